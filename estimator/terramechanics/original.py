@@ -1,0 +1,166 @@
+"""The original model, Eqs. (1)-(10): stresses on the rim, integrated by Gauss-Legendre quadrature.
+
+Angles θ [rad] are measured from bottom dead centre, positive forward: entry θ₁, peak of normal stress θₘ, exit θ₂.
+Samples run along the last axis: every argument is a float or an array (n,), and the results have that shape.
+Angles inside the contact carry the quadrature nodes on the axis before it. Valid for 0 ≤ θ₁ ≤ π/2, −1 ≤ i ≤ 1.
+
+The pieces can be called apart: `contact` gives σ and τ at the nodes, `integrate` sums whatever stands there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
+
+Mobilisation = Callable[[Array], Array]  # share of the shear strength mobilised at j/k; odd in j/k
+
+ORDER = 16  # nodes in each of the two zones; docs/physics.md states the error
+LOCKED = 1e-9  # smallest 1 + i: a locked wheel has travelled 1e9 times what its rim has turned
+
+
+class Contact(NamedTuple):
+    """Stresses at the nodes of both zones; each field (2·order, n), or (2·order,) for one sample."""
+
+    theta: Array  # [rad]
+    weight: Array  # quadrature weight times dθ [rad]
+    sigma: Array  # normal stress [Pa]
+    tau: Array  # shear stress, positive where it drives the wheel forward [Pa]
+
+
+class Forces(NamedTuple):
+    """What the soil does to the wheel; each field (n,), or 0-d for one sample."""
+
+    drawbar_pull: Array  # DP [N], Eq. (8)
+    load: Array  # W [N], Eq. (9)
+    torque: Array  # T [N·m], Eq. (10)
+    resistance: Array  # second term of (8), rb∫σ sin θ dθ [N]
+
+
+def theta_m(wheel: Wheel, slip: Scalar, theta_1: Scalar) -> Scalar:
+    """Angle of maximum stress [rad], kept inside [0, θ₁]. Eq. (5)."""
+    return np.clip(wheel.c1 + wheel.c2 * slip, 0.0, 1.0) * theta_1
+
+
+def velocity_ratio(slip: Scalar) -> Array:
+    """Carriage speed over rim speed, v/(rω): 1 − i when driving, 1/(1 + i) when braking.
+
+    Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with the same slope.
+    """
+    slip = np.asarray(slip, dtype=float)
+    return np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + np.minimum(slip, 0.0), LOCKED))
+
+
+def front_stress(wheel: Wheel, soil: Soil, theta_1: Scalar, theta: Scalar) -> Array:
+    """Normal stress σ [Pa] between θₘ and θ₁, Eq. (3): K rⁿ (cos θ − cos θ₁)ⁿ; zero ahead of θ₁."""
+    # cos θ − cos θ₁ as a product, which keeps its digits when both angles are small
+    depth = 2.0 * wheel.radius * np.sin(0.5 * (theta_1 + theta)) * np.sin(0.5 * (theta_1 - theta))
+    stress: Array = soil.modulus * np.maximum(depth, 0.0) ** soil.exponent
+    return stress
+
+
+def rear_stress(
+    wheel: Wheel, soil: Soil, theta_1: Scalar, theta_m: Scalar, theta: Scalar, theta_2: Scalar = 0.0
+) -> Array:
+    """Normal stress σ [Pa] between θ₂ and θₘ, Eq. (4): the front zone's, mirrored and stretched about θₘ."""
+    mirrored = theta_1 - (theta - theta_2) * (theta_1 - theta_m) / (theta_m - theta_2)
+    return front_stress(wheel, soil, theta_1, mirrored)
+
+
+def shear_displacement(wheel: Wheel, theta_1: Scalar, slip: Scalar, theta: Scalar) -> Array:
+    """Shear displacement j [m] of the soil at θ, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ − sin θ)].
+
+    The rim moves past the soil at rω − v cos θ while θ falls from θ₁ at the rate ω, so j = r∫(1 − (v/rω) cos θ) dθ.
+    Written with v/(rω) it holds for driving and braking; j < 0 where the soil has been dragged forward.
+    """
+    turned = theta_1 - theta
+    advanced = 2.0 * np.cos(0.5 * (theta_1 + theta)) * np.sin(0.5 * turned)  # sin θ₁ − sin θ
+    displacement: Array = wheel.radius * (turned - velocity_ratio(slip) * advanced)
+    return displacement
+
+
+def janosi(x: Array) -> Array:
+    """Share of the shear strength mobilised at x = j/k, Eq. (2): 1 − e^(−x); odd, so that τ has the sign of j.
+
+    Janosi and Hanamoto (1961).
+    """
+    return np.copysign(np.expm1(-np.abs(x)), x)
+
+
+def shear_stress(soil: Soil, sigma: Array, displacement: Array, mobilisation: Mobilisation = janosi) -> Array:
+    """Shear stress τ [Pa], Eqs. (2) and (7): (c + σ tan φ)(1 − e^(−j/k))."""
+    stress: Array = (soil.cohesion + sigma * soil.tan_phi) * mobilisation(displacement / soil.shear_modulus)
+    return stress
+
+
+def contact(
+    wheel: Wheel,
+    soil: Soil,
+    theta_1: Scalar,
+    slip: Scalar,
+    *,
+    theta_m: Scalar | None = None,
+    theta_2: Scalar = 0.0,
+    mobilisation: Mobilisation = janosi,
+    order: int = ORDER,
+) -> Contact:
+    """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones."""
+    peak = _peak(wheel, slip, theta_1) if theta_m is None else theta_m
+    shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
+    s, ds = (values.reshape(-1, *(1 for _ in shape)) for values in _nodes(order))
+    front, rear = theta_1 - s * (theta_1 - peak), theta_2 + s * (peak - theta_2)
+    theta = np.concatenate(np.broadcast_arrays(rear, front))
+    weight = np.concatenate(np.broadcast_arrays(ds * (peak - theta_2), ds * (theta_1 - peak)))
+    sigma = front_stress(wheel, soil, theta_1, front)
+    sigma = np.concatenate((sigma, sigma))  # Eq. (4) gives the rear zone the same stress at the same s
+    tau = shear_stress(soil, sigma, shear_displacement(wheel, theta_1, slip, theta), mobilisation)
+    return Contact(theta, weight, sigma, tau)
+
+
+def integrate(wheel: Wheel, contact: Contact) -> Forces:
+    """Forces on the wheel from the stresses on its rim, Eqs. (8)-(10)."""
+    theta, weight, sigma, tau = contact
+    sine, cosine = np.sin(theta), np.cos(theta)
+    area = wheel.radius * wheel.width
+    sigma, tau = area * weight * sigma, area * weight * tau
+    resistance = np.sum(sigma * sine, axis=0)
+    drawbar_pull = np.sum(tau * cosine, axis=0) - resistance  # Eq. (8)
+    load = np.sum(tau * sine + sigma * cosine, axis=0)  # Eq. (9)
+    torque = wheel.radius * np.sum(tau, axis=0)  # Eq. (10)
+    return Forces(drawbar_pull, load, torque, resistance)
+
+
+def forces(
+    wheel: Wheel,
+    soil: Soil,
+    theta_1: Scalar,
+    slip: Scalar,
+    *,
+    theta_m: Scalar | None = None,
+    theta_2: Scalar = 0.0,
+    mobilisation: Mobilisation = janosi,
+    order: int = ORDER,
+) -> Forces:
+    """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the paper."""
+    stresses = contact(
+        wheel, soil, theta_1, slip, theta_m=theta_m, theta_2=theta_2, mobilisation=mobilisation, order=order
+    )
+    return integrate(wheel, stresses)
+
+
+_peak = theta_m  # `contact` has an argument of that name
+
+
+@cache
+def _nodes(order: int) -> tuple[Array, Array]:
+    """Nodes and weights on s ∈ [0, 1], where s = 0 is the stress-free end of a zone and s = 1 is θₘ.
+
+    Gauss-Legendre in t with s = t³: stress starts as sⁿ, which is t³ⁿ and so smooth enough for any n of a soil.
+    """
+    t, weight = np.polynomial.legendre.leggauss(order)
+    t = 0.5 * (t + 1.0)
+    return t**3, 1.5 * weight * t**2

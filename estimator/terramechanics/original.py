@@ -2,7 +2,7 @@
 
 Angles θ [rad] are measured from bottom dead centre, positive forward: entry θ₁, peak of normal stress θₘ, exit θ₂.
 Samples run along the last axis: every argument is a float or an array (n,), and the results have that shape.
-Angles inside the contact carry the quadrature nodes on the axis before it. Valid for 0 ≤ θ₁ ≤ π/2, −1 ≤ i ≤ 1.
+Angles inside the contact carry the quadrature nodes on the axis before it. Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤ 1.
 
 The pieces can be called apart: `contact` gives σ and τ at the nodes, `integrate` sums whatever stands there.
 """
@@ -23,10 +23,20 @@ ORDER = 16  # nodes in each of the two zones; docs/physics.md states the error
 LOCKED = 1e-9  # smallest 1 + i: a locked wheel has travelled 1e9 times what its rim has turned
 
 
-class Contact(NamedTuple):
-    """Stresses at the nodes of both zones; each field (2·order, n), or (2·order,) for one sample."""
+class Arc(NamedTuple):
+    """Points θ on the rim, seen from the entry angle θ₁."""
 
-    theta: Array  # [rad]
+    turned: Array  # θ₁ − θ [rad]
+    sine: Array  # sin θ
+    cosine: Array  # cos θ
+    drop: Array  # cos θ − cos θ₁, depth below the surface over r
+    advance: Array  # sin θ₁ − sin θ
+
+
+class Contact(NamedTuple):
+    """Stresses at the nodes, rear zone first; each field (2·order, n), or (2·order,) for one sample."""
+
+    points: Arc
     weight: Array  # quadrature weight times dθ [rad]
     sigma: Array  # normal stress [Pa]
     tau: Array  # shear stress, positive where it drives the wheel forward [Pa]
@@ -55,11 +65,20 @@ def velocity_ratio(slip: Scalar) -> Array:
     return np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + np.minimum(slip, 0.0), LOCKED))
 
 
-def front_stress(wheel: Wheel, soil: Soil, theta_1: Scalar, theta: Scalar) -> Array:
+def arc(theta_1: Scalar, theta: Scalar) -> Arc:
+    """Angles of a point θ on the rim; differences of sines and cosines keep their digits however small the angles."""
+    turned = np.subtract(theta_1, theta)
+    half = np.sin(0.5 * turned)
+    other = np.sqrt(1.0 - half * half)  # cos((θ₁ − θ)/2), at a tenth of the price
+    sin_1, cos_1 = np.sin(theta_1), np.cos(theta_1)
+    drop = 2.0 * half * (sin_1 * other - cos_1 * half)
+    advance = 2.0 * half * (cos_1 * other + sin_1 * half)
+    return Arc(turned, sin_1 - advance, cos_1 + drop, drop, advance)
+
+
+def front_stress(wheel: Wheel, soil: Soil, front: Arc) -> Array:
     """Normal stress σ [Pa] between θₘ and θ₁, Eq. (3): K rⁿ (cos θ − cos θ₁)ⁿ; zero ahead of θ₁."""
-    # cos θ − cos θ₁ as a product, which keeps its digits when both angles are small
-    depth = 2.0 * wheel.radius * np.sin(0.5 * (theta_1 + theta)) * np.sin(0.5 * (theta_1 - theta))
-    stress: Array = soil.modulus * np.maximum(depth, 0.0) ** soil.exponent
+    stress: Array = soil.modulus * (wheel.radius * np.maximum(front.drop, 0.0)) ** soil.exponent
     return stress
 
 
@@ -68,18 +87,16 @@ def rear_stress(
 ) -> Array:
     """Normal stress σ [Pa] between θ₂ and θₘ, Eq. (4): the front zone's, mirrored and stretched about θₘ."""
     mirrored = theta_1 - (theta - theta_2) * (theta_1 - theta_m) / (theta_m - theta_2)
-    return front_stress(wheel, soil, theta_1, mirrored)
+    return front_stress(wheel, soil, arc(theta_1, mirrored))
 
 
-def shear_displacement(wheel: Wheel, theta_1: Scalar, slip: Scalar, theta: Scalar) -> Array:
-    """Shear displacement j [m] of the soil at θ, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ − sin θ)].
+def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
+    """Shear displacement j [m] of the soil, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ − sin θ)].
 
     The rim moves past the soil at rω − v cos θ while θ falls from θ₁ at the rate ω, so j = r∫(1 − (v/rω) cos θ) dθ.
     Written with v/(rω) it holds for driving and braking; j < 0 where the soil has been dragged forward.
     """
-    turned = theta_1 - theta
-    advanced = 2.0 * np.cos(0.5 * (theta_1 + theta)) * np.sin(0.5 * turned)  # sin θ₁ − sin θ
-    displacement: Array = wheel.radius * (turned - velocity_ratio(slip) * advanced)
+    displacement: Array = wheel.radius * (points.turned - velocity_ratio(slip) * points.advance)
     return displacement
 
 
@@ -113,23 +130,22 @@ def contact(
     shape = np.broadcast_shapes(*(np.shape(value) for value in (theta_1, slip, peak, theta_2)))
     s, ds = (values.reshape(-1, *(1 for _ in shape)) for values in _nodes(order))
     front, rear = theta_1 - s * (theta_1 - peak), theta_2 + s * (peak - theta_2)
-    theta = np.concatenate(np.broadcast_arrays(rear, front))
+    points = arc(theta_1, np.concatenate(np.broadcast_arrays(rear, front)))
     weight = np.concatenate(np.broadcast_arrays(ds * (peak - theta_2), ds * (theta_1 - peak)))
-    sigma = front_stress(wheel, soil, theta_1, front)
+    sigma = front_stress(wheel, soil, Arc(*(field[order:] for field in points)))
     sigma = np.concatenate((sigma, sigma))  # Eq. (4) gives the rear zone the same stress at the same s
-    tau = shear_stress(soil, sigma, shear_displacement(wheel, theta_1, slip, theta), mobilisation)
-    return Contact(theta, weight, sigma, tau)
+    tau = shear_stress(soil, sigma, shear_displacement(wheel, slip, points), mobilisation)
+    return Contact(points, weight, sigma, tau)
 
 
 def integrate(wheel: Wheel, contact: Contact) -> Forces:
     """Forces on the wheel from the stresses on its rim, Eqs. (8)-(10)."""
-    theta, weight, sigma, tau = contact
-    sine, cosine = np.sin(theta), np.cos(theta)
-    area = wheel.radius * wheel.width
-    sigma, tau = area * weight * sigma, area * weight * tau
-    resistance = np.sum(sigma * sine, axis=0)
-    drawbar_pull = np.sum(tau * cosine, axis=0) - resistance  # Eq. (8)
-    load = np.sum(tau * sine + sigma * cosine, axis=0)  # Eq. (9)
+    points = contact.points
+    area = wheel.radius * wheel.width * contact.weight  # r b dθ
+    sigma, tau = area * contact.sigma, area * contact.tau
+    resistance = np.sum(sigma * points.sine, axis=0)
+    drawbar_pull = np.sum(tau * points.cosine, axis=0) - resistance  # Eq. (8)
+    load = np.sum(tau * points.sine + sigma * points.cosine, axis=0)  # Eq. (9)
     torque = wheel.radius * np.sum(tau, axis=0)  # Eq. (10)
     return Forces(drawbar_pull, load, torque, resistance)
 

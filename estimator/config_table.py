@@ -1,0 +1,383 @@
+"""The format of the configuration file: every key with its kind, unit, bounds, default and meaning.
+
+Parsing, defaults, error lines and the reference in docs/configuration.md all come from these tables. A default is
+written as it would be in the file. The builders below them check what concerns several keys at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from estimator.readings import CHANNELS, ENCODERS, REQUIRED
+from estimator.schema import (
+    ABSENT,
+    NEEDED,
+    UNLIMITED,
+    Choice,
+    Impossible,
+    Integer,
+    Interval,
+    Key,
+    Kind,
+    Named,
+    Options,
+    Quantity,
+    Section,
+    Text,
+    UncertainQuantity,
+    Variant,
+    entries,
+)
+from estimator.settings import (
+    Calibration,
+    Channel,
+    ConfiguredEffect,
+    Device,
+    Drive,
+    FilterSettings,
+    Load,
+    Logging,
+    Rates,
+    Settings,
+    SoilPrior,
+    Uncertain,
+    Wrench,
+)
+from estimator.terramechanics.soil import PressureSinkage, Wheel
+from estimator.yamltree import Mapping as Tree
+from estimator.yamltree import Node, Scalar
+
+EffectSchema = Callable[[str], Mapping[str, str] | None]
+"""Effect name → unit of each of its parameters; None for a name that is no effect."""
+
+
+def _uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
+    return UncertainQuantity(Quantity(unit, **bounds))
+
+
+NAME = Text("a name", r".*\S.*")
+
+# ---- wheel, soil, drive, load --------------------------------------------------------------------------------------
+
+WHEEL = {
+    "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
+    "width": Key(Quantity("m", above=0, high=5), "wheel width b"),
+    "c1": Key(Quantity("", low=0, high=1), "c₁ of θₘ = (c₁ + c₂ i) θ₁, Eq. (5)", "0.5"),
+    "c2": Key(Quantity("", low=-1, high=1), "c₂ of Eq. (5)", "0.0"),
+}
+
+SOIL = {
+    "cohesion": Key(_uncertain("Pa", low=0, high=1e6), "cohesion c, before the run"),
+    "tan_phi": Key(_uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"),
+    "shear_modulus": Key(_uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
+    "exponent": Key(_uncertain("", above=0, high=5), "sinkage exponent n"),
+    "k_c": Key(Quantity("Pa/m^(n-1)"), "with `k_phi`, Bekker: σ = (k_c/b + k_φ) zⁿ", ABSENT),
+    "k_phi": Key(Quantity("Pa/m^n"), "with `k_c`", ABSENT),
+    "k1": Key(Quantity("Pa"), "with `k2`, instead of `k_c` and `k_phi`, Reece, Eq. (1): σ = (k₁ + k₂ b)(z/b)ⁿ", ABSENT),
+    "k2": Key(Quantity("Pa/m"), "with `k1`", ABSENT),
+    "modulus_sigma": Key(Quantity("", low=0, high=1), "relative standard deviation of K in σ = K zⁿ", "0.0"),
+}
+
+DRIVE = {
+    "torque_constant": Key(_uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"),
+    "torque_source": Key(Choice(("motor_shunt", "wrench")), "the channel that gives the torque", "motor_shunt"),
+}
+
+LOAD = {
+    "nominal": Key(_uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"),
+    "minimum": Key(Quantity("N", low=0), "under this load the wheel is in the air", "5 N"),
+}
+
+FORMS = {"bekker": ("k_c", "k_phi"), "reece": ("k1", "k2")}
+
+
+def _soil(exponent: Uncertain, **values: Any) -> SoilPrior:
+    """Raises Impossible unless the moduli stand there in exactly one form."""
+    moduli = {form: [values.pop(name) for name in names] for form, names in FORMS.items()}
+    begun = [form for form, pair in moduli.items() if pair != [None, None]]
+    expected = "the moduli in one form, k_c and k_phi or k1 and k2"
+    if len(begun) != 1:
+        raise Impossible("k1" if begun and moduli["reece"][0] is not None else "k2" if begun else "k_c", expected)
+    form = begun[0]
+    for name, value in zip(FORMS[form], moduli[form], strict=True):
+        if value is None:
+            raise Impossible(name, expected)
+    law = PressureSinkage("bekker" if form == "bekker" else "reece", exponent.value, *moduli[form])
+    return SoilPrior(exponent=exponent, pressure_sinkage=law, **values)
+
+
+def _load(nominal: Uncertain, minimum: float) -> Load:
+    if minimum >= nominal.value:
+        raise Impossible("minimum", "less than load.nominal")
+    return Load(nominal, minimum)
+
+
+# ---- devices -------------------------------------------------------------------------------------------------------
+
+SERIAL = {
+    "kind": Key(Choice(("serial",)), "a serial port"),
+    "port": Key(NAME, "path of the port, such as /dev/ttyACM0"),
+    "baud": Key(Integer(300, 12_000_000), "bits per second", "115200"),
+    "framing": Key(Choice(("cobs", "ascii")), "COBS with CRC-16 and sequence number, or lines with a checksum", "cobs"),
+}
+
+
+@dataclass(frozen=True)
+class FilePath:
+    """A path. A relative one counts from the folder and stands absolute in the effective configuration."""
+
+    folder: Path | None
+    expected: str = "a path"
+
+    def read(self, node: Node) -> tuple[str, Node]:
+        text, _ = Text(self.expected).read(node)
+        path = str(self.folder / text) if self.folder and text else text
+        return path, Scalar(node.place, path, "str")
+
+
+def _can(folder: Path | None) -> dict[str, Key]:
+    return {
+        "kind": Key(Choice(("can",)), "a CAN bus"),
+        "interface": Key(NAME, "name of a python-can interface", "socketcan"),
+        "channel": Key(NAME, "channel of that interface", "can0"),
+        "bitrate": Key(Integer(10_000, 1_000_000), "bits per second", "500000"),
+        "dbc": Key(FilePath(folder), "CAN database; a relative path counts from the folder of this file", "''"),
+        "options": Key(Options(), "further arguments of the python-can interface", "{}"),
+        "signals": Key(Named(Options(), lambda _, value: value), "signals defined here instead of in a DBC", "{}"),
+    }
+
+
+def _device(folder: Path | None) -> Variant:
+    return Variant("kind", {"serial": Section(SERIAL, partial(Device, "")), "can": Section(_can(folder), _bus)})
+
+
+def _bus(dbc: str, signals: dict[str, Any], **values: Any) -> Device:
+    if not dbc and not signals:
+        raise Impossible("dbc", "a CAN database, or signals defined here")
+    return Device("", dbc=dbc, signals=signals, **values)
+
+
+# ---- channels ------------------------------------------------------------------------------------------------------
+
+# channel -> raw unit, physical unit, unit of raw differences
+UNITS = {
+    "wheel_encoder": ("count", "rad", "count"),
+    "carriage_encoder": ("count", "rad", "count"),
+    "sinkage_pot": ("V", "m", "V"),
+    "motor_shunt": ("V", "A", "V"),
+    "motor_temperature": ("degC", "K", "K"),
+}
+
+
+def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
+    return {
+        "scale": Key(_uncertain(scale), "physical = raw · scale + offset", default_scale),
+        "offset": Key(_uncertain(offset), "see `scale`", f"0 {offset}"),
+        "date": Key(Text("a date such as 2026-11-20", r"|\d{4}-\d\d-\d\d"), "day of the calibration", "''"),
+        "serial": Key(Text(), "serial number of the sensor", "''"),
+    }
+
+
+def _timing() -> dict[str, Key]:
+    return {
+        "latency": Key(Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"),
+        "stale_after": Key(Quantity("s", above=0, high=10), "silence after which the channel is stale", "50 ms"),
+    }
+
+
+def _source() -> dict[str, Key]:
+    return {
+        "device": Key(NAME, "name of the device it comes from"),
+        "signal": Key(NAME, "key in the serial frame, or Message.Signal of the CAN database"),
+    }
+
+
+def _channel(name: str) -> Section:
+    """Keys of one channel, in its units."""
+    raw, physical, step = UNITS[name]
+    slope = f"{physical}/{raw}"
+    keys = _source() | (_calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED))
+    keys["noise"] = Key(Quantity(step, low=0), "standard deviation of one reading")
+    if name in ENCODERS:
+        keys["range"] = Key(Interval(Quantity(raw), unlimited=True), "valid counts", UNLIMITED)
+        keys["bits"] = Key(Integer(8, 64), "width of the counter on the wire", "32")
+    else:
+        keys["range"] = Key(Interval(Quantity(raw)), "valid readings; one outside is quarantined")
+    max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
+    keys["max_rate"] = Key(max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED)
+    return Section(keys | _timing(), partial(_build_channel, name))
+
+
+def _build_channel(name: str, **values: Any) -> Channel:
+    low, high = values.pop("range")
+    calibration = _build_calibration(**{key: values.pop(key) for key in ("scale", "offset", "date", "serial")})
+    return Channel(name=name, calibration=calibration, low=low, high=high, **values)
+
+
+def _build_calibration(scale: Uncertain, **values: Any) -> Calibration:
+    if scale.value == 0.0:
+        raise Impossible("scale", "a scale other than 0", "0")
+    return Calibration(scale, **values)
+
+
+WRENCH = {
+    "device": Key(NAME, "name of the device it comes from"),
+    "signal": Key(NAME, "key in the serial frame, or the messages of the CAN database"),
+    "drawbar_pull": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fx", "{}"),
+    "load": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fz", "{}"),
+    "torque": Key(Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"),
+    "force_noise": Key(Quantity("N", low=0), "standard deviation of one force reading"),
+    "torque_noise": Key(Quantity("N*m", low=0), "standard deviation of one torque reading"),
+    "max_force": Key(Quantity("N", above=0), "a larger force is quarantined", "10 kN"),
+    "max_torque": Key(Quantity("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
+}
+
+
+def _channels() -> Section:
+    """The channels by name; the optional ones may be absent."""
+    keys = {
+        name: Key(
+            Section(WRENCH | _timing(), Wrench) if name == "wrench" else _channel(name),
+            CHANNEL_DOCS[name],
+            NEEDED if name in REQUIRED else ABSENT,
+        )
+        for name in CHANNELS
+    }
+    return Section(keys, dict)
+
+
+CHANNEL_DOCS = {
+    "wheel_encoder": "counts of the wheel axle; physical: angle of the wheel",
+    "carriage_encoder": "counts of the carriage pulley; physical: angle of the pulley",
+    "sinkage_pot": "volts of the potentiometer; physical: sinkage z",
+    "motor_shunt": "volts of the current shunt's amplifier; physical: motor current",
+    "wrench": "force/torque sensor: fx drawbar pull, fz vertical load, ty torque about the axle",
+    "motor_temperature": "degrees Celsius of the winding",
+}
+
+# ---- rates, filter, logging, effects, run --------------------------------------------------------------------------
+
+RATES = {
+    "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
+    "update": Key(Quantity("Hz", above=0, high=1000), "updates of the filter; its window is 1/update", "10 Hz"),
+    "horizon": Key(Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"),
+}
+
+FILTER = {
+    "engine": Key(Choice(("filterpy", "plain")), "same numbers from both; plain is the faster", "filterpy"),
+    "cohesion_walk": Key(Quantity("Pa/sqrt(s)", low=0), "random walk of c", "2 Pa/sqrt(s)"),
+    "tan_phi_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of tan φ", "2e-4 1/sqrt(s)"),
+    "ln_k_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of ln k", "1e-4 1/sqrt(s)"),
+    "gate": Key(Quantity("", above=0), "innovations of more standard deviations are rejected", "5.0"),
+    "cohesion_bounds": Key(Interval(Quantity("Pa", low=0)), "c stays inside", "[0 kPa, 50 kPa]"),
+    "tan_phi_bounds": Key(Interval(Quantity("", above=0)), "tan φ stays inside", "[0.05, 1.5]"),
+    "shear_modulus_bounds": Key(Interval(Quantity("m", above=0)), "k stays inside", "[1 mm, 200 mm]"),
+    "estimate_k": Key(Choice(("auto", "always", "never")), "k as a state; auto: where slip varies enough", "auto"),
+    "model_sigma": Key(Quantity("", low=0, high=1), "relative error of the closed forms not modelled elsewhere", "0.0"),
+}
+
+LOGGING = {
+    "directory": Key(NAME, "folder of the recordings", "runs"),
+    "flush_interval": Key(Quantity("s", above=0, high=60), "every chunk is closed and synced this often", "200 ms"),
+    "compression": Key(Choice(("zstd", "lz4", "none")), "compression of a chunk", "zstd"),
+}
+
+RUN = {
+    "name": Key(Text(), "name of the run", "''"),
+    "load": Key(Quantity("N", above=0), "nominal load of the run", ABSENT),
+    "pass": Key(Integer(1, 1000), "how often the wheel goes over this track, from 1", "1"),
+    "start": Key(Quantity("m"), "starting position of the wheel on the bed", "0 m"),
+    "notes": Key(Text(), "anything worth keeping, one line", "''"),
+}
+
+
+def _rates(tick: float, update: float, horizon: float) -> Rates:
+    ratio = tick / update
+    if round(ratio) < 2 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+        raise Impossible("tick", f"a whole multiple of rates.update ({update:g} Hz), at least twice it")
+    return Rates(tick, update, horizon)
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Effect name → parameters. With a schema each has its unit; without one any quantity will do."""
+
+    schema: EffectSchema | None
+    expected: str = "a mapping of effects"
+
+    def read(self, node: Node) -> tuple[tuple[ConfiguredEffect, ...], Node]:
+        given = entries(node, self.expected)
+        read = {name: self._parameters(name, item).read(item) for name, item in given.items()}
+        effects = tuple(ConfiguredEffect(name, parameters) for name, (parameters, _) in read.items())
+        return effects, Tree(node.place, {name: complete for name, (_, complete) in read.items()})
+
+    def _parameters(self, name: str, item: Node) -> Kind:
+        if self.schema is None:
+            return Named(UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters")
+        if (known := self.schema(name)) is None:
+            raise item.place.error("an unknown effect", "the name of an effect")
+        keys = {parameter: Key(_uncertain(unit), "parameter") for parameter, unit in known.items()}
+        return Section(keys, dict, "a mapping of parameters")
+
+
+# ---- the whole file ------------------------------------------------------------------------------------------------
+
+
+def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:
+    """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if there is one."""
+    devices = Named(_device(folder), lambda name, device: replace(device, name=name), "a mapping of devices")
+    keys = {
+        "testbed": Key(NAME, "name of the testbed"),
+        "wheel": Key(Section(WHEEL, Wheel), "the rigid wheel"),
+        "pulley_radius": Key(Quantity("m", above=0, high=5), "radius of the carriage encoder's pulley"),
+        "soil": Key(Section(SOIL, _soil), "what is known of the soil before the run"),
+        "drive": Key(Section(DRIVE, Drive), "motor and gear, seen from the wheel axle"),
+        "load": Key(Section(LOAD, _load), "the vertical load"),
+        "devices": Key(devices, "serial ports and CAN buses, by names of your choice"),
+        "channels": Key(_channels(), "the sensors"),
+        "rates": Key(Section(RATES, _rates), "how often", "{}"),
+        "filter": Key(Section(FILTER, FilterSettings), "the extended Kalman filter", "{}"),
+        "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),
+        "effects": Key(Effects(effect_schema), "physics beyond the paper's, by effect name", "{}"),
+        "run": Key(Section(RUN, dict), "about this run; the command line may say it instead", ABSENT),
+    }
+    return Section(keys, _settings)
+
+
+def _settings(channels: dict[str, Any], run: dict[str, Any] | None, **values: Any) -> tuple[Settings, dict[str, Any]]:
+    wrench = channels.pop("wrench")
+    known = {name: channel for name, channel in channels.items() if channel is not None}
+    settings = Settings(channels=known, wrench=wrench, **values)
+    _check_channels(settings)
+    _check_soil(settings)
+    return settings, run or {}
+
+
+def _check_channels(settings: Settings) -> None:
+    """Every channel has its device and arrives within the horizon; the torque's channel is there."""
+    if settings.drive.torque_source == "wrench" and settings.wrench is None:
+        raise Impossible("drive.torque_source", "motor_shunt, since there is no channel wrench")
+    sources = dict(settings.channels) | ({"wrench": settings.wrench} if settings.wrench else {})
+    for name, channel in sources.items():
+        if channel.device not in settings.devices:
+            names = ", ".join(settings.devices) or "none there"
+            raise Impossible(f"channels.{name}.device", f"the name of a device ({names})")
+        if channel.latency >= settings.rates.horizon:
+            raise Impossible(f"channels.{name}.latency", "less than rates.horizon, or no reading arrives in time")
+
+
+def _check_soil(settings: Settings) -> None:
+    """The moduli carry the wheel, and the filter starts inside its bounds."""
+    soil, bounds = settings.soil, settings.filter
+    if settings.soil.pressure_sinkage.modulus(settings.wheel.width) <= 0:
+        second = FORMS[soil.pressure_sinkage.form][1]
+        raise Impossible(f"soil.{second}", "moduli that give a positive pressure under this wheel")
+    for name in ("cohesion", "tan_phi", "shear_modulus"):
+        low, high = getattr(bounds, f"{name}_bounds")
+        value = getattr(soil, name).value
+        if not low <= value <= high:
+            raise Impossible(f"soil.{name}", f"a value inside filter.{name}_bounds", f"{value:g} (SI)")

@@ -1,0 +1,266 @@
+"""An MCAP file written chunk by chunk (mcap.dev/spec), each chunk readable without any other part of the file.
+
+The mcap library's own Writer puts schemas and channels into the first chunk only, so one damaged block can take the
+whole of an unclosed file with it. Here every chunk repeats the definitions it needs, under its checksum; the library's
+record classes write everything that is not a message.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import lz4.frame  # type: ignore[import-untyped]
+import numpy as np
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from numpy.typing import NDArray
+
+MAGIC = b"\x89MCAP0\r\n"
+PROFILE = "ros2"
+LIBRARY = "gritd"
+RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
+MESSAGE_DTYPE = np.dtype(
+    {
+        "names": ["opcode", "length", "channel", "sequence", "log_time", "publish_time"],
+        "formats": ["<u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
+        "offsets": [0, 1, 9, 11, 15, 23],
+        "itemsize": MESSAGE_HEAD.size,
+    }
+)
+
+Definition = tuple[Schema, Channel]
+Starts = NDArray[np.int64]
+
+
+class RecordingError(Exception):
+    """A recording cannot be written or read; the message is one line. `errno` is the system's, where it was asked."""
+
+    def __init__(self, message: str, errno: int | None = None) -> None:
+        super().__init__(message)
+        self.errno = errno
+
+
+@contextmanager
+def reported(path: Path, doing: str) -> Iterator[None]:
+    """Turn an OSError into one line naming the file."""
+    try:
+        yield
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot {doing}: {error.strerror or error}", error.errno) from error
+
+
+def gather(content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy, shape (n,).
+
+    Every record must lie inside: starts + dtype.itemsize <= len(content).
+    """
+    if starts.size == 0:
+        return np.empty(0, dtype)
+    room = len(content) - dtype.itemsize + 1
+    windows = np.ndarray((room,), np.dtype((np.void, dtype.itemsize)), content, strides=(1,))
+    return np.asarray(windows[starts]).view(dtype)
+
+
+def record_bytes(*records: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]
+
+
+class McapFile:
+    """The file on disk: a valid prefix at every moment, an index once closed.
+
+    A write that fails takes back what it wrote in part, so the file ends at its last whole record and the same call can
+    be made again. Raises RecordingError.
+    """
+
+    def __init__(self, path: Path, compression: str = "zstd") -> None:
+        if compression not in ("zstd", "lz4", "none"):
+            raise RecordingError(f"{path}: compression {compression!r} is not one of zstd, lz4, none")
+        self.path = path
+        self._compression = "" if compression == "none" else compression
+        self._definitions: dict[int, Definition] = {}
+        self._preambles: dict[int, bytes] = {}
+        self._metadata_index: list[MetadataIndex] = []
+        self._chunk_indexes: list[bytes] = []
+        self._counts: Counter[int] = Counter()
+        self._span: tuple[int, int] | None = None  # first and last log_time [ns]
+        self._length = 0
+        self._crc = 0
+        with reported(path, "create"):
+            self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - it lives as long as the run
+        self._append(MAGIC + record_bytes(Header(PROFILE, LIBRARY)))
+
+    def fileno(self) -> int:
+        return self._file.fileno()
+
+    def define(self, schema: Schema, channel: Channel) -> None:
+        """Make a channel known; its definition is written into every chunk that uses it."""
+        self._definitions[channel.id] = (schema, channel)
+        self._preambles[channel.id] = record_bytes(schema, channel)
+
+    def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
+        data = record_bytes(Metadata(name=name, metadata=dict(entries)))
+        index = MetadataIndex(offset=self._length, length=len(data), name=name)
+        self._append(data)
+        self._metadata_index.append(index)
+
+    def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
+        """Write message records, concatenated in `messages`, that begin at `starts`, in this order, as one chunk."""
+        heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
+        preamble = b"".join(self._preambles[int(c)] for c in np.unique(heads["channel"]))
+        content = preamble + messages
+        offsets = np.asarray(starts, np.uint64) + np.uint64(len(preamble))
+        span = int(heads["log_time"].min()), int(heads["log_time"].max())
+        chunk = record_bytes(self._chunk(content, span))
+        indexes = [_message_index(int(c), heads, offsets) for c in np.unique(heads["channel"])]
+        entry = self._chunk_index(chunk, indexes, len(content), span)
+        self._append(chunk + b"".join(index for _, index in indexes))
+        self._chunk_indexes.append(entry)
+        self._counts.update(heads["channel"].tolist())
+        self._span = span if self._span is None else (min(self._span[0], span[0]), max(self._span[1], span[1]))
+
+    def sync(self) -> None:
+        """Ask the kernel to put everything written on the medium, and wait for it."""
+        with reported(self.path, "sync"):
+            os.fdatasync(self._file.fileno())
+
+    def close(self) -> None:
+        """Write index and summary and close. Whatever fails, the file is closed and stays a valid prefix."""
+        try:
+            self._append(self._ending())
+            self.sync()
+        finally:
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Close without an index; what was written stays readable."""
+        with suppress(OSError):
+            self._file.close()
+
+    def _append(self, data: bytes) -> None:
+        view = memoryview(data)
+        try:
+            with reported(self.path, "write"):
+                while view:
+                    view = view[self._file.write(view) :]
+        except RecordingError:
+            self._rewind()
+            raise
+        self._length += len(data)
+        self._crc = zlib.crc32(data, self._crc)
+
+    def _rewind(self) -> None:
+        with suppress(OSError):
+            self._file.truncate(self._length)
+            self._file.seek(self._length)
+
+    def _chunk(self, content: bytes, span: tuple[int, int]) -> Chunk:
+        return Chunk(
+            compression=self._compression,
+            data=_compress(self._compression, content),
+            message_start_time=span[0],
+            message_end_time=span[1],
+            uncompressed_crc=zlib.crc32(content),
+            uncompressed_size=len(content),
+        )
+
+    def _chunk_index(
+        self, chunk: bytes, indexes: Sequence[tuple[int, bytes]], size: int, span: tuple[int, int]
+    ) -> bytes:
+        """Serialised at once: closing the file then costs a join, however long the run was."""
+        position = self._length + len(chunk)
+        offsets: dict[int, int] = {}
+        for channel, index in indexes:
+            offsets[channel] = position
+            position += len(index)
+        return record_bytes(
+            ChunkIndex(
+                chunk_length=len(chunk),
+                chunk_start_offset=self._length,
+                compression=self._compression,
+                compressed_size=len(chunk) - RECORD_HEAD.size - 40 - len(self._compression),
+                message_end_time=span[1],
+                message_index_length=position - self._length - len(chunk),
+                message_index_offsets=offsets,
+                message_start_time=span[0],
+                uncompressed_size=size,
+            )
+        )
+
+    def _ending(self) -> bytes:
+        data_end = record_bytes(DataEnd(self._crc))
+        start = self._length + len(data_end)
+        groups = self._summary_groups()
+        summary, offsets = b"", b""
+        for opcode, group in groups:
+            if group:
+                place = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(group))
+                offsets += record_bytes(place)
+                summary += group
+        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        summary += offsets
+        crc = zlib.crc32(summary + record_bytes(footer)[:-4])
+        return data_end + summary + record_bytes(Footer(start, footer.summary_offset_start, crc)) + MAGIC
+
+    def _summary_groups(self) -> list[tuple[Opcode, bytes]]:
+        used = [self._definitions[channel] for channel in sorted(self._counts)]
+        schemas = {schema.id: schema for schema, _ in used}
+        return [
+            (Opcode.SCHEMA, record_bytes(*schemas.values())),
+            (Opcode.CHANNEL, record_bytes(*(channel for _, channel in used))),
+            (Opcode.STATISTICS, record_bytes(self._statistics(len(schemas)))),
+            (Opcode.CHUNK_INDEX, b"".join(self._chunk_indexes)),
+            (Opcode.METADATA_INDEX, record_bytes(*self._metadata_index)),
+        ]
+
+    def _statistics(self, schemas: int) -> Statistics:
+        first, last = self._span or (0, 0)
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._counts),
+            channel_message_counts=dict(sorted(self._counts.items())),
+            chunk_count=len(self._chunk_indexes),
+            message_count=self._counts.total(),
+            message_end_time=last,
+            message_start_time=first,
+            metadata_count=len(self._metadata_index),
+            schema_count=schemas,
+        )
+
+
+def _compress(kind: str, content: bytes) -> bytes:
+    if kind == "zstd":
+        return zstandard.ZstdCompressor(write_content_size=True).compress(content)
+    return bytes(lz4.frame.compress(content)) if kind == "lz4" else content
+
+
+def _message_index(channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]) -> tuple[int, bytes]:
+    """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the channel."""
+    own = heads["channel"] == channel
+    entries = np.column_stack([heads["log_time"][own], offsets[own]]).astype("<u8").tobytes()
+    head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack("<HI", channel, len(entries))
+    return channel, head + entries

@@ -18,6 +18,7 @@ from estimator.schema import (
     NEEDED,
     UNLIMITED,
     Choice,
+    Flag,
     Impossible,
     Integer,
     Interval,
@@ -126,6 +127,23 @@ SERIAL = {
 }
 
 
+SIGNAL = {
+    "id": Key(Integer(0, 2**29 - 1), "frame id"),
+    "start": Key(Integer(0, 511), "start bit, as in a DBC"),
+    "length": Key(Integer(1, 64), "bits"),
+    "byte_order": Key(Choice(("little_endian", "big_endian")), "default little_endian", ABSENT),
+    "signed": Key(Flag(), "default false", ABSENT),
+    "is_float": Key(Flag(), "IEEE 754, default false", ABSENT),
+    "extended": Key(Flag(), "29-bit frame id, default false", ABSENT),
+    "scale": Key(Quantity(""), "value = bits · scale + offset; default 1", ABSENT),
+    "offset": Key(Quantity(""), "default 0", ABSENT),
+}
+
+
+def _signal(**values: Any) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
 @dataclass(frozen=True)
 class FilePath:
     """A path. A relative one counts from the folder and stands absolute in the effective configuration."""
@@ -147,7 +165,11 @@ def _can(folder: Path | None) -> dict[str, Key]:
         "bitrate": Key(Integer(10_000, 1_000_000), "bits per second", "500000"),
         "dbc": Key(FilePath(folder), "CAN database; a relative path counts from the folder of this file", "''"),
         "options": Key(Options(), "further arguments of the python-can interface", "{}"),
-        "signals": Key(Named(Options(), lambda _, value: value), "signals defined here instead of in a DBC", "{}"),
+        "signals": Key(
+            Named(Section(SIGNAL, _signal), lambda _, value: value),
+            "signals defined here instead of in a DBC, by names Message.Signal",
+            "{}",
+        ),
     }
 
 
@@ -156,8 +178,8 @@ def _device(folder: Path | None) -> Variant:
 
 
 def _bus(dbc: str, signals: dict[str, Any], **values: Any) -> Device:
-    if not dbc and not signals:
-        raise Impossible("dbc", "a CAN database, or signals defined here")
+    if bool(dbc) == bool(signals):
+        raise Impossible("signals" if dbc else "dbc", "either a CAN database or signals defined here")
     return Device("", dbc=dbc, signals=signals, **values)
 
 

@@ -22,6 +22,8 @@ NEEDED = "\0needed"
 ABSENT = "\0absent"  # may be left out, and then there is none
 UNLIMITED = "unlimited"
 
+WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,18})|0x[0-9a-fA-F]{1,16}")
+
 
 class Kind(Protocol):
     """One kind of value."""
@@ -151,11 +153,20 @@ class Integer:
 
     def read(self, node: Node) -> tuple[int, Node]:
         text = _scalar(node, self.expected)
-        if not re.fullmatch(r"-?(0|[1-9][0-9]{0,18})", text) or _tag(node) != "int":
+        if not WHOLE.fullmatch(text) or _tag(node) != "int" or not self.low <= int(text, 0) <= self.high:
             raise node.place.error(describe(node), self.expected)
-        if not self.low <= int(text) <= self.high:
-            raise node.place.error(text, self.expected)
-        return int(text), node
+        return int(text, 0), node
+
+
+@dataclass(frozen=True)
+class Flag:
+    expected: str = "true or false"
+
+    def read(self, node: Node) -> tuple[bool, Node]:
+        text = _scalar(node, self.expected)
+        if _tag(node) != "bool" or text not in ("true", "false"):
+            raise node.place.error(describe(node), self.expected)
+        return text == "true", node
 
 
 @dataclass(frozen=True)
@@ -213,7 +224,7 @@ class Options:
             return node.text
         if node.tag == "bool" and node.text in ("true", "false"):
             return node.text == "true"
-        if node.tag == "int" and re.fullmatch(r"-?(0|[1-9][0-9]{0,18}|0x[0-9a-fA-F]{1,16})", node.text):
+        if node.tag == "int" and WHOLE.fullmatch(node.text):
             return int(node.text, 0)
         if node.tag == "float" and units.NUMBER.fullmatch(node.text):
             return float(node.text)

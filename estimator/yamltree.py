@@ -86,7 +86,7 @@ def _reading(node: Scalar) -> str:
     if node.tag == "bool":
         truth = "true" if node.text.lower() in ("yes", "true", "on") else "false"
         return "" if node.text == truth else f", which YAML reads as {truth}"
-    kinds = {"int": "a number", "float": "a number", "null": "nothing", "timestamp": "a date"}
+    kinds = {"null": "nothing", "timestamp": "a date"}
     return f", which YAML reads as {kinds[node.tag]}" if node.tag in kinds else ""
 
 
@@ -136,12 +136,17 @@ class _Composer:
         try:
             yield from yaml.parse(text, Loader=_PARSER)
         except yaml.MarkedYAMLError as error:
-            line = error.problem_mark.line + 1 if error.problem_mark else self._place.line
-            place = Place(self._place.file, line, self._place.path)
-            raise place.error(shown(error.problem or "a syntax error"), "valid YAML") from None
+            problem = shown(error.problem or "a syntax error").removeprefix("found ")
+            raise self._blamed(error).error(problem, "valid YAML") from None
         except (yaml.YAMLError, UnicodeError):
             line = _unprintable_line(text)
             raise Place(self._top.file, line, "").error("a character YAML forbids", "printable UTF-8 text") from None
+
+    def _blamed(self, error: yaml.MarkedYAMLError) -> Place:
+        """The line of a syntax error; that of the beginning where the end is what is missing."""
+        unended = "end of stream" in (error.problem or "") and error.context_mark
+        mark = error.context_mark if unended else error.problem_mark
+        return Place(self._place.file, mark.line + 1 if mark else self._place.line, self._place.path)
 
     def _next(self) -> yaml.Event:
         return next(self._events)
@@ -185,6 +190,7 @@ class _Composer:
         while not isinstance(event := self._next(), yaml.MappingEndEvent):
             name = self._key(event, place)
             here = self._at(event, place).key(shown(name))
+            self._place = here
             if name in items:
                 raise here.error(f"the key again (first on line {items[name].place.line})", "each key once")
             items[name] = self._node(self._next(), here, depth + 1)

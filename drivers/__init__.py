@@ -1,0 +1,1 @@
+"""From the bytes on a wire to readings in a queue."""

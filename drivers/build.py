@@ -1,0 +1,111 @@
+"""From the configuration to readers that can be started."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import can
+from cantools.database.can import Signal
+
+from drivers.can_link import CanLink
+from drivers.can_signals import database
+from drivers.decoder import Decoder
+from drivers.errors import DeviceSettingsError
+from drivers.framing import Framing
+from drivers.framing_ascii import AsciiFraming
+from drivers.framing_can import CanFraming
+from drivers.framing_cobs import CobsFraming
+from drivers.link import Clock, Link
+from drivers.queue import ReadingQueue
+from drivers.reader import Reader, Tap
+from drivers.sensor import Sensor, SensorSettings, SignalShape, sensor_kinds
+from drivers.serial_link import SerialLink
+from estimator.settings import Device, Settings
+
+
+def build_readers(
+    settings: Settings, clock: Clock, queue: ReadingQueue, tap: Callable[[str], Tap | None] = lambda device: None
+) -> list[Reader]:
+    """One reader for each device that some channel uses, not yet started.
+
+    clock: ns since the epoch, the daemon's own. tap: device name -> where to log its raw chunks, or None.
+    Raises DeviceSettingsError, one line, where channels, devices and signals do not fit together.
+    """
+    readers = []
+    for device in used_devices(settings):
+        decoder = build_decoder(settings, device)
+        link = build_link(device, decoder.framing, clock)
+        readers.append(Reader(device.name, link, decoder, queue, tap(device.name)))
+    return readers
+
+
+def used_devices(settings: Settings) -> list[Device]:
+    """The devices that some channel names, in the order of the configuration."""
+    names = {of.device for of in _sensor_settings(settings).values()}
+    for channel, of in _sensor_settings(settings).items():
+        if of.device not in settings.devices:
+            known = ", ".join(settings.devices) or "none"
+            raise DeviceSettingsError(f"channel {channel}", f"no device {of.device!r}, there are: {known}")
+    return [device for name, device in settings.devices.items() if name in names]
+
+
+def build_decoder(settings: Settings, device: Device) -> Decoder:
+    """Framing and sensors of one device; serves live readers and recorded wires alike."""
+    sensors = [_sensor(name, of) for name, of in _sensor_settings(settings).items() if of.device == device.name]
+    framing = _framing(device, sensors)
+    if isinstance(framing, CanFraming):
+        _check_signals(framing, sensors)
+    else:
+        _check_keys(sensors)
+    return Decoder(framing, sensors)
+
+
+def build_link(device: Device, framing: Framing, clock: Clock) -> Link:
+    """The hardware end of a device."""
+    if isinstance(framing, CanFraming):
+        if device.interface not in can.VALID_INTERFACES:
+            reason = f"no CAN interface {device.interface!r}, expected one of {', '.join(sorted(can.VALID_INTERFACES))}"
+            raise DeviceSettingsError(f"device {device.name}", reason)
+        return CanLink(device, framing.filters(), clock)
+    return SerialLink(device.name, device.port, device.baud, clock)
+
+
+def _sensor_settings(settings: Settings) -> dict[str, SensorSettings]:
+    """Channel name -> settings, the wrench included."""
+    wrench: dict[str, SensorSettings] = {} if settings.wrench is None else {"wrench": settings.wrench}
+    return {**settings.channels, **wrench}
+
+
+def _sensor(channel: str, settings: SensorSettings) -> Sensor:
+    kinds = sensor_kinds()
+    if channel not in kinds:
+        raise DeviceSettingsError(f"channel {channel}", f"no such sensor, expected one of {', '.join(sorted(kinds))}")
+    return kinds[channel](settings)  # type: ignore[arg-type]
+
+
+def _framing(device: Device, sensors: list[Sensor]) -> Framing:
+    if device.kind == "can":
+        return CanFraming(device.name, database(device), [key for sensor in sensors for key in sensor.keys])
+    return AsciiFraming() if device.framing == "ascii" else CobsFraming()
+
+
+def _check_keys(sensors: list[Sensor]) -> None:
+    """On a serial port a value comes in one frame: frames are numbered one by one, not by cycle."""
+    for sensor in sensors:
+        if len(sensor.keys) > 1:
+            reason = f"signal is {'+'.join(sensor.keys)!r}, expected one key: a serial frame carries all values"
+            raise DeviceSettingsError(sensor.channel, reason)
+
+
+def _check_signals(framing: CanFraming, sensors: list[Sensor]) -> None:
+    for sensor in sensors:
+        if len(sensor.keys) > 1 and not all(map(framing.has_counter, sensor.keys)):
+            reason = f"{' and '.join(sensor.keys)} make one value, expected a Cycle signal in each"
+            raise DeviceSettingsError(sensor.channel, reason)
+        signals = [signal for key in sensor.keys for signal in framing.signals(key)]
+        sensor.check_signals([SignalShape(s.name, s.length, _is_integer(s)) for s in signals])
+
+
+def _is_integer(signal: Signal) -> bool:
+    """Whether the signal's values are integers, exactly as counted."""
+    return not signal.conversion.is_float and signal.scale == 1 and signal.offset == 0

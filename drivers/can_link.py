@@ -1,0 +1,117 @@
+"""A CAN bus through python-can: socketcan in production; slcan, udp_multicast or virtual without such hardware."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import can
+
+from drivers.errors import DeviceError
+from drivers.framing_can import ERROR, EXTENDED, REMOTE, pack
+from drivers.link import POLL, Chunk, Clock
+from estimator.settings import Device
+
+RECEIVE_BUFFER = 1 << 20  # [bytes] asked of the kernel, so that a burst waits there instead of being lost
+
+# Options an interface needs to be safe or prompt; the configuration's `options` win.
+DEFAULTS: dict[str, dict[str, Any]] = {
+    "udp_multicast": {"hop_limit": 0},  # never leaves this machine
+    "slcan": {"sleep_after_open": 0.1},  # the library's 2 s would outlast a stop
+}
+
+
+class CanLink:
+    """Messages of the wanted ids only: the filters are given to the bus, which gives them to kernel or hardware.
+
+    filters: as python-can takes them, from CanFraming.filters().
+    """
+
+    def __init__(self, device: Device, filters: Sequence[dict[str, int | bool]], clock: Clock) -> None:
+        self.damaged = 0
+        self._device = device
+        self._filters = filters
+        self._clock = clock
+        self._bus: can.BusABC | None = None
+
+    def open(self) -> None:
+        device = self._device
+        options = {"bitrate": device.bitrate, **DEFAULTS.get(device.interface, {}), **device.options}
+        try:
+            bus = can.Bus(
+                device.channel, device.interface, ignore_config=True, can_filters=list(self._filters), **options
+            )
+        except Exception as error:  # every backend has exceptions of its own
+            where = f"{device.interface} {device.channel}"
+            raise DeviceError(device.name, f"cannot open {where}: {_reason(error)}") from None
+        _enlarge_receive_buffer(bus)
+        self._bus = bus
+
+    def read(self) -> Chunk | None:
+        if self._bus is None:
+            raise DeviceError(self._device.name, f"{self._device.channel} is not open")
+        try:
+            message = self._bus.recv(POLL)
+            return None if message is None else Chunk(self._clock(), packed(message))
+        except Exception as error:  # every backend has exceptions of its own
+            if not _is_damage(self._device.interface, error):
+                raise DeviceError(self._device.name, f"cannot read {self._device.channel}: {_reason(error)}") from None
+            self._discard_damage(error)
+            return None
+
+    def _discard_damage(self, error: Exception) -> None:
+        """Count a message that could not be read, and go on."""
+        self.damaged += 1
+        if isinstance(error, UnicodeDecodeError) and self._bus is not None:
+            with suppress(Exception):  # slcan keeps an undecodable line for ever, unless it is told to drop it
+                self._bus._buffer.clear()  # type: ignore[attr-defined]
+
+    def close(self) -> None:
+        bus, self._bus = self._bus, None
+        if bus is None:
+            return
+        with suppress(Exception):  # a device that is gone cannot be told to stop
+            bus.shutdown()
+        with suppress(Exception):  # slcan leaves its port open where that failed
+            bus.serialPortOrig.close()  # type: ignore[attr-defined]
+
+
+def packed(message: can.Message) -> bytes:
+    """The message as a chunk of CanFraming. Raises struct.error, TypeError or ValueError if it is none."""
+    flags = EXTENDED * message.is_extended_id | REMOTE * message.is_remote_frame | ERROR * message.is_error_frame
+    data = bytes(message.data)
+    if message.dlc != len(data) and not message.is_remote_frame:
+        raise ValueError(f"length {message.dlc}, but {len(data)} bytes")
+    return pack(message.arbitration_id | flags, data)
+
+
+def _is_damage(interface: str, error: Exception) -> bool:
+    """Whether this is one unreadable message rather than a failing bus."""
+    if isinstance(error, struct.error):
+        return True
+    if interface == "slcan":
+        return isinstance(error, ValueError | IndexError)
+    if interface == "udp_multicast":
+        unpacking = isinstance(error, can.CanError) and error.__cause__ is not None
+        return isinstance(error, TypeError) or (unpacking and not isinstance(error.__cause__, OSError))
+    return False
+
+
+def _enlarge_receive_buffer(bus: can.BusABC) -> None:
+    """Where the bus is a socket; a duplicate descriptor reaches the same one."""
+    with suppress(Exception):
+        if isinstance(number := bus.fileno(), int) and number >= 0:
+            with socket.socket(fileno=os.dup(number)) as same:
+                same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+
+
+def _reason(error: BaseException) -> str:
+    """The innermost cause's words: python-can wraps the telling one."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error) or type(error).__name__

@@ -1,0 +1,131 @@
+"""Where the signals of a CAN bus lie in its messages: a DBC file, or inline definitions. One database for both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import cantools
+from cantools.database import Database
+from cantools.database.can import Message, Signal
+from cantools.database.conversion import BaseConversion
+
+from drivers.errors import DeviceSettingsError
+from estimator.settings import Device
+
+MAX_DBC_BYTES = 4 << 20
+MAX_INLINE = 256  # signals of one device
+
+Definition = Mapping[str, object]
+
+# key of an inline definition -> (default or None if it must be given, test, what is expected)
+_Rule = tuple[object, Callable[[Any], bool], str]
+_RULES: dict[str, _Rule] = {
+    "id": (None, lambda v: _is_int(v) and 0 <= v < 1 << 29, "a frame id below 2^29"),
+    "start": (None, lambda v: _is_int(v) and 0 <= v < 512, "a start bit of 0 to 511"),
+    "length": (None, lambda v: _is_int(v) and 1 <= v <= 64, "a length of 1 to 64 bits"),
+    "byte_order": ("little_endian", lambda v: v in ("little_endian", "big_endian"), "little_endian or big_endian"),
+    "signed": (False, lambda v: isinstance(v, bool), "true or false"),
+    "is_float": (False, lambda v: isinstance(v, bool), "true or false"),
+    "extended": (False, lambda v: isinstance(v, bool), "true or false"),
+    "scale": (1, lambda v: _is_number(v) and v != 0, "a number other than 0"),
+    "offset": (0, lambda v: _is_number(v), "a number"),
+}
+INLINE_KEYS = tuple(_RULES)
+
+
+def database(device: Device) -> Database:
+    """The message database of a CAN device. Raises DeviceSettingsError where file or definitions are wrong."""
+    if device.dbc and device.signals:
+        raise DeviceSettingsError(f"device {device.name}", "both dbc and signals are given, expected one of them")
+    if device.signals:
+        return _inline(device)
+    if device.dbc:
+        return _from_file(device)
+    raise DeviceSettingsError(f"device {device.name}", "neither dbc nor signals is given, expected one of them")
+
+
+def _from_file(device: Device) -> Database:
+    try:
+        with open(device.dbc, encoding="cp1252") as file:
+            text = file.read(MAX_DBC_BYTES + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DeviceSettingsError(f"device {device.name}", f"cannot read {device.dbc}: {reason}") from None
+    if len(text) > MAX_DBC_BYTES:
+        raise DeviceSettingsError(f"device {device.name}", f"{device.dbc} is larger than {MAX_DBC_BYTES} bytes")
+    try:
+        return cantools.database.load_string(text, database_format="dbc")  # type: ignore[return-value]
+    except Exception as error:  # the parser's own errors share no class but this one
+        reason = f"{device.dbc} is not a DBC file: {error}"
+        raise DeviceSettingsError(f"device {device.name}", reason) from None
+
+
+def _inline(device: Device) -> Database:
+    """Messages from definitions named Message.Signal."""
+    if len(device.signals) > MAX_INLINE:
+        reason = f"{len(device.signals)} signals, expected at most {MAX_INLINE}"
+        raise DeviceSettingsError(f"device {device.name}", reason)
+    messages: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, definition in device.signals.items():
+        where = f"device {device.name}, signal {name}"
+        message, dot, signal = name.partition(".")
+        if not (message and dot and signal):
+            raise DeviceSettingsError(where, "expected a name of the form Message.Signal")
+        messages.setdefault(message, {})[signal] = _checked(where, definition)
+    return Database([_message(device, name, signals) for name, signals in messages.items()])
+
+
+def _checked(where: str, definition: Definition) -> dict[str, Any]:
+    """The definition, complete, each value of the right kind."""
+    for key in definition:
+        if key not in _RULES:
+            raise DeviceSettingsError(where, f"unknown key {key!r}, expected some of {', '.join(_RULES)}")
+    values = {}
+    for key, (default, valid, expected) in _RULES.items():
+        values[key] = definition.get(key, default)
+        if not valid(values[key]):
+            raise DeviceSettingsError(where, f"{key} is {definition.get(key)!r}, expected {expected}")
+    if values["is_float"] and values["length"] not in (32, 64):
+        raise DeviceSettingsError(where, f"length is {values['length']}, expected 32 or 64 bits for a float")
+    return values
+
+
+def _message(device: Device, name: str, signals: dict[str, dict[str, Any]]) -> Message:
+    first = next(iter(signals.values()))
+    if any((s["id"], s["extended"]) != (first["id"], first["extended"]) for s in signals.values()):
+        raise DeviceSettingsError(f"device {device.name}, message {name}", "its signals differ in id or extended")
+    built = [_signal(signal, values) for signal, values in signals.items()]
+    length = max(map(_bytes_reached, built))
+    try:
+        return Message(first["id"], name, length, built, is_extended_frame=first["extended"], strict=True)
+    except cantools.Error as error:
+        raise DeviceSettingsError(f"device {device.name}, message {name}", error) from None
+
+
+def _bytes_reached(signal: Signal) -> int:
+    """Length of the shortest message that holds the signal."""
+    if signal.byte_order == "little_endian":
+        return -(-(signal.start + signal.length) // 8)
+    first_byte, top_bit = divmod(signal.start, 8)
+    return first_byte + 1 + -(-max(signal.length - top_bit - 1, 0) // 8)
+
+
+def _signal(name: str, values: dict[str, Any]) -> Signal:
+    conversion = BaseConversion.factory(scale=values["scale"], offset=values["offset"], is_float=values["is_float"])
+    return Signal(
+        name,
+        values["start"],
+        values["length"],
+        byte_order=values["byte_order"],
+        is_signed=values["signed"],
+        conversion=conversion,
+    )
+
+
+def _is_int(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < float("inf")

@@ -1,0 +1,131 @@
+"""What a sensor kind is: a class that turns the raw values of its frames into one validated value.
+
+A kind is one file in `drivers/sensors/` with one subclass of Sensor. A value that cannot be right is counted as
+quarantined and not passed on; nothing is ever put in its place.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cache
+from math import isfinite
+from typing import ClassVar, NamedTuple
+
+from drivers.errors import DeviceSettingsError
+from drivers.framing import FieldValue, Frame
+from estimator.readings import Value
+from estimator.settings import Channel, Wrench
+
+SensorSettings = Channel | Wrench
+
+
+class SignalShape(NamedTuple):
+    """What a sensor must know of a CAN signal to tell whether it can be its own."""
+
+    name: str
+    bits: int
+    integer: bool  # values are integers, unscaled
+
+
+class Sensor(ABC):
+    """One channel's values out of the frames of one device."""
+
+    channel: ClassVar[str]  # a key of estimator.readings.CHANNELS
+
+    def __init__(self, signal: str) -> None:
+        self.keys: tuple[str, ...] = (signal,)  # the frames it wants
+        self.quarantined = 0  # values refused as impossible
+        self.incomplete = 0  # values of which a part never came
+
+    @abstractmethod
+    def value(self, frame: Frame) -> Value | None:
+        """The value of a frame whose key is in `keys`; None if refused, or not yet complete."""
+
+    def reset(self) -> None:  # noqa: B027 - most sensors remember nothing
+        """The device was reopened or started anew: forget what depended on its last frames."""
+
+    def check_signals(self, signals: Sequence[SignalShape]) -> None:  # noqa: B027 - most take any signal
+        """Raise DeviceSettingsError if these CAN signals cannot be this sensor's."""
+
+    def refuse(self) -> None:
+        """Count a value as impossible."""
+        self.quarantined += 1
+
+
+class Encoder(Sensor):
+    """An incremental encoder: a counter of `bits` width that wraps both ways, unwrapped to an exact integer.
+
+    The first count is taken as read. After a reset of the device the total goes on from where it was.
+    """
+
+    def __init__(self, settings: Channel) -> None:
+        super().__init__(settings.signal)
+        self.bits = settings.bits
+        self._total: int | None = None
+        self._last: int | None = None
+
+    def value(self, frame: Frame) -> int | None:
+        count = frame.values[0]
+        if len(frame.values) != 1 or not isinstance(count, int) or not self._fits(count):
+            self.refuse()
+            return None
+        if self._total is None:
+            self._total = count
+        elif self._last is not None:
+            self._total += modular_difference(count, self._last, self.bits)
+        self._last = count
+        return self._total
+
+    def _fits(self, count: int) -> bool:
+        """Whether a counter of this width, signed or not, can show this count."""
+        return -(1 << (self.bits - 1)) <= count < 1 << self.bits
+
+    def reset(self) -> None:
+        self._last = None
+
+    def check_signals(self, signals: Sequence[SignalShape]) -> None:
+        name, bits, integer = signals[0]
+        if len(signals) != 1 or not integer:
+            raise DeviceSettingsError(f"channel {self.channel}", f"signal {name} is not one unscaled integer")
+        if bits != self.bits:
+            raise DeviceSettingsError(f"channel {self.channel}", f"bits is {self.bits}, but signal {name} has {bits}")
+
+
+class Analog(Sensor):
+    """A converter's reading as a float; NaN, infinity and what lies outside [low, high] are refused."""
+
+    def __init__(self, settings: Channel) -> None:
+        super().__init__(settings.signal)
+        self.low = settings.low
+        self.high = settings.high
+
+    def value(self, frame: Frame) -> float | None:
+        value = frame.values[0]
+        if len(frame.values) != 1 or not within(value, self.low, self.high):
+            self.refuse()
+            return None
+        return float(value)
+
+
+def modular_difference(count: int, last: int, bits: int) -> int:
+    """count − last of a counter that wraps at 2^bits, as the step of smallest size."""
+    half = 1 << (bits - 1)
+    return (count - last + half) % (1 << bits) - half
+
+
+def within(value: FieldValue, low: float, high: float) -> bool:
+    """Whether the value is finite and in [low, high]."""
+    return isfinite(value) and low <= value <= high
+
+
+@cache
+def sensor_kinds() -> dict[str, type[Sensor]]:
+    """Channel name -> its class, found by walking drivers/sensors."""
+    package = importlib.import_module("drivers.sensors")
+    for module in pkgutil.iter_modules(package.__path__, "drivers.sensors."):
+        importlib.import_module(module.name)
+    kinds = [kind for base in (Sensor, Encoder, Analog) for kind in base.__subclasses__()]
+    return {kind.channel: kind for kind in kinds if kind.__module__.startswith("drivers.sensors.")}

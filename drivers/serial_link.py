@@ -1,0 +1,60 @@
+"""A serial port, real, USB or pseudo-terminal."""
+
+from __future__ import annotations
+
+import errno
+import os
+import termios
+from contextlib import suppress
+
+import serial
+
+from drivers.errors import DeviceError
+from drivers.link import POLL, Chunk, Clock
+
+_FAILURES = (OSError, ValueError, TypeError, termios.error)  # what pyserial lets through; SerialException is an OSError
+
+
+class SerialLink:
+    """Reads whatever is there, as soon as there is something. The port is locked against a second reader."""
+
+    def __init__(self, device: str, port: str, baud: int, clock: Clock) -> None:
+        self.damaged = 0
+        self._device = device
+        self._path = port
+        self._baud = baud
+        self._clock = clock
+        self._port: serial.Serial | None = None
+
+    def open(self) -> None:
+        try:
+            self._port = serial.Serial(self._path, self._baud, timeout=POLL, exclusive=True)
+        except _FAILURES as error:
+            raise DeviceError(self._device, f"cannot open {self._path}: {_reason(error)}") from None
+
+    def read(self) -> Chunk | None:
+        if self._port is None:
+            raise DeviceError(self._device, f"{self._path} is not open")
+        try:
+            first = self._port.read(1)
+            received = self._clock()
+            if not first:
+                return None
+            return Chunk(received, first + self._port.read(self._port.in_waiting))
+        except _FAILURES as error:
+            raise DeviceError(self._device, f"cannot read {self._path}: {_reason(error)}") from None
+
+    def close(self) -> None:
+        if self._port is not None:
+            with suppress(*_FAILURES):
+                self._port.close()
+        self._port = None
+
+
+def _reason(error: Exception) -> str:
+    """The operating system's words where there are some, with the remedy for the usual one."""
+    number = getattr(error, "errno", None)
+    if number is None:
+        return str(error)
+    hint = " (is the user in the port's group, often dialout?)" if number == errno.EACCES else ""
+    return os.strerror(number) + hint

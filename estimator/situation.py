@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimator.history import rate_of
 from estimator.terramechanics.original import Mobilisation, janosi
-from estimator.terramechanics.soil import Array, Scalar, Wheel
+from estimator.terramechanics.soil import Scalar, Wheel
 
 CREEP = 2e-4  # [m/s] slower than this the wheel neither drives nor brakes: soil forces fade out
-SMOOTHING = 0.2  # [s] span over which a measured speed or sinkage is averaged before it is differentiated
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ class Situation:
     # the vertical balance
     theta_1: Scalar = 0.0  # [rad]
     sinkage: Scalar = 0.0  # z [m], positive down
+    sinking: Scalar = 0.0  # dz/dt [m/s], on line only
     carried: Scalar = 0.0  # vertical force of the soil W [N]
     torque: Scalar = 0.0  # at the axle [N·m]
     drawbar_pull: Scalar = 0.0  # DP [N]
@@ -129,20 +130,3 @@ def signed_slip(rim_speed: Scalar, carriage_speed: Scalar) -> tuple[Scalar, Scal
     direction = np.tanh((rim_speed + carriage_speed) / (2.0 * CREEP))
     fastest = np.maximum(np.maximum(np.abs(rim_speed), np.abs(carriage_speed)), CREEP)
     return np.clip(direction * (rim_speed - carriage_speed) / fastest, -1.0, 1.0), direction
-
-
-def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Scalar:
-    """Time derivative of a measured quantity, averaged over `span` [s]; 0 where there is only one instant."""
-    if np.ndim(value) == 0 or np.size(value) < 3:
-        return 0.0 * value
-    return np.gradient(smoothed(np.asarray(time), np.asarray(value), span), time)
-
-
-def smoothed(time: Array, value: Array, span: float) -> Array:
-    """Moving average over `span` [s] of evenly sampled values; the ends average what there is."""
-    half = min(round(0.5 * span * (time.size - 1) / max(time[-1] - time[0], 1e-9)), (value.size - 1) // 2)
-    total = np.concatenate(([0.0], np.cumsum(value - value[0])))
-    first = np.maximum(np.arange(value.size) - half, 0)
-    last = np.minimum(np.arange(value.size) + half + 1, value.size)
-    mean: Array = (total[last] - total[first]) / (last - first) + value[0]
-    return mean

@@ -181,6 +181,8 @@ def _parameter(
     return Parameter(name, meaning, unit, role, float(centre), sigma, low, high, scan)
 
 
+RATE_REFERENCE = 0.02  # [m/s] speed at which the soil's parameters were found
+RATE_FLOOR = 0.001  # [m/s] slower than this speed no longer matters, so a standing wheel stays finite
 TURNING = 0.01  # [rad/s] width over which a friction torque changes sign
 
 

@@ -16,8 +16,8 @@ class Bulldozing(Effect):
 
     R = s b [cot X + tan(X + φ)] [c z + γ z²/2 (cot X + cot² X / cot φ)],   X = 45° − φ/2;   DP − R
 
-    Source: Hegedus (1960), US Army Ordnance ATAC Land Locomotion Report, as given by Ishigami et al. (2007),
-    J. Field Robotics 24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as wide as the wheel.
+    Source: Hegedus (1960), Land Locomotion Laboratory Report 61, as given by Ishigami et al. (2007), J. Field Robotics
+    24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as wide as the wheel.
     """
 
     share: float = strength("share of a plane blade's resistance, s", "-", typical=0.3, low=0.0, high=1.5)

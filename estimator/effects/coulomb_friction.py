@@ -15,7 +15,7 @@ class CoulombFriction(Effect):
 
     T_loss = T_C sign(ω)
 
-    Source: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083-1138, Eq. for kinetic friction.
+    Source: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083-1138, section 2.
     """
 
     loss: float = strength("torque consumed, T_C", "N·m", typical=0.8, low=0.0, high=10.0)

@@ -1,0 +1,51 @@
+"""Lugs on the rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from estimator.situation import ContactLaw, Reaction, Situation
+from estimator.terramechanics.soil import Wheel
+
+
+@dataclass(frozen=True)
+class Grousers(Effect):
+    """Lugs on the rim shear the soil at a larger radius, grip better than smooth metal, and make N ripples a turn.
+
+    r_s = r + λ h;  (c, tan φ) · (1 + g);  q = a cos Nψ + b sin Nψ;  T(1 + q),  DP + qT/r,  z − q h;   ψ wheel angle
+
+    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; ripple Skonieczny,
+    Moreland, Wettergreen (2012), IEEE/RSJ IROS; soil-to-soil against soil-to-metal friction Wong (2008), section 2.4.
+    """
+
+    height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)
+    grip: float = strength("gain of shear strength over the smooth rim, g", "-", typical=0.15, low=0.0, high=1.0)
+    ripple_cos: float = strength("relative ripple of torque in phase, a", "-", typical=0.05, low=-0.5, high=0.5)
+    ripple_sin: float = strength("relative ripple of torque in quadrature, b", "-", typical=0.05, low=-0.5, high=0.5)
+    count: float = shape("lugs on the rim, N", "1/turn", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True)
+    share: float = shape("share of the height that shears, λ", "-", mean=0.6, sigma=0.2, low=0.0, high=1.0)
+
+    stage = "wheel"
+    fingerprint = Fingerprint(
+        "torque", "wheel_angle", "N ripples a turn in torque, drawbar pull and sinkage; more pull"
+    )
+    confusable_with = told_apart(gear_ripple="wrench", wheel_eccentricity="lifted_spin", wheel_radius_error="tape")
+
+    def geometry(self, wheel: Wheel) -> Wheel:
+        return replace(wheel, radius=wheel.radius + self.share * self.height)
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        return replace(law, strength=law.strength * (1.0 + self.grip))
+
+    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+        phase = self.count * situation.wheel_angle
+        ripple = self.ripple_cos * np.cos(phase) + self.ripple_sin * np.sin(phase)
+        return replace(
+            reaction,
+            torque=reaction.torque + ripple * situation.torque,
+            drawbar_pull=reaction.drawbar_pull + ripple * situation.torque / situation.radius,
+            sinkage=reaction.sinkage - ripple * self.height,
+        )

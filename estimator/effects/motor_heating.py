@@ -1,0 +1,44 @@
+"""The motor weakens as it warms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from estimator.history import relaxed
+from estimator.situation import Situation
+from estimator.terramechanics.soil import Scalar
+
+
+@dataclass(frozen=True)
+class MotorHeating(Effect):
+    """Current warms the winding and the magnets, and the torque per ampere falls.
+
+    K_t / (1 + β H),   τ dH/dt = I² − H,   H = 0 at the start of the run
+
+    Source: one-body winding thermal model τ dΔT/dt = R_th R I² − ΔT with K_t falling linearly in a small ΔT, Hendershot
+    and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins thermal resistance and magnet coefficient.
+    """
+
+    fall: float = strength("relative fall per squared current, β", "1/A²", typical=0.15, low=0.0, high=5.0)
+    duration: float = shape("thermal time constant, τ", "s", mean=60.0, sigma=40.0, low=2.0, high=3600.0, scan=True)
+
+    stage = "drivetrain"
+    fingerprint = Fingerprint("torque", "time", "current creeps up over a run while measured axle torque stays")
+    confusable_with = told_apart(
+        torque_constant_error="long_run", drying_cohesion="wrench", viscous_friction="long_run"
+    )
+
+    def torque_factor(self, situation: Situation) -> Scalar:
+        return 1.0 / (1.0 + self.fall * self._heat(situation))
+
+    def remember(self, memory: float, step: float, situation: Situation) -> float:
+        return float(memory + (situation.current**2 - memory) * -np.expm1(-step / self.duration))
+
+    def _heat(self, situation: Situation) -> Scalar:
+        """H [A²]."""
+        if self.name in situation.memory:
+            return situation.memory[self.name]
+        return relaxed(situation.time, situation.current**2, self.duration)

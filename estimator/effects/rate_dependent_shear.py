@@ -1,0 +1,35 @@
+"""Shear strength that depends on speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.effects.base import RATE_FLOOR, RATE_REFERENCE, Effect, Fingerprint, strength, told_apart
+from estimator.situation import ContactLaw, Situation
+
+
+@dataclass(frozen=True)
+class RateDependentShear(Effect):
+    """Soil is stronger when it is sheared faster.
+
+    (c, tan φ) · [1 + λ log₁₀((r|ω| + v_f)/(v₀ + v_f))],   v₀ = 20 mm/s,   v_f = 1 mm/s keeps a standing wheel finite
+
+    Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten per cent a decade.
+    """
+
+    per_decade: float = strength("gain of strength per tenfold speed, λ", "-", typical=0.08, low=-0.2, high=0.3)
+
+    stage = "contact"
+    fingerprint = Fingerprint(
+        "torque", "speed", "torque and drawbar pull rise with the logarithm of speed at fixed slip"
+    )
+    confusable_with = told_apart(
+        viscous_friction="lifted_spin", stribeck_friction="lifted_spin", rate_dependent_sinkage="speed_step"
+    )
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        speed = situation.radius * np.abs(situation.wheel_speed)
+        decades = np.log10((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR))
+        return replace(law, strength=law.strength * (1.0 + self.per_decade * decades))

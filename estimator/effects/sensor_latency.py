@@ -1,0 +1,47 @@
+"""A channel that lags the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+from estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from estimator.history import delayed
+from estimator.situation import Sensed, Situation
+from estimator.terramechanics.soil import Scalar
+
+
+@dataclass(frozen=True)
+class SensorLatency(Effect):
+    """One channel lags the others, so it shows what the encoders saw some time ago.
+
+    y_read(t) = y(t − d), each channel its own d; d < 0 leads
+
+    Source: transport delay. It has no inverse at one instant: on line it is undone by the channel's configured latency,
+    which shifts its stamps; `correct` undoes it for whole runs.
+    """
+
+    sinkage: float = strength("delay of the potentiometer", "s", typical=0.1, low=-0.5, high=1.0)
+    current: float = strength("delay of the current", "s", typical=0.1, low=-0.5, high=1.0)
+    force: float = strength("delay of the force/torque sensor", "s", typical=0.1, low=-0.5, high=1.0)
+
+    stage = "sensor"
+    fingerprint = Fingerprint(
+        "torque", "acceleration", "pulses of opposite sign at every change of speed, slip or load"
+    )
+    confusable_with = told_apart(wheel_inertia="speed_step", load_axis_friction="load_step")
+
+    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
+        return self._shifted(sensed, situation.time, 1.0)
+
+    def correct(self, sensed: Sensed, situation: Situation) -> Sensed:
+        return self._shifted(sensed, situation.time, -1.0)
+
+    def _shifted(self, sensed: Sensed, time: Scalar, sign: float) -> Sensed:
+        delays = {"sinkage": self.sinkage, "current": self.current}
+        return replace(
+            sensed,
+            **{
+                channel.name: delayed(time, getattr(sensed, channel.name), sign * delays.get(channel.name, self.force))
+                for channel in fields(sensed)
+            },
+        )

@@ -1,0 +1,43 @@
+"""Dense soil: shear stress peaks before it settles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from estimator.situation import ContactLaw, Situation
+from estimator.terramechanics.soil import Array
+
+
+@dataclass(frozen=True)
+class ShearPeak(Effect):
+    """Dense or crusted soil resists shear up to a peak, then breaks and falls to a residual strength.
+
+    τ = τ_res (1 − e^(−j/K_w)) [1 + P e^(1 − j/K_w)],   P = 1/(K_r (1 − 1/e)) − 1,   K_w = k
+
+    Wong's third form, written with the residual strength τ_res = K_r τ_max = c + σ tan φ in front: c and φ stay what
+    they are in Eq. (2), and P = 0 is Eq. (2) itself.
+    Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas (1983).
+    """
+
+    overshoot: float = strength("P: 0 is no peak, 1.4 a residual of two thirds", "-", typical=0.4, low=0.0, high=3.0)
+
+    stage = "contact"
+    fingerprint = Fingerprint(
+        "torque", "slip", "torque and drawbar pull are highest at middle slip and fall again; φ seems larger than it is"
+    )
+    confusable_with = told_apart(
+        rear_contact="slip_step", stress_peak_shift="slip_step", rate_dependent_shear="speed_step"
+    )
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        settled = law.mobilisation
+
+        def peaked(x: Array) -> Array:
+            share = settled(x)
+            grown: Array = share * (1.0 + self.overshoot * np.e * (1.0 - np.abs(share)))  # e^(−x) = 1 − share
+            return grown
+
+        return replace(law, mobilisation=peaked)

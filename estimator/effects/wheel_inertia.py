@@ -1,0 +1,27 @@
+"""Inertia of wheel, gear and rotor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from estimator.situation import Reaction, Situation
+
+
+@dataclass(frozen=True)
+class WheelInertia(Effect):
+    """Torque is needed to speed the wheel up and comes back when it slows down.
+
+    T + J dω/dt
+
+    Source: Newton's second law; J holds the rotor's inertia times the square of the gear ratio.
+    """
+
+    inertia: float = strength("moment of inertia at the axle, J", "kg·m²", typical=0.3, low=0.0, high=5.0)
+
+    stage = "wheel"
+    fingerprint = Fingerprint("torque", "acceleration", "torque pulses while the speed changes, none at steady speed")
+    confusable_with = told_apart(sensor_latency="speed_step", stribeck_friction="speed_step")
+
+    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+        return replace(reaction, torque=reaction.torque + self.inertia * situation.wheel_acceleration)

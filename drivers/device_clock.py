@@ -32,6 +32,9 @@ class DeviceClock:
     the last 20 s, a constant that belongs into the channel's latency.
     """
 
+    _newest: int  # latest device time [ns], unwrapped
+    _newest_received: int  # and when it came [ns]
+
     def __init__(self, modulus_us: int = 1 << 32) -> None:
         self.resets = 0  # times the device clock was seen to start anew
         self._modulus = modulus_us * 1000
@@ -58,7 +61,8 @@ class DeviceClock:
                 self.resets += 1
                 self._start(time, received)
             elif time > self._newest:
-                self._newest, self._newest_received = time, received
+                self._newest = time
+                self._newest_received = received
             times.append(time)
         return stamps + self._settle(times, received)
 
@@ -80,9 +84,9 @@ class DeviceClock:
         """Begin the mapping at this frame."""
         self._started = True
         self._origin = received - time
-        self._first: int = time
-        self._newest: int = time
-        self._newest_received: int = received
+        self._first = time
+        self._newest = time
+        self._newest_received = received
         self._intercept = 0.0
         self._blocks: deque[Point] = deque(maxlen=BLOCKS)
         self._lowest: Point = (0.0, 0.0)

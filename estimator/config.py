@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from estimator.config_table import EffectSchema, table
+from estimator.recording import RunInfo
 from estimator.settings import Settings
 from estimator.yamltree import MAX_BYTES, ConfigError, compose, serialise
 
@@ -26,13 +25,13 @@ class Configuration:
     settings: typed, SI.
     text:     the effective YAML: every default filled in, units as written; loading it gives the same settings.
     source:   the file's name, for messages.
-    run:      the `run` section in SI, empty where the file has none.
+    run:      the `run` section, with its defaults where the file has none.
     """
 
     settings: Settings
     text: str
     source: str
-    run: Mapping[str, Any] = field(default_factory=dict)
+    run: RunInfo = field(default_factory=RunInfo)
 
 
 def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = None) -> Configuration:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.readings import CHANNELS, ENCODERS, REQUIRED
+from estimator.recording import RunInfo
 from estimator.schema import (
     ABSENT,
     NEEDED,
@@ -317,6 +318,10 @@ RUN = {
 }
 
 
+def _run(name: str, load: float | None, start: float, notes: str, **values: int) -> RunInfo:
+    return RunInfo(name, load, values["pass"], start, notes)
+
+
 def _rates(tick: float, update: float, horizon: float) -> Rates:
     ratio = tick / update
     if round(ratio) < 2 or abs(ratio - round(ratio)) > 1e-9 * ratio:
@@ -365,18 +370,18 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "filter": Key(Section(FILTER, FilterSettings), "the extended Kalman filter", "{}"),
         "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),
         "effects": Key(Effects(effect_schema), "physics beyond the paper's, by effect name", "{}"),
-        "run": Key(Section(RUN, dict), "about this run; the command line may say it instead", ABSENT),
+        "run": Key(Section(RUN, _run), "about this run; the command line may say it instead", ABSENT),
     }
     return Section(keys, _settings)
 
 
-def _settings(channels: dict[str, Any], run: dict[str, Any] | None, **values: Any) -> tuple[Settings, dict[str, Any]]:
+def _settings(channels: dict[str, Any], run: RunInfo | None, **values: Any) -> tuple[Settings, RunInfo]:
     wrench = channels.pop("wrench")
     known = {name: channel for name, channel in channels.items() if channel is not None}
     settings = Settings(channels=known, wrench=wrench, **values)
     _check_channels(settings)
     _check_soil(settings)
-    return settings, run or {}
+    return settings, run or RunInfo()
 
 
 def _check_channels(settings: Settings) -> None:

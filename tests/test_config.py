@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from config import packaged
 from estimator import config
 from estimator.config import ConfigError
+from estimator.recording import RunInfo
 from estimator.settings import Channel, ConfiguredEffect, FilterSettings, Load, Logging, Rates, Uncertain
 
 TESTBED = packaged().read_text(encoding="utf-8")
@@ -144,8 +145,9 @@ def test_effects_are_checked_against_a_schema() -> None:
 
 def test_run_section() -> None:
     read = config.loads(MINIMAL + "run: {name: sand 3, load: 70 N, pass: 2, start: 150 mm}\n", "rig.yaml")
-    assert read.run == {"name": "sand 3", "load": 70.0, "pass": 2, "start": 0.15, "notes": ""}
-    assert config.loads(MINIMAL, "rig.yaml").run == {}
+    assert read.run == RunInfo("sand 3", nominal_load=70.0, pass_number=2, start_position=0.15)
+    assert config.loads(read.text, "b.yaml").run == read.run
+    assert config.loads(MINIMAL, "rig.yaml").run == RunInfo()
 
 
 # ---- what is refused -----------------------------------------------------------------------------------------------

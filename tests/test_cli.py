@@ -1,0 +1,147 @@
+"""`gritd` from outside: exit codes, one-line errors, the packaged configuration."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from config import packaged
+from drivers.errors import DeviceError, DeviceSettingsError
+from estimator import config
+from estimator.settings import Settings
+from tools import check_config, cli, config_reference
+from tools.command import CommandError
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def testbed() -> Settings:
+    return config.load(packaged()).settings
+
+
+def gritd(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "tools.cli", *arguments], cwd=ROOT, capture_output=True, text=True)
+
+
+def test_every_command_has_its_module() -> None:
+    for module, summary in cli.COMMANDS.values():
+        assert callable(importlib.import_module(module).main) and summary
+
+
+def test_help_and_version() -> None:
+    for option in ("--help", "--version"):
+        run = gritd(option)
+        assert run.returncode == 0 and "gritd" in run.stdout
+    assert all(name in gritd("--help").stdout for name in cli.COMMANDS)
+
+
+def test_packaged_configuration_is_valid_and_summarised() -> None:
+    run = gritd("check-config")
+    assert (run.returncode, run.stderr) == (0, "")
+    for words in ("valid", "r 72 mm, b 71 mm", "c 1000 ± 300 Pa", "WrenchForce+WrenchTorque", "slip"):
+        assert words in run.stdout
+
+
+def test_effective_text_checks_too(tmp_path: Path) -> None:
+    (tmp_path / "rig.yaml").write_text(gritd("check-config", "--effective").stdout, encoding="utf-8")
+    assert gritd("check-config", str(tmp_path / "rig.yaml")).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "gritd: expected a command"),
+        (("dance",), "gritd: argument COMMAND: invalid choice"),
+        (("check-config", "--dance"), "gritd: unrecognized arguments: --dance"),
+        (("check-config", "/nowhere.yaml"), "gritd: /nowhere.yaml: found no such file or directory; expected"),
+    ],
+)
+def test_usage_errors_are_one_line_and_code_2(arguments: Sequence[str], words: str) -> None:
+    run = gritd(*arguments)
+    assert run.returncode == 2 and run.stdout == ""
+    assert run.stderr.startswith(words) and run.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("dbc: testbed.dbc", "dbc: other.dbc", "cannot read"),
+        ("SinkagePot.Volts", "SinkagePot.Vults", "no signal SinkagePot.Vults"),
+        ("MotorShunt.Volts", "Motor.Volts", "no message Motor "),
+        ("interface: socketcan", "interface: pigeon", "no CAN interface 'pigeon'"),
+        ("radius: 72 mm", "radius: 0 mm", "rig.yaml:8: wheel.radius: found 0 mm"),
+    ],
+)
+def test_what_cannot_work_is_named(old: str, new: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
+    text = packaged().read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "rig.yaml").write_text(text.replace(old, new), encoding="utf-8")
+    run = gritd("check-config", str(tmp_path / "rig.yaml"))
+    assert run.returncode == 2 and run.stdout == ""
+    assert run.stderr.startswith(f"gritd: {tmp_path}/rig.yaml:") and words in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (CommandError("a.mcap: the last chunk is damaged", 3), 3, "gritd: a.mcap: the last chunk is damaged\n"),
+        (CommandError("two\nlines"), 1, "gritd: two lines\n"),
+        (DeviceError("bus", "gone"), 1, "gritd: bus: gone\n"),
+        (DeviceSettingsError("device bus", "no dbc"), 2, "gritd: device bus: no dbc\n"),
+        (config.ConfigError("a.yaml:1: x: found y; expected z"), 2, "gritd: a.yaml:1: x: found y; expected z\n"),
+        (PermissionError(13, "Permission denied", "/x"), 1, "gritd: /x: permission denied\n"),
+        (KeyError("x"), 1, "gritd: internal error: KeyError: 'x' (GRITD_TRACEBACK=1 shows where)\n"),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+)
+def test_errors_become_a_line_and_a_code(
+    error: BaseException, code: int, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(_: Sequence[str]) -> int:
+        raise error
+
+    monkeypatch.setattr(importlib, "import_module", lambda name: SimpleNamespace(main=fail))
+    assert cli.main(["check-config"]) == code
+    assert capsys.readouterr().err == line
+
+
+def test_reader_that_leaves_is_no_error() -> None:
+    command = f"{sys.executable} -m tools.cli check-config | true; exit ${{PIPESTATUS[0]}}"
+    run = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_reference_is_current() -> None:
+    text = config_reference.PAGE.read_text(encoding="utf-8")
+    wanted = text.partition(config_reference.BEGIN)[0] + config_reference.BEGIN + config_reference.reference()
+    assert text == wanted, "run: python -m tools.config_reference"
+
+
+def test_slip_resolution_is_what_a_simulated_window_shows(testbed: Settings) -> None:
+    """The stated resolution against slopes fitted to noisy counts."""
+    random = np.random.default_rng(7)
+    count = check_config.window_readings(testbed)
+    times = np.arange(count) / testbed.rates.tick
+    slopes = []
+    for name, radius, speed in (
+        ("wheel_encoder", testbed.wheel.radius, 0.02),
+        ("carriage_encoder", testbed.pulley_radius, 0.016),
+    ):
+        encoder = replace(testbed.channels[name], noise=0.3)
+        per_count = encoder.calibration.scale.value * radius
+        start = random.uniform(0, 1, (4000, 1))
+        counts = speed / per_count * times + start + random.normal(0, encoder.noise, (4000, count))
+        slopes.append(np.polyfit(times, (counts * per_count).T, 1)[0])
+    slip = 1 - slopes[1] / slopes[0]
+    assert np.std(slip) == pytest.approx(check_config.slip_sigma(testbed), rel=0.05)

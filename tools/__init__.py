@@ -1,0 +1,1 @@
+"""The commands around the estimator: `gritd` and what it starts."""

@@ -1,0 +1,92 @@
+"""`gritd`: one table of commands, each a module of tools with `main(argv)`, imported when it is asked for."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+
+from drivers.errors import DeviceError, DeviceSettingsError
+from estimator.yamltree import ConfigError
+from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
+
+# command -> (module, what it does)
+COMMANDS = {
+    "check-config": ("tools.check_config", "check a configuration and show what it implies"),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
+    parser = _parser()
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        parser.error("expected a command")
+    arguments = parser.parse_args(given)
+    try:
+        module = importlib.import_module(COMMANDS[arguments.command][0])
+        code = int(module.main(arguments.arguments) or DONE)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        return _leave_pipe()
+    except Exception as error:
+        return _fail(error)
+
+
+def _parser() -> argparse.ArgumentParser:
+    listing = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in COMMANDS.items())
+    parser = Parser(
+        prog="gritd",
+        usage="gritd [--help] [--version] COMMAND …",
+        description="Learns the soil under a rover wheel while the wheel drives.",
+        epilog=f"commands:\n{listing}\n\n`gritd COMMAND --help` explains one.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"gritd {version()}")
+    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="one of the commands below")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    return parser
+
+
+def version() -> str:
+    """The installed version."""
+    try:
+        return metadata.version("gritd")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def _fail(error: Exception) -> int:
+    """One line for the user, and the exit code."""
+    if os.environ.get("GRITD_TRACEBACK"):
+        raise error
+    print(f"gritd: {_one_line(error)}", file=sys.stderr)
+    if isinstance(error, CommandError):
+        return error.code
+    return USAGE if isinstance(error, ConfigError | DeviceSettingsError) else FAILED
+
+
+def _one_line(error: Exception) -> str:
+    """The message of a known error; an unexpected one says so, and how to see more."""
+    text = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror.lower()}"
+    if isinstance(error, CommandError | ConfigError | DeviceError | DeviceSettingsError | OSError):
+        return text
+    return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
+
+
+def _leave_pipe() -> int:
+    """The reader of our output has gone: say nothing, not even when Python flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

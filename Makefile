@@ -1,0 +1,53 @@
+# `make` lists what there is. Everything is set up in .venv by itself, and again when pyproject.toml changes.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.ready
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test slow lint format type docs wheel clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+
+venv: $(READY) ## set up .venv (the other targets do it when they need it)
+
+# --upgrade makes a venv that an older Python or an interrupted set-up left behind whole again.
+$(READY): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "gritd needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
+	@echo "setting up $(VENV) (a minute or two, once) …"
+	@$(PYTHON) -m venv --upgrade $(VENV) || { echo "cannot make a venv; is the package python3-venv installed?" >&2; exit 1; }
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@
+
+demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
+	@$(BIN)/gritd demo
+
+test: $(READY) ## the tests, without the slow ones
+	@$(BIN)/python -m pytest --quiet -n 2
+
+slow: $(READY) ## the slow tests
+	@$(BIN)/python -m pytest --quiet -m slow
+
+lint: $(READY) ## ruff: lint and format
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check . || { echo "not formatted; run: make format" >&2; exit 1; }
+
+format: $(READY) ## put the code into the format
+	@$(BIN)/ruff format --quiet .
+
+type: $(READY) ## mypy --strict
+	@$(BIN)/mypy --no-error-summary
+
+docs: $(READY) ## the generated parts of the documents
+	@$(BIN)/python -m tools.config_reference
+
+wheel: $(READY) ## dist/gritd-….whl
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	@ls dist/*.whl
+
+clean: ## remove what the targets made
+	@rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

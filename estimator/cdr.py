@@ -144,21 +144,21 @@ class Codec:
 
     def fill(self, table: Rows, records: Rows) -> None:
         """Copy records of `record_dtype`, shape (n,), into the rows of `table`, shape (n,), by name."""
-        for name, kind in zip(self.names, self.kinds, strict=True):
-            if kind == TIME:
+        for name in table.dtype.names or ():
+            if self.kinds[self.names.index(name)] == TIME:
                 table[name] = records[name + ".sec"].astype(np.int64) * BILLION + records[name + ".nanosec"]
             else:
                 table[name] = records[name]
 
 
 def parse_schema(text: str) -> tuple[Field, ...] | None:
-    """The fields of a ros2msg text, or None where it is not flat (strings, arrays and other nested messages)."""
+    """The fields of a ros2msg text, or None where it has arrays or nested messages other than Time."""
     own = re.split(r"^=+\s*$", text, maxsplit=1, flags=re.MULTILINE)[0]
     fields = [_parse_line(line) for line in own.splitlines()]
     kept = tuple(field for field in fields if field is not None)
-    flat = all(kind in CODES or kind == TIME for _, kind, _ in kept)
+    readable = all(kind in CODES or kind in (TIME, STRING) for _, kind, _ in kept)
     unique = len({name for name, _, _ in kept}) == len(kept)
-    return kept if kept and flat and unique else None
+    return kept if kept and readable and unique else None
 
 
 def _parse_line(line: str) -> Field | None:
@@ -166,7 +166,8 @@ def _parse_line(line: str) -> Field | None:
     words = code.split()
     if len(words) < 2 or "=" in code:  # blank, or a constant
         return None
-    return words[1], ALIASES.get(words[0], words[0]), comment.strip()
+    kind = words[0].partition("<=")[0]  # a bounded string is a string
+    return words[1], ALIASES.get(kind, kind), comment.strip()
 
 
 def _primitives(name: str, kind: str) -> list[tuple[str, str]]:

@@ -26,7 +26,7 @@ from estimator.readings import WRENCH_FIELDS, Reading
 __all__ = ["LOG_TOPIC", "RAW_TOPICS", "RecordingError", "RunInfo", "RunWriter", "Topic", "part_path", "parts"]
 
 CHUNK_SIZE = 1 << 20  # [bytes] a chunk is closed at this size even if nobody flushes
-CONFIG, RUN = "gritd.config", "gritd.run"
+CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
 CHECKSUM = "crc32"
 
 _STAMP: Field = ("stamp", TIME, "when the sample was taken")

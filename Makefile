@@ -19,7 +19,7 @@ $(READY): pyproject.toml
 	  { echo "gritd needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "setting up $(VENV) (a minute or two, once) …"
 	@$(PYTHON) -m venv --upgrade $(VENV) || { echo "cannot make a venv; is the package python3-venv installed?" >&2; exit 1; }
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --editable '.[test]'
 	@touch $@
 
 demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
@@ -45,7 +45,7 @@ docs: $(READY) ## the generated parts of the documents
 	@$(BIN)/python -m tools.config_reference
 
 wheel: $(READY) ## dist/gritd-….whl
-	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir dist .
 	@ls dist/*.whl
 
 clean: ## remove what the targets made

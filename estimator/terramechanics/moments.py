@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from estimator.terramechanics.soil import Array
 
-SMALL = 0.3  # |y + η| below which the recurrence runs backward
+SMALL = 0.25  # |y + η| below which the recurrence runs backward
 BACKWARD = 11  # where it starts; what is left out there weighs SMALL¹¹/11! of it, below 1e-14, in μ₀
 
 # A real or complex number, or an array of them: the arithmetic below is the same for all.

@@ -61,8 +61,8 @@ def velocity_ratio(slip: Scalar) -> Array:
 
     Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with the same slope.
     """
-    slip = np.asarray(slip, dtype=float)
-    return np.where(slip >= 0.0, 1.0 - slip, 1.0 / np.maximum(1.0 + np.minimum(slip, 0.0), LOCKED))
+    q = np.clip(1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0)  # 1 when driving, 1 + i when braking
+    return np.asarray(1.0 - slip / q)
 
 
 def arc(theta_1: Scalar, theta: Scalar) -> Arc:
@@ -172,7 +172,8 @@ _peak = theta_m  # `contact` has an argument of that name
 
 def _dot(a: Array, b: Array) -> Array:
     """Sum of products over the nodes."""
-    return np.asarray(np.einsum("i...,i...->...", a, b))
+    total: Array = np.einsum("i...,i...->...", a, b)
+    return total
 
 
 @cache

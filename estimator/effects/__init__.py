@@ -49,6 +49,11 @@ def configured(effects: Iterable[ConfiguredEffect]) -> tuple[Effect, ...]:
     return tuple(make(e.name, {key: value.value for key, value in e.parameters.items()}) for e in effects)
 
 
+def units(name: str) -> dict[str, str] | None:
+    """Unit of each parameter of an effect, as the configuration reads it; None where there is no such effect."""
+    return {p.name: p.unit for p in EFFECTS[name].parameters()} if name in EFFECTS else None
+
+
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Effects in the order in which they act, whatever order they are listed in."""
     return tuple(

@@ -82,7 +82,7 @@ class Fingerprint(NamedTuple):
     """Where the effect shows most."""
 
     channel: str  # torque, drawbar_pull, sinkage, load
-    covariate: str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, direction, constant
+    covariate: str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant, rate (the channel's own), heat (∫I²dt)
     sentence: str
 
 

@@ -20,8 +20,8 @@ class Bulldozing(Effect):
     24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as wide as the wheel.
     """
 
-    share: float = strength("share of a plane blade's resistance, s", "-", typical=0.3, low=0.0, high=1.5)
-    unit_weight: float = shape("weight of the soil, γ", "N/m³", mean=15e3, sigma=2e3, low=1e3, high=25e3)
+    share: float = strength("share of a plane blade's resistance, s", "", typical=0.3, low=0.0, high=1.5)
+    unit_weight: float = shape("weight of the soil, γ", "N/m^3", mean=15e3, sigma=2e3, low=1e3, high=25e3)
 
     stage = "wheel"
     fingerprint = Fingerprint(

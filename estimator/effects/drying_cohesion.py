@@ -21,11 +21,13 @@ class DryingCohesion(Effect):
     Geotechnical J. 15, 313-321), suction relaxing exponentially.
     """
 
-    change: float = strength("final relative change of c, a", "-", typical=0.4, low=-0.95, high=5.0)
+    change: float = strength("final relative change of c, a", "", typical=0.4, low=-0.95, high=5.0)
     duration: float = shape("time constant, τ", "s", mean=300.0, sigma=300.0, low=10.0, high=36e3, scan=True)
 
     stage = "soil"
-    fingerprint = Fingerprint("torque", "time", "torque and drawbar pull drift with time, the same at every speed")
+    fingerprint = Fingerprint(
+        "drawbar_pull", "time", "drawbar pull and torque drift with time, the same at every speed"
+    )
     confusable_with = told_apart(motor_heating="wrench", multipass="shifted_start", soil_patch="shifted_start")
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:

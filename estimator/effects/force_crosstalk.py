@@ -19,7 +19,7 @@ class ForceCrosstalk(Effect):
     """
 
     from_torque: float = strength("pull read per torque, a", "N/(N·m)", typical=0.5, low=-5.0, high=5.0)
-    from_load: float = strength("pull read per load, b", "-", typical=0.02, low=-0.3, high=0.3)
+    from_load: float = strength("pull read per load, b", "", typical=0.02, low=-0.3, high=0.3)
 
     stage = "sensor"
     fingerprint = Fingerprint("drawbar_pull", "load", "drawbar pull off in proportion to torque or load")

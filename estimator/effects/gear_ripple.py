@@ -23,9 +23,7 @@ class GearRipple(Effect):
 
     ripple_cos: float = strength("ripple in phase, a", "N·m", typical=0.2, low=-3.0, high=3.0)
     ripple_sin: float = strength("ripple in quadrature, b", "N·m", typical=0.2, low=-3.0, high=3.0)
-    order: float = shape(
-        "ripples a turn of the wheel, N", "1/turn", mean=40.0, sigma=30.0, low=2.0, high=200.0, scan=True
-    )
+    order: float = shape("ripples a turn of the wheel, N", "", mean=40.0, sigma=30.0, low=2.0, high=200.0, scan=True)
 
     stage = "drivetrain"
     fingerprint = Fingerprint(

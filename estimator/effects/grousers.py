@@ -22,15 +22,15 @@ class Grousers(Effect):
     """
 
     height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)
-    grip: float = strength("gain of shear strength over the smooth rim, g", "-", typical=0.15, low=0.0, high=1.0)
-    ripple_cos: float = strength("relative ripple of torque in phase, a", "-", typical=0.05, low=-0.5, high=0.5)
-    ripple_sin: float = strength("relative ripple of torque in quadrature, b", "-", typical=0.05, low=-0.5, high=0.5)
-    count: float = shape("lugs on the rim, N", "1/turn", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True)
-    share: float = shape("share of the height that shears, λ", "-", mean=0.6, sigma=0.2, low=0.0, high=1.0)
+    grip: float = strength("gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=1.0)
+    ripple_cos: float = strength("relative ripple of torque in phase, a", "", typical=0.15, low=-0.5, high=0.5)
+    ripple_sin: float = strength("relative ripple of torque in quadrature, b", "", typical=0.15, low=-0.5, high=0.5)
+    count: float = shape("lugs on the rim, N", "", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True)
+    share: float = shape("share of the height that shears, λ", "", mean=0.6, sigma=0.2, low=0.0, high=1.0)
 
     stage = "wheel"
     fingerprint = Fingerprint(
-        "torque", "wheel_angle", "N ripples a turn in torque, drawbar pull and sinkage; more pull"
+        "drawbar_pull", "wheel_angle", "N ripples a turn in drawbar pull, torque and sinkage; more pull"
     )
     confusable_with = told_apart(gear_ripple="wrench", wheel_eccentricity="lifted_spin", wheel_radius_error="tape")
 

@@ -22,11 +22,11 @@ class MotorHeating(Effect):
     and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins thermal resistance and magnet coefficient.
     """
 
-    fall: float = strength("relative fall per squared current, β", "1/A²", typical=0.15, low=0.0, high=5.0)
-    duration: float = shape("thermal time constant, τ", "s", mean=60.0, sigma=40.0, low=2.0, high=3600.0, scan=True)
+    fall: float = strength("relative fall per squared current, β", "1/A^2", typical=0.15, low=0.0, high=5.0)
+    duration: float = shape("thermal time constant, τ", "s", mean=300.0, sigma=200.0, low=2.0, high=3600.0, scan=True)
 
     stage = "drivetrain"
-    fingerprint = Fingerprint("torque", "time", "current creeps up over a run while measured axle torque stays")
+    fingerprint = Fingerprint("torque", "heat", "current creeps up over a run while measured axle torque stays")
     confusable_with = told_apart(
         torque_constant_error="long_run", drying_cohesion="wrench", viscous_friction="long_run"
     )

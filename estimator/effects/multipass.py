@@ -21,10 +21,10 @@ class Multipass(Effect):
     Holm (1969), Proc. 3rd ISTVS Conf., and Senatore and Sandu (2011), J. Terramechanics 48, 265-276.
     """
 
-    stiffening: float = strength("final rise of K, a", "-", typical=0.5, low=0.0, high=5.0)
-    bonding: float = strength("final rise of c, a_c", "-", typical=0.3, low=0.0, high=3.0)
-    shortening: float = strength("final fall of k as 1/(1 + a_k)", "-", typical=0.2, low=0.0, high=2.0)
-    passes: float = shape("passes to 63 % of the growth, N₀", "-", mean=2.0, sigma=1.0, low=0.5, high=10.0)
+    stiffening: float = strength("final rise of K, a", "", typical=0.5, low=0.0, high=5.0)
+    bonding: float = strength("final rise of c, a_c", "", typical=0.3, low=0.0, high=3.0)
+    shortening: float = strength("final fall of k as 1/(1 + a_k)", "", typical=0.2, low=0.0, high=2.0)
+    passes: float = shape("passes to 63 % of the growth, N₀", "", mean=2.0, sigma=1.0, low=0.5, high=10.0)
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "run", "sinkage falls from pass to pass, fast at first")

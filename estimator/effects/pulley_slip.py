@@ -18,10 +18,12 @@ class PulleySlip(Effect):
     Source: elastic creep of a belt drive, Johnson (1985), Contact Mechanics, chapter 8: a share of the travel.
     """
 
-    share: float = strength("travel not seen, s", "-", typical=0.03, low=-0.1, high=0.4)
+    share: float = strength("travel not seen, s", "", typical=0.03, low=-0.1, high=0.4)
 
     stage = "sensor"
-    fingerprint = Fingerprint("torque", "slip", "true slip smaller than the computed one, most at low slip")
+    fingerprint = Fingerprint(
+        "drawbar_pull", "slip", "drawbar pull and torque too low, most where slip is low and its error counts most"
+    )
     confusable_with = told_apart(wheel_radius_error="tape", torque_constant_error="slip_step")
 
     def motion(self, motion: Motion, wheel: Wheel) -> Motion:

@@ -19,11 +19,11 @@ class RateDependentShear(Effect):
     Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten per cent a decade.
     """
 
-    per_decade: float = strength("gain of strength per tenfold speed, λ", "-", typical=0.08, low=-0.2, high=0.3)
+    per_decade: float = strength("gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.2, high=0.3)
 
     stage = "contact"
     fingerprint = Fingerprint(
-        "torque", "speed", "torque and drawbar pull rise with the logarithm of speed at fixed slip"
+        "drawbar_pull", "speed", "drawbar pull and torque rise with the logarithm of speed at fixed slip"
     )
     confusable_with = told_apart(
         viscous_friction="lifted_spin", stribeck_friction="lifted_spin", rate_dependent_sinkage="speed_step"

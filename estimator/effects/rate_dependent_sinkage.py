@@ -20,7 +20,7 @@ class RateDependentSinkage(Effect):
     Source: Grahn (1991), J. Terramechanics 28: p = k ż^m zⁿ; the penetration rate ż scales with speed.
     """
 
-    power: float = strength("exponent of speed, m", "-", typical=0.08, low=-0.3, high=0.5)
+    power: float = strength("exponent of speed, m", "", typical=0.08, low=-0.3, high=0.5)
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "speed", "sinkage falls with speed at fixed load and slip")

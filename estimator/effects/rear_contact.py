@@ -17,7 +17,7 @@ class RearContact(Effect):
     Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98; Ishigami et al. (2007), J. Field Robotics 24, 233-250.
     """
 
-    ratio: float = strength("exit over entry angle, c₃", "-", typical=0.25, low=0.0, high=0.8)
+    ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=0.8)
 
     stage = "contact"
     fingerprint = Fingerprint(

@@ -25,9 +25,7 @@ class SensorLatency(Effect):
     force: float = strength("delay of the force/torque sensor", "s", typical=0.1, low=-0.5, high=1.0)
 
     stage = "sensor"
-    fingerprint = Fingerprint(
-        "torque", "acceleration", "pulses of opposite sign at every change of speed, slip or load"
-    )
+    fingerprint = Fingerprint("load", "rate", "pulses in proportion to how fast the channel itself changes")
     confusable_with = told_apart(wheel_inertia="speed_step", load_axis_friction="load_step")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:

@@ -22,11 +22,13 @@ class ShearPeak(Effect):
     Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas (1983).
     """
 
-    overshoot: float = strength("P: 0 is no peak, 1.4 a residual of two thirds", "-", typical=0.4, low=0.0, high=3.0)
+    overshoot: float = strength("P: 0 is no peak, 1.4 a residual of two thirds", "", typical=0.4, low=0.0, high=3.0)
 
     stage = "contact"
     fingerprint = Fingerprint(
-        "torque", "slip", "torque and drawbar pull are highest at middle slip and fall again; φ seems larger than it is"
+        "drawbar_pull",
+        "sinkage",
+        "more pull and torque where j is about k, less gain where j is far beyond; φ seems larger than it is",
     )
     confusable_with = told_apart(
         rear_contact="slip_step", stress_peak_shift="slip_step", rate_dependent_shear="speed_step"

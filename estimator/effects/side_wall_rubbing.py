@@ -18,7 +18,7 @@ class SideWallRubbing(Effect):
     Source: Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6, who add 0.25 of the sideways force.
     """
 
-    share: float = strength("pull lost over load, s", "-", typical=0.04, low=0.0, high=0.5)
+    share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=0.5)
 
     stage = "testbed"
     fingerprint = Fingerprint("drawbar_pull", "load", "drawbar pull lost in proportion to load, always against travel")

@@ -28,10 +28,14 @@ class SidewallFriction(Effect):
     the faces of the wheel as in Ishigami et al. (2007), J. Field Robotics 24, 233-250.
     """
 
-    share: float = strength("strength mobilised on the faces, s", "-", typical=0.3, low=0.0, high=1.5)
+    share: float = strength("strength mobilised on the faces, s", "", typical=0.3, low=0.0, high=1.5)
 
     stage = "wheel"
-    fingerprint = Fingerprint("torque", "sinkage", "torque grows with sinkage faster than the rim explains")
+    fingerprint = Fingerprint(
+        "drawbar_pull",
+        "slip",
+        "torque grows with sinkage faster than the rim explains; pull gains at high slip, loses at low",
+    )
     confusable_with = told_apart(bulldozing="wrench", coulomb_friction="lifted_spin", torque_constant_error="wrench")
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:

@@ -20,7 +20,7 @@ class SlipSinkage(Effect):
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in i.
     """
 
-    growth: float = strength("rise of the exponent with slip, n₁", "-", typical=0.2, low=-0.2, high=1.2)
+    growth: float = strength("rise of the exponent with slip, n₁", "", typical=0.2, low=-0.2, high=1.2)
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "slip", "sinkage rises with slip at one load")

@@ -17,11 +17,13 @@ class StressPeakShift(Effect):
     Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98: c₁ ≈ 0.18-0.43, c₂ ≈ 0.32-0.41 in sand.
     """
 
-    share: float = strength("added to c₁", "-", typical=0.1, low=-0.3, high=0.3)
-    slip_share: float = strength("added to c₂", "-", typical=0.2, low=-0.4, high=0.4)
+    share: float = strength("added to c₁", "", typical=0.1, low=-0.3, high=0.3)
+    slip_share: float = strength("added to c₂", "", typical=0.2, low=-0.4, high=0.4)
 
     stage = "contact"
-    fingerprint = Fingerprint("sinkage", "slip", "sinkage and drawbar pull change with slip, torque much less")
+    fingerprint = Fingerprint(
+        "sinkage", "sinkage", "sinkage and drawbar pull change, more at high slip; torque much less"
+    )
     confusable_with = told_apart(rear_contact="penetration", slip_sinkage="penetration", shear_peak="slip_step")
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:

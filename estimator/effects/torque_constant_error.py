@@ -18,7 +18,7 @@ class TorqueConstantError(Effect):
     Source: calibration model; a gear's efficiency enters the same way while it drives.
     """
 
-    error: float = strength("relative error of the configured constant, e", "-", typical=0.08, low=-0.6, high=1.0)
+    error: float = strength("relative error of the configured constant, e", "", typical=0.08, low=-0.6, high=1.0)
 
     stage = "sensor"
     fingerprint = Fingerprint("torque", "load", "motor torque off in proportion to itself")

@@ -17,7 +17,7 @@ class WheelInertia(Effect):
     Source: Newton's second law; J holds the rotor's inertia times the square of the gear ratio.
     """
 
-    inertia: float = strength("moment of inertia at the axle, J", "kg·m²", typical=0.3, low=0.0, high=5.0)
+    inertia: float = strength("moment of inertia at the axle, J", "kg·m^2", typical=0.3, low=0.0, high=5.0)
 
     stage = "wheel"
     fingerprint = Fingerprint("torque", "acceleration", "torque pulses while the speed changes, none at steady speed")

@@ -17,10 +17,14 @@ class WheelRadiusError(Effect):
     Source: calibration model.
     """
 
-    error: float = strength("relative error of the configured radius, e", "-", typical=0.03, low=-0.3, high=0.3)
+    error: float = strength("relative error of the configured radius, e", "", typical=0.03, low=-0.3, high=0.3)
 
     stage = "sensor"
-    fingerprint = Fingerprint("torque", "slip", "true slip differs from the computed one, most at low slip")
+    fingerprint = Fingerprint(
+        "drawbar_pull",
+        "sinkage",
+        "drawbar pull, torque and sinkage off, more where the wheel rides deep; slip off most where it is low",
+    )
     confusable_with = told_apart(pulley_slip="tape", grousers="tape", torque_constant_error="slip_step")
 
     def geometry(self, wheel: Wheel) -> Wheel:

@@ -1,0 +1,1 @@
+"""The estimator: physics, geometry, filter, recording. It never imports drivers or tools."""

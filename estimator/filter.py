@@ -1,0 +1,148 @@
+"""The extended Kalman filter on c, tan φ and ln k, with considered nuisances (Schmidt).
+
+Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance. They, and ln k while
+slip does not vary, are considered: their uncertainty and their correlation with the state take part in every
+innovation covariance, but their own value and variance never change. Without them a filter fed ten windows a second
+soon claims to know c far better than the calibration of the sensors allows.
+
+Two engines share one interface: `FilterpyEngine` is filterpy's ExtendedKalmanFilter with the Schmidt gain, and
+`plain.PlainEngine` the same algebra in plain floats. Both use the Joseph form with the gain that was really applied,
+zeroed rows included, so the covariance stays symmetric and positive.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+C = 0  # cohesion [kPa]
+TAN_PHI = 1  # tangent of the internal friction angle [-]
+LN_K = 2  # logarithm of the shear modulus k/m [-]
+STATES = 3
+KPA = 1e3  # [Pa]; cohesion is scaled so that all three states are of order one
+
+Vector = tuple[float, ...]
+Matrix = tuple[Vector, ...]
+
+
+class Estimate(NamedTuple):
+    """Mean and covariance of [c, tan φ, ln k], and their correlation with the q nuisances."""
+
+    x: Vector  # (3,)
+    P: Matrix  # (3, 3)
+    cross: Matrix  # (3, q) covariance of the state with each nuisance
+
+
+class Update(NamedTuple):
+    """A vector measurement of m = 1 or 2 components, linearised at the present estimate."""
+
+    innovation: Vector  # y (m,)
+    H: Matrix  # (m, 3) with respect to the state
+    G: Matrix  # (m, q) with respect to the nuisances
+    R: Matrix  # (m, m) noise
+
+
+class Engine(Protocol):
+    """The algebra of one step. It knows the nuisances' variances and holds no estimate of its own."""
+
+    def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
+        """Apply a measurement. With consider_k, ln k keeps its value and variance."""
+
+
+class _SchmidtFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
+    """filterpy's EKF, whose gain is set to zero for considered states before it is applied anywhere."""
+
+    x: np.ndarray
+    P: np.ndarray
+
+    def consider(self, y: np.ndarray, H: np.ndarray, R: np.ndarray, considered: slice) -> None:
+        cross = self.P @ H.T
+        self.S = H @ cross + R
+        self.K = cross @ np.linalg.inv(self.S)
+        self.K[considered] = 0.0
+        self.y = y
+        self.x = self.x + self.K @ self.y
+        kept = self._I - self.K @ H
+        self.P = kept @ self.P @ kept.T + self.K @ R @ self.K.T
+
+
+class FilterpyEngine:
+    """filterpy behind the Engine interface: one augmented vector [state, nuisances]."""
+
+    def __init__(self, nuisance_variances: Vector) -> None:
+        self._variances = np.diag(nuisance_variances)
+
+    def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
+        nuisances = len(self._variances)
+        ekf = _SchmidtFilter(dim_x=STATES + nuisances, dim_z=len(update.innovation))
+        cross = np.array(estimate.cross).reshape(STATES, nuisances)
+        ekf.x = np.array((*estimate.x, *(0.0,) * nuisances))
+        ekf.P = np.block([[np.array(estimate.P), cross], [cross.T, self._variances]])
+        H = np.hstack([np.array(update.H), np.array(update.G).reshape(len(update.H), nuisances)])
+        y, R = np.array(update.innovation), np.array(update.R)
+        if consider_k or nuisances:
+            ekf.consider(y, H, R, slice(LN_K if consider_k else STATES, None))
+        else:
+            ekf.update(y, lambda _: H, lambda _: np.zeros_like(y), R=R)
+        P = 0.5 * (ekf.P + ekf.P.T)
+        return Estimate(tuple(ekf.x[:STATES].tolist()), _rows(P[:STATES, :STATES]), _rows(P[:STATES, STATES:]))
+
+
+def _rows(matrix: np.ndarray) -> Matrix:
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def predict(estimate: Estimate, walk: Vector) -> Estimate:
+    """Random walk: add the variances `walk` (3,) to the diagonal of P."""
+    P = estimate.P
+    grown = tuple(tuple(value + walk[i] if i == j else value for j, value in enumerate(row)) for i, row in enumerate(P))
+    return Estimate(estimate.x, grown, estimate.cross)
+
+
+def innovation_covariance(estimate: Estimate, update: Update, variances: Vector) -> Matrix:
+    """S = H P Hᵀ + H C Gᵀ + G Cᵀ Hᵀ + G V Gᵀ + R (m, m), with C the cross covariance and V the nuisances' variances."""
+    state, nuisance = crossed(estimate, update, variances)
+    m = range(len(update.innovation))
+    return tuple(
+        tuple(dot(update.H[a], state[b]) + dot(update.G[a], nuisance[b]) + update.R[a][b] for b in m) for a in m
+    )
+
+
+def crossed(estimate: Estimate, update: Update, variances: Vector) -> tuple[Matrix, Matrix]:
+    """Covariance of state and nuisances with each predicted component: (m, 3) and (m, q)."""
+    state = tuple(
+        tuple([dot(row, h) + dot(cross, g) for row, cross in zip(estimate.P, estimate.cross, strict=True)])
+        for h, g in zip(update.H, update.G, strict=True)
+    )
+    (c0, c1, c2) = estimate.cross
+    nuisance = tuple(
+        tuple([a * h[0] + b * h[1] + c * h[2] + v * w for a, b, c, v, w in zip(c0, c1, c2, variances, g, strict=True)])
+        for h, g in zip(update.H, update.G, strict=True)
+    )
+    return state, nuisance
+
+
+def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
+    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never negative."""
+    state, nuisance = crossed(estimate, Update((0.0,), (h,), (g,), ((0.0,),)), variances)
+    return max(dot(h, state[0]) + dot(g, nuisance[0]), 0.0)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    return sum([u * v for u, v in zip(a, b, strict=True)])
+
+
+def project(estimate: Estimate, bounds: tuple[tuple[float, float], ...]) -> Estimate:
+    """Move a state that left its bounds back to the bound, and the states correlated with it along.
+
+    The covariance is kept: a bound is knowledge of the state, not a measurement that narrows it.
+    """
+    x, P = list(estimate.x), estimate.P
+    for j, (low, high) in enumerate(bounds):
+        step = min(max(x[j], low), high) - x[j]
+        if step != 0.0:
+            x = [value + P[i][j] / P[j][j] * step for i, value in enumerate(x)]
+    clamped = tuple(min(max(value, low), high) for value, (low, high) in zip(x, bounds, strict=True))
+    return Estimate(clamped, P, estimate.cross)

@@ -1,0 +1,77 @@
+"""What the filter expects the sensors to say: the closed forms, with the configured effects applied to them."""
+
+from __future__ import annotations
+
+from math import cos, hypot, log, sin
+from typing import NamedTuple
+
+from estimator.nuisance import Sensitivity
+from estimator.settings import Settings
+from estimator.sync import Measured
+from estimator.terramechanics import linear
+
+SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)  # where the largest drawbar pull is looked for
+
+
+class Quantity(NamedTuple):
+    """A predicted force or torque and its gradient, SI."""
+
+    value: float
+    by_c: float  # [1/Pa]
+    by_tan_phi: float
+    by_ln_k: float
+    by_theta_1: float
+    by_slip: float
+    by_load: float
+
+
+class Prediction(NamedTuple):
+    torque: Quantity  # T [N·m]
+    drawbar_pull: Quantity  # DP [N]
+    resistance: Quantity  # [N]
+
+
+class WheelModel:
+    """Eqs. (20)-(22) for one wheel, σₘ eliminated through (21)."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._wheel = settings.wheel
+        self._soil = settings.soil
+        self._modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
+        self._model_sigma = settings.filter.model_sigma
+
+    def predict(self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
+        """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
+        p = linear.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
+        return Prediction(
+            Quantity(p.torque, *p.torque_gradient),
+            Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),
+            Quantity(p.resistance, *p.resistance_gradient),
+        )
+
+    def residual_sigma(self, sensitivity: Sensitivity) -> tuple[float, float]:
+        """Standard deviation of the model's own error in T [N·m] and DP [N]."""
+        return self._model_sigma * abs(sensitivity.torque), self._model_sigma * abs(sensitivity.drawbar_pull)
+
+    def best_slip(self, c: float, tan_phi: float, k: float, theta_1: float, load: float) -> float:
+        """Slip of the largest drawbar pull at this load and sinkage: the best of SLIPS, refined by a parabola."""
+        pulls = [
+            linear.forces_under_load(self._wheel, c, tan_phi, k, theta_1, slip, load).drawbar_pull for slip in SLIPS
+        ]
+        best = max(range(len(SLIPS)), key=pulls.__getitem__)
+        if best in (0, len(SLIPS) - 1):
+            return SLIPS[best]
+        before, peak, after = pulls[best - 1 : best + 2]
+        return SLIPS[best] + 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (before - 2.0 * peak + after)
+
+    def load(self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float) -> Measured:
+        """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli and of θ₁."""
+        radius, soil = self._wheel.radius, self._soil
+        depth = radius * (cos(theta_m) - cos(theta_1.value))
+        if depth <= 0.0:
+            return Measured(0.0, 0.0)
+        sigma_m = self._modulus * depth**soil.exponent.value
+        load = float(linear.forces(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m).load)
+        by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
+        relative = hypot(soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma)
+        return Measured(load, abs(load) * relative)

@@ -1,0 +1,261 @@
+"""One window after another into c, tan φ and k.
+
+`Tracker.step` takes a state and a snapshot and returns the next state and an account of what was done. It reads no
+clock and keeps nothing between calls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, hypot, log, sqrt
+from typing import NamedTuple
+
+from estimator.filter import (
+    KPA,
+    STATES,
+    TAN_PHI,
+    C,
+    Engine,
+    Estimate,
+    FilterpyEngine,
+    Update,
+    Vector,
+    dot,
+    innovation_covariance,
+    predict,
+    project,
+)
+from estimator.measurement import Measurement, selected
+from estimator.model import Prediction
+from estimator.plain import PlainEngine
+from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
+from estimator.segments import CAPACITY, Memory, Stretch
+from estimator.settings import Settings
+from estimator.sync import NS, Snapshot
+from estimator.wheel_state import REQUIRED_BITS, WheelState, classify, wheel_state
+
+SLIP_MEMORY = 20.0  # [s] k is estimated while slip has varied within this time …
+SLIP_VARIES = 0.05  # … by this standard deviation
+SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
+CONSISTENCY_MEMORY = 2.0  # [s]
+# Mean normalised innovation squared above which the filter is reset: with 20 independent windows of one component the
+# chance of a false reset is 3e-11 a window, 1 in 900 simulated hours (chi-square, 20 degrees of freedom).
+INCONSISTENT = 5.0
+MISMATCH = 2.5  # … and above which model and measurement are said to disagree
+PATIENCE = 5.0  # [s] after a reset before the next
+
+ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {"filterpy": FilterpyEngine, "plain": PlainEngine}
+
+
+class Aid(NamedTuple):
+    """The account of one measurement component (STYLE rule 6)."""
+
+    z: float
+    r: float
+    innovation: float
+    s: float
+    test_ratio: float
+    accepted: bool
+
+
+class Account(NamedTuple):
+    """What one tick saw and did."""
+
+    snapshot: Snapshot
+    now: WheelState
+    status: Status
+    flags: Flag
+    prediction: Prediction | None  # at the estimate after the update; None without contact
+    aids: tuple[Aid, ...]  # empty where nothing was offered to the filter
+
+
+@dataclass(frozen=True)
+class TrackState:
+    """Everything the tracker remembers from window to window."""
+
+    estimate: Estimate
+    memory: Memory
+    window_end: int = -1  # end of the last window looked at [ns]
+    before: WheelState | None = None
+    slip_mean: float = 0.0
+    slip_variance: float = 0.0
+    surprise: float = 0.0  # sum of normalised innovations squared, exponentially forgotten
+    components: float = 0.0  # number of them, likewise
+    last_reset: int = -1
+    updates: int = 0
+    resets: int = 0
+    largest_pull: tuple[float, float, float] = (NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER)  # value, σ [N], slip
+
+    @property
+    def consistency(self) -> float:
+        """Mean normalised innovation squared per component; 1 when the stated noise is the real one."""
+        return self.surprise / self.components if self.components > 0.0 else NOT_A_NUMBER
+
+
+class Tracker:
+    """The settings turned into a filter; the state lives with the caller."""
+
+    def __init__(self, settings: Settings, engine: str | None = None) -> None:
+        self.settings = settings
+        self.measurement = Measurement(settings)
+        self.engine: Engine = ENGINES[engine or settings.filter.engine](self.measurement.variances)
+        self._window = round(NS / settings.rates.update)
+        self._required = REQUIRED_BITS | (CHANNEL_BITS["wrench"] if settings.wrench is not None else 0)
+        self._bounds = _bounds(settings)
+        soil = settings.soil
+        self._prior_sigma = (
+            soil.cohesion.sigma / KPA,
+            soil.tan_phi.sigma,
+            soil.shear_modulus.sigma / soil.shear_modulus.value,
+        )
+
+    def start(self) -> TrackState:
+        """The prior."""
+        soil = self.settings.soil
+        estimate = self._unsure((soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value)))
+        return TrackState(estimate, Memory(estimate))
+
+    def _unsure(self, x: Vector) -> Estimate:
+        """The state x with the prior's covariance."""
+        sigma = self._prior_sigma
+        P = tuple(tuple(sigma[i] ** 2 if i == j else 0.0 for j in range(STATES)) for i in range(STATES))
+        return Estimate(x, P, ((0.0,) * len(self.measurement.variances),) * STATES)
+
+    def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
+        """Classify the window; when a whole new one has passed, and it is fit for it, update the filter."""
+        now = wheel_state(self.settings, snapshot)
+        status = classify(self.settings, snapshot, now, state.before, self._required)
+        touching = snapshot.ready and now.theta_1.value > 0.0
+        prediction = self.measurement.predict(state.estimate, now) if touching else None
+        aids: tuple[Aid, ...] = ()
+        if snapshot.evaluated - state.window_end >= self._window:
+            elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
+            state = replace(state, window_end=snapshot.evaluated, before=now if snapshot.ready else None)
+            if status == Status.TRACKING and prediction is not None:
+                state, aids = self._update(state, now, prediction, elapsed)
+                prediction = self.measurement.predict(state.estimate, now)
+        return state, Account(snapshot, now, status, now.flags | self._flags(state, aids), prediction, aids)
+
+    def _update(
+        self, state: TrackState, now: WheelState, prediction: Prediction, elapsed: float
+    ) -> tuple[TrackState, tuple[Aid, ...]]:
+        """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
+        state = _remember_slip(replace(state, estimate=self._walk(state.estimate, elapsed)), now.slip.value, elapsed)
+        update = self.measurement.linearise(now, prediction)
+        aids = self._gate(state.estimate, now, update)
+        taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
+        if taken:
+            estimate = self.engine.update(state.estimate, selected(update, taken), not self.estimates_k(state))
+            state = replace(state, estimate=project(estimate, self._bounds), updates=state.updates + 1)
+            state = self._remember(state, now, taken, elapsed)
+        else:
+            state = replace(state, memory=state.memory.waited(elapsed))
+        state = self._judge(state, aids, elapsed)
+        return replace(state, largest_pull=self.measurement.largest_pull(state.estimate, now)), aids
+
+    def _walk(self, estimate: Estimate, elapsed: float) -> Estimate:
+        """Random walk of the soil over the elapsed time [s]."""
+        walk = self.settings.filter
+        rates = (walk.cohesion_walk / KPA, walk.tan_phi_walk, walk.ln_k_walk)
+        return predict(estimate, tuple(rate * rate * elapsed for rate in rates))
+
+    def estimates_k(self, state: TrackState) -> bool:
+        """Whether ln k is a state; otherwise it is considered."""
+        choice = self.settings.filter.estimate_k
+        return choice == "always" or (choice == "auto" and state.slip_variance > SLIP_VARIES**2)
+
+    def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
+        covariance = innovation_covariance(estimate, update, self.measurement.variances)
+        gate = self.settings.filter.gate
+        measured = (now.torque.value, now.drawbar_pull.value)
+        aids = []
+        for index, innovation in enumerate(update.innovation):
+            s = covariance[index][index]
+            ratio = innovation * innovation / (gate * gate * s)
+            aids.append(Aid(measured[index], update.R[index][index], innovation, s, ratio, ratio <= 1.0))
+        return tuple(aids)
+
+    def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:
+        """Add the window to the memory; when a new stretch begins, linearise all of them anew."""
+        memory, begun = state.memory.extended(now, taken, self.settings.wheel.radius, elapsed)
+        if not begun or len(memory.stretches) == 1:
+            return replace(state, memory=memory)
+        if len(memory.stretches) > CAPACITY:
+            anchor = self._absorb(memory.anchor, memory.stretches[0], state)
+            memory = Memory(anchor, memory.stretches[1:])
+        estimate = memory.anchor
+        for stretch in memory.stretches:
+            estimate = self._absorb(estimate, stretch, state)
+        return replace(state, memory=memory, estimate=project(estimate, self._bounds))
+
+    def _absorb(self, estimate: Estimate, stretch: Stretch, state: TrackState) -> Estimate:
+        """Update with a whole stretch, its Jacobians taken at the present estimate of `state`."""
+        estimate = self._walk(estimate, stretch.elapsed)
+        prediction = self.measurement.predict(state.estimate, stretch.mean)
+        update = selected(self.measurement.linearise(stretch.mean, prediction), stretch.components)
+        offset = tuple([x - at for x, at in zip(estimate.x, state.estimate.x, strict=True)])
+        merged = Update(
+            tuple([y - dot(h, offset) for y, h in zip(update.innovation, update.H, strict=True)]),
+            update.H,
+            update.G,
+            tuple([tuple([r / stretch.windows for r in row]) for row in update.R]),
+        )
+        return self.engine.update(estimate, merged, not self.estimates_k(state))
+
+    def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
+        """Keep the running consistency figure; back to the prior's covariance when it is out of all measure."""
+        keep = exp(-elapsed / CONSISTENCY_MEMORY)
+        surprise = keep * state.surprise + sum([aid.innovation**2 / aid.s for aid in aids])
+        state = replace(state, surprise=surprise, components=keep * state.components + len(aids))
+        rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
+        if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):
+            return state
+        estimate = self._unsure(state.estimate.x)
+        return replace(
+            state,
+            estimate=estimate,
+            memory=Memory(estimate),
+            surprise=0.0,
+            components=0.0,
+            last_reset=state.window_end,
+            resets=state.resets + 1,
+        )
+
+    def _experienced(self, state: TrackState) -> bool:
+        """Whether the consistency figure rests on at least half its memory."""
+        return state.components > 0.5 * CONSISTENCY_MEMORY * NS / self._window
+
+    def separability(self, estimate: Estimate) -> float:
+        """Posterior over prior standard deviation in the weakest direction of (c, tan φ)."""
+        sigma_c, sigma_t = self._prior_sigma[C], self._prior_sigma[TAN_PHI]
+        if sigma_c == 0.0 or sigma_t == 0.0:
+            return 0.0
+        P = estimate.P
+        a, d = P[C][C] / sigma_c**2, P[TAN_PHI][TAN_PHI] / sigma_t**2
+        b = P[C][TAN_PHI] / (sigma_c * sigma_t)
+        return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
+
+    def _flags(self, state: TrackState, aids: tuple[Aid, ...]) -> Flag:
+        raised = {
+            Flag.NOT_SEPARABLE: self.separability(state.estimate) > SEPARABLE,
+            Flag.K_ESTIMATED: self.estimates_k(state),
+            Flag.GATED: not all(aid.accepted for aid in aids),
+            Flag.RESET: bool(aids) and state.last_reset == state.window_end,
+            Flag.MISMATCH: self._experienced(state) and state.consistency > MISMATCH,
+        }
+        return Flag(sum(flag for flag, holds in raised.items() if holds))
+
+
+def _remember_slip(state: TrackState, slip: float, elapsed: float) -> TrackState:
+    """Exponentially forgotten mean and variance of slip."""
+    keep = exp(-elapsed / SLIP_MEMORY) if state.updates else 0.0
+    step = slip - state.slip_mean
+    mean = state.slip_mean + (1.0 - keep) * step
+    return replace(state, slip_mean=mean, slip_variance=keep * (state.slip_variance + (1.0 - keep) * step * step))
+
+
+def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:
+    """Bounds of the scaled state."""
+    low_c, high_c = settings.filter.cohesion_bounds
+    low_k, high_k = settings.filter.shear_modulus_bounds
+    return (low_c / KPA, high_c / KPA), settings.filter.tan_phi_bounds, (log(low_k), log(high_k))

@@ -15,6 +15,7 @@ from estimator.settings import Device
 
 MAX_DBC_BYTES = 4 << 20
 MAX_INLINE = 256  # signals of one device
+MAX_MESSAGE = 64  # [bytes] of CAN FD
 
 Definition = Mapping[str, object]
 
@@ -97,6 +98,9 @@ def _message(device: Device, name: str, signals: dict[str, dict[str, Any]]) -> M
         raise DeviceSettingsError(f"device {device.name}, message {name}", "its signals differ in id or extended")
     built = [_signal(signal, values) for signal, values in signals.items()]
     length = max(map(_bytes_reached, built))
+    if length > MAX_MESSAGE:
+        reason = f"its signals reach to byte {length}, expected at most {MAX_MESSAGE}"
+        raise DeviceSettingsError(f"device {device.name}, message {name}", reason)
     try:
         return Message(first["id"], name, length, built, is_extended_frame=first["extended"], strict=True)
     except cantools.Error as error:

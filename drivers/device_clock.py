@@ -112,10 +112,10 @@ class DeviceClock:
         self._blocks.append(self._lowest)
         self._lowest = (at, offset)
         self._block_end = at + BLOCK
-        points = [*self._blocks, self._lowest]
-        if points[-1][0] - points[0][0] >= SLOPE_AFTER:
-            self._slope = max(-MAX_DRIFT, min(MAX_DRIFT, hull_slope(sorted(self._blocks))))
-        self._intercept = min(y - self._slope * x for x, y in points)
+        closed = sorted(self._blocks)
+        if closed[-1][0] - closed[0][0] >= SLOPE_AFTER:
+            self._slope = max(-MAX_DRIFT, min(MAX_DRIFT, hull_slope(closed)))
+        self._intercept = min(y - self._slope * x for x, y in [*closed, self._lowest])
 
     def _line(self, at: float) -> float:
         return self._intercept + self._slope * at

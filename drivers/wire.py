@@ -41,7 +41,8 @@ class CanWire:
     def encode(self, key: str, values: Sequence[FieldValue], device_us: int | None = None) -> can.Message:
         """The message of a key, `Message` or `Message.Signal`; signals that are not given are 0.
 
-        Raises cantools.Error if a value does not fit its signal.
+        A value outside the signal's stated range is sent all the same: a broken sensor does so. Raises an error of
+        cantools or bitstruct if it does not fit the bits.
         """
         name, _, signal = key.partition(".")
         message = self._database.get_message_by_name(name)
@@ -52,7 +53,7 @@ class CanWire:
             arbitration_id=message.frame_id,
             is_extended_id=message.is_extended_frame,
             is_fd=message.length > 8,
-            data=message.encode(fields),
+            data=message.encode(fields, strict=False),
         )
 
     def _counters(self, message: Message, device_us: int) -> dict[str, FieldValue]:

@@ -7,6 +7,7 @@ record classes write everything that is not a message.
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import zlib
@@ -50,16 +51,16 @@ MESSAGE_DTYPE = np.dtype(
     }
 )
 
-Definition = tuple[Schema, Channel]
+Definition = tuple[Schema | None, Channel]
 Starts = NDArray[np.int64]
 
 
 class RecordingError(Exception):
     """A recording cannot be written or read; the message is one line. `errno` is the system's, where it was asked."""
 
-    def __init__(self, message: str, errno: int | None = None) -> None:
+    def __init__(self, message: str, number: int | None = None) -> None:
         super().__init__(message)
-        self.errno = errno
+        self.errno = number
 
 
 @contextmanager
@@ -69,6 +70,15 @@ def reported(path: Path, doing: str) -> Iterator[None]:
         yield
     except OSError as error:
         raise RecordingError(f"{path}: cannot {doing}: {error.strerror or error}", error.errno) from error
+
+
+def sync(fileno: int) -> None:
+    """fdatasync, where the file system knows it."""
+    try:
+        os.fdatasync(fileno)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP):
+            raise
 
 
 def gather(content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]) -> NDArray[np.void]:
@@ -97,7 +107,7 @@ class McapFile:
     be made again. Raises RecordingError.
     """
 
-    def __init__(self, path: Path, compression: str = "zstd") -> None:
+    def __init__(self, path: Path, compression: str = "zstd", library: str = LIBRARY) -> None:
         if compression not in ("zstd", "lz4", "none"):
             raise RecordingError(f"{path}: compression {compression!r} is not one of zstd, lz4, none")
         self.path = path
@@ -112,15 +122,26 @@ class McapFile:
         self._crc = 0
         with reported(path, "create"):
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - it lives as long as the run
-        self._append(MAGIC + record_bytes(Header(PROFILE, LIBRARY)))
+        with self.discarding():
+            self._append(MAGIC + record_bytes(Header(PROFILE, library)))
+
+    @contextmanager
+    def discarding(self) -> Iterator[None]:
+        """While a file is begun: if that fails, leave none behind."""
+        try:
+            yield
+        except RecordingError:
+            self.abandon()
+            self.path.unlink(missing_ok=True)
+            raise
 
     def fileno(self) -> int:
         return self._file.fileno()
 
-    def define(self, schema: Schema, channel: Channel) -> None:
+    def define(self, schema: Schema | None, channel: Channel) -> None:
         """Make a channel known; its definition is written into every chunk that uses it."""
         self._definitions[channel.id] = (schema, channel)
-        self._preambles[channel.id] = record_bytes(schema, channel)
+        self._preambles[channel.id] = record_bytes(*([schema] if schema else []), channel)
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         data = record_bytes(Metadata(name=name, metadata=dict(entries)))
@@ -130,6 +151,8 @@ class McapFile:
 
     def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
         """Write message records, concatenated in `messages`, that begin at `starts`, in this order, as one chunk."""
+        if len(starts) == 0:
+            return
         heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
         preamble = b"".join(self._preambles[int(c)] for c in np.unique(heads["channel"]))
         content = preamble + messages
@@ -146,7 +169,7 @@ class McapFile:
     def sync(self) -> None:
         """Ask the kernel to put everything written on the medium, and wait for it."""
         with reported(self.path, "sync"):
-            os.fdatasync(self._file.fileno())
+            sync(self._file.fileno())
 
     def close(self) -> None:
         """Write index and summary and close. Whatever fails, the file is closed and stays a valid prefix."""
@@ -228,7 +251,7 @@ class McapFile:
 
     def _summary_groups(self) -> list[tuple[Opcode, bytes]]:
         used = [self._definitions[channel] for channel in sorted(self._counts)]
-        schemas = {schema.id: schema for schema, _ in used}
+        schemas = {schema.id: schema for schema, _ in used if schema}
         return [
             (Opcode.SCHEMA, record_bytes(*schemas.values())),
             (Opcode.CHANNEL, record_bytes(*(channel for _, channel in used))),

@@ -160,18 +160,23 @@ class RunWriter:
     """
 
     def __init__(
-        self, path: Path | str, topics: Iterable[Topic], config_yaml: str, run: RunInfo, *, compression: str = "zstd"
+        self,
+        path: Path | str,
+        topics: Iterable[Topic],
+        config_yaml: str,
+        run: RunInfo,
+        *,
+        compression: str = "zstd",
+        chunk_size: int = CHUNK_SIZE,
     ) -> None:
         self.path = Path(path)
+        self._chunk_size = chunk_size
         self._pending = _Pending()
         self._file = McapFile(self.path, compression)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
-        try:
+        with self._file.discarding():
             self._file.add_metadata(CONFIG, sealed({"yaml": config_yaml, **versions()}))
             self._file.add_metadata(RUN, sealed(run.entries()))
-        except RecordingError:
-            self._file.abandon()
-            raise
 
     def reading(self, reading: Reading) -> None:
         """One raw reading, under its receive time."""
@@ -187,7 +192,7 @@ class RunWriter:
             raise ValueError(f"{topic}: not a topic of this recording") from None
         except (struct.error, TypeError) as error:
             raise ValueError(f"{topic}: {tuple(values)!r:.200} does not fit its fields: {error}") from None
-        if len(self._pending.records) >= CHUNK_SIZE:
+        if len(self._pending.records) >= self._chunk_size:
             self.write_out()
 
     def write_out(self) -> None:
@@ -215,8 +220,9 @@ class RunWriter:
         self._file.abandon()
 
     def adopt(self, other: RunWriter) -> None:
-        """Take over what `other` could not write; both must have been made with the same topics."""
+        """Take over what `other` could not write, and its numbering; both must have been made with the same topics."""
         self._pending, other._pending = other._pending, self._pending
+        self._encoders = other._encoders
 
     def fileno(self) -> int:
         return self._file.fileno()

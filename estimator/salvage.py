@@ -19,7 +19,16 @@ from mcap.records import Channel, Schema
 
 from estimator.blocks import MAX_WASTE, Block, Contents, Damaged, Texts, Walk, records, split, unpack
 from estimator.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
-from estimator.mcapfile import LIBRARY, MESSAGE_DTYPE, MESSAGE_HEAD, RecordingError, Starts, gather, reported
+from estimator.mcapfile import (
+    LIBRARY,
+    MESSAGE_DTYPE,
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    RecordingError,
+    Starts,
+    gather,
+    reported,
+)
 from estimator.recording import CHECKSUM, CONFIG, RAW_TOPICS, RECOVERED, RUN, RunInfo, seal_holds
 
 MAX_KEPT = 64 << 20  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
@@ -72,7 +81,13 @@ class Chunk:
 
     def body(self, i: int) -> bytes:
         start = int(self.starts[i])
-        return self.content[start + MESSAGE_HEAD.size : start + 9 + int(self.heads["length"][i])]
+        return self.content[start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])]
+
+    def records(self) -> tuple[bytes, Starts]:
+        """The message records, heads included, end to end, and where each begins."""
+        sizes = self.heads["length"].astype(np.int64) + RECORD_HEAD.size
+        pieces = zip(self.starts.tolist(), (self.starts + sizes).tolist(), strict=True)
+        return b"".join(self.content[start:end] for start, end in pieces), np.cumsum(sizes) - sizes
 
     @cached_property
     def groups(self) -> dict[int, Starts]:
@@ -363,7 +378,7 @@ def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
         return True
     if not codec.flat:
         return [_decodes(codec, chunk.body(i)) for i in own.tolist()]
-    excess = chunk.heads["length"][own].astype(np.int64) - (MESSAGE_HEAD.size - 9 + codec.size)
+    excess = chunk.heads["length"][own].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size)
     fits = (excess >= 0) & (excess <= _PADDING)
     kinds = gather(chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")]))
     fits[fits] = kinds["kind"] == _CDR_LE

@@ -1,0 +1,301 @@
+"""The writer thread: takes messages off the loop's hands and gets them onto the disk every fifth of a second.
+
+What has been written out survives the death of the process; a second thread waits for the medium (fdatasync), so that a
+slow card delays nobody. A full or failing disk never reaches the loop: messages queue, then the oldest are dropped and
+counted, and writing resumes when it can. A file never has a gap: after a loss the next part begins (run.1.mcap, …), a
+recording of its own with the same metadata.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Literal
+
+from estimator.cdr import Topic, Values
+from estimator.mcapfile import RecordingError, sync
+from estimator.readings import Reading
+from estimator.recording import RunInfo, RunWriter, part_path
+
+CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
+BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
+RETRY = 1.0  # [s] between attempts at a disk that failed
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+Item = Reading | tuple[str, int, Values]  # a reading, or topic, log_time [ns] and values
+State = Literal["writing", "degraded", "closed"]
+
+
+@dataclass(frozen=True)
+class WriterStatus:
+    """accepted = written + dropped + queued, exactly, at every moment."""
+
+    state: State
+    error: str  # the last one, kept after recovery; empty if there was none
+    accepted: int  # messages handed in
+    written: int  # handed to the kernel
+    dropped: int  # lost: the queue was full, the message did not fit its topic, or the disk failed to the end
+    queued: int  # waiting, or being written
+    files: tuple[Path, ...]  # the run's parts so far
+
+
+class WriterThread:
+    """Writes one run. Made, started and stopped by the daemon, fed by the loop.
+
+    Making it raises RecordingError if the first file cannot be created, ValueError if topics contradict each other;
+    afterwards nothing is raised, `status` tells.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        topics: Iterable[Topic],
+        config_yaml: str,
+        run: RunInfo,
+        *,
+        compression: str = "zstd",
+        flush_interval: float = 0.2,
+        capacity: int = CAPACITY,
+        retry: float = RETRY,
+    ) -> None:
+        self._queue = _Queue(capacity)
+        self._parts = _Parts(Path(path), tuple(topics), config_yaml, run, compression)
+        self._sync = _Syncer()
+        self._interval = flush_interval
+        self._retry = retry
+        self._batch: list[Item] = []  # taken from the queue, not yet encoded
+        self._lost = 0  # messages dropped between what was encoded last and the batch
+        self._rejected = 0  # messages encoded since the last flush that did not fit their topic
+        self._suspect = False  # the current file failed for another reason than a full disk
+        self._state: State = "writing"
+        self._error = ""
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="writer", daemon=True)
+
+    def start(self) -> None:
+        self._sync.start()
+        self._thread.start()
+
+    def put(self, readings: Iterable[Reading], messages: Iterable[tuple[str, int, Values]] = ()) -> None:
+        """Hand over the readings that one tick consumed, then its messages. Never waits for the disk, never raises."""
+        self._queue.put([*readings, *messages])
+
+    def status(self) -> WriterStatus:
+        accepted, written, dropped, queued = self._queue.counters()
+        return WriterStatus(self._state, self._error, accepted, written, dropped, queued, tuple(self._parts.files))
+
+    @property
+    def alive(self) -> bool:
+        return self._thread.is_alive()
+
+    def stop(self, timeout: float = 2.0) -> WriterStatus:
+        """Write what is queued, close the file with its index, and return the final counters.
+
+        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed".
+        """
+        self._stopping.set()
+        self._thread.join(timeout)
+        return self.status()
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._stopping.is_set():
+            due = max(due + (self._interval if self._state == "writing" else self._retry), time.monotonic())
+            self._stopping.wait(due - time.monotonic())
+            self._attempt(self._write_out)
+        self._attempt(self._finish)
+
+    def _attempt(self, action: Callable[[], None]) -> None:
+        """Whatever goes wrong is said, and what could not be written is kept for the next attempt."""
+        try:
+            action()
+        except RecordingError as error:
+            self._fail(str(error), full=error.errno in _FULL)
+        except Exception as error:  # this thread must outlive what nobody thought of
+            self._fail(f"{self._parts.files[-1]}: {type(error).__name__}: {error}", full=False)
+
+    def _fail(self, error: str, full: bool) -> None:
+        self._state, self._error = "degraded", error
+        self._suspect |= not full
+
+    def _write_out(self) -> None:
+        """Everything queued by now, in batches; first what an earlier attempt left."""
+        self._sync.raise_error(self._parts.files[-1])
+        if self._suspect:
+            self._parts.next(lost=0)
+            self._suspect = False
+        self._flush()
+        for _ in range(self._queue.batches()):
+            self._next_batch()
+        self._state = "writing"
+
+    def _next_batch(self) -> None:
+        if not self._batch:
+            self._batch, lost = self._queue.take()
+            self._lost += lost
+        if self._lost and self._batch:
+            self._parts.next(self._lost)
+            self._lost = 0
+        self._encode()
+        self._flush()
+
+    def _encode(self) -> None:
+        batch, self._batch = self._batch, []
+        for item in batch:
+            try:
+                if isinstance(item, Reading):
+                    self._parts.writer.reading(item)
+                else:
+                    self._parts.writer.message(*item)
+            except ValueError as error:
+                self._rejected += 1
+                self._error = str(error)
+
+    def _flush(self) -> None:
+        self._parts.writer.write_out()
+        self._queue.settle(dropped=self._rejected)
+        self._rejected = 0
+        self._sync.request(self._parts.writer.fileno())
+
+    def _finish(self) -> None:
+        try:
+            self._write_out()
+        finally:
+            self._queue.drop_all()
+            self._sync.stop()
+            self._parts.writer.close()
+        self._state = "closed"
+
+
+class _Queue:
+    """A bounded queue that drops its oldest messages, and counts exactly."""
+
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._items: deque[Item] = deque()
+        self._lock = threading.Lock()
+        self._accepted = self._written = self._dropped = 0
+        self._taken = 0  # on their way to the disk
+        self._overflow = 0  # dropped since the last take
+
+    def put(self, items: list[Item]) -> None:
+        with self._lock:
+            self._items.extend(items)
+            self._accepted += len(items)
+            excess = len(self._items) - self._capacity
+            for _ in range(excess):
+                self._items.popleft()
+            self._dropped += max(0, excess)
+            self._overflow += max(0, excess)
+
+    def batches(self) -> int:
+        """How many takes empty the queue as it is, or write the batch that waits."""
+        return 1 + len(self._items) // BATCH
+
+    def take(self) -> tuple[list[Item], int]:
+        """The next messages, and how many were dropped before them since the last take."""
+        with self._lock:
+            batch = [self._items.popleft() for _ in range(min(BATCH, len(self._items)))]
+            self._taken += len(batch)
+            lost, self._overflow = self._overflow, 0
+        return batch, lost
+
+    def settle(self, dropped: int) -> None:
+        """What was taken is written, but for those that could not be encoded."""
+        with self._lock:
+            self._written += self._taken - dropped
+            self._dropped += dropped
+            self._taken = 0
+
+    def drop_all(self) -> None:
+        """Give up what is still here."""
+        with self._lock:
+            self._dropped += len(self._items) + self._taken
+            self._taken = 0
+            self._items.clear()
+
+    def counters(self) -> tuple[int, int, int, int]:
+        """Accepted, written, dropped, queued."""
+        with self._lock:
+            return self._accepted, self._written, self._dropped, len(self._items) + self._taken
+
+
+class _Parts:
+    """The file being written, and how to make the one that continues it."""
+
+    def __init__(self, path: Path, topics: tuple[Topic, ...], config_yaml: str, run: RunInfo, compression: str) -> None:
+        self._run = run
+        self._make = partial(RunWriter, topics=topics, config_yaml=config_yaml, compression=compression)
+        self.writer = self._make(path, run=run, chunk_size=sys.maxsize)  # chunks are closed by the clock
+        self.files = [path]
+
+    def next(self, lost: int) -> None:
+        """Go on in a new file, with what the old one could not take. Raises RecordingError, and nothing has changed."""
+        number = next(n for n in count(len(self.files)) if not part_path(self.files[0], n).exists())
+        path = part_path(self.files[0], number)
+        new = self._make(path, run=replace(self._run, part=number, lost_before=lost), chunk_size=sys.maxsize)
+        new.adopt(self.writer)
+        with suppress(RecordingError):  # without an index it is readable still
+            self.writer.close()
+        self.writer = new
+        self.files.append(path)
+
+
+class _Syncer:
+    """Waits for the medium in its own thread; a request made while one is waiting is covered by it or by the next."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._file: int | None = None
+        self._error: OSError | None = None
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="writer-sync", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Not waited for: a disk that hangs would hang us."""
+        self._stopped = True
+        self._wake.set()
+
+    def request(self, fileno: int) -> None:
+        with self._lock:
+            if self._file is None:
+                self._file = os.dup(fileno)  # the writer may close its own while we wait
+        self._wake.set()
+
+    def raise_error(self, path: Path) -> None:
+        """Raises RecordingError if a sync failed since the last call: the medium may lack what it was given."""
+        error, self._error = self._error, None
+        if error:
+            raise RecordingError(f"{path}: cannot sync: {error.strerror}", error.errno) from error
+
+    def _run(self) -> None:
+        while not self._stopped:
+            self._wake.wait()
+            self._wake.clear()
+            self._sync()
+
+    def _sync(self) -> None:
+        with self._lock:
+            file, self._file = self._file, None
+        if file is None:
+            return
+        try:
+            sync(file)
+        except OSError as error:
+            self._error = error
+        finally:
+            os.close(file)

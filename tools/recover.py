@@ -1,0 +1,76 @@
+"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of everything that a damaged or unclosed one still holds."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from estimator.mcapfile import McapFile, RecordingError
+from estimator.recording import RECOVERED, sealed
+from estimator.salvage import Recording, read
+
+LIBRARY = "gritd recover"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit code: 0 nothing lost, 2 usage or not an MCAP file, 3 saved in part."""
+    parser = argparse.ArgumentParser(prog="gritd recover", description=__doc__)
+    parser.add_argument("file", type=Path, help="the recording; it is not changed")
+    parser.add_argument("-o", "--output", type=Path, help="default: FILE with .recovered before its suffix")
+    try:
+        arguments = parser.parse_args(argv)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    source: Path = arguments.file
+    target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
+    try:
+        recording = read(source, topics=())
+        recover(recording, target)
+    except RecordingError as error:
+        print(f"gritd recover: {error}", file=sys.stderr)
+        return 2
+    for line in recording.damage:
+        print(f"{source}: {line}", file=sys.stderr)
+    print(f"{target}: {summary(recording)}")
+    return 3 if recording.damage or recording.attachments else 0
+
+
+def recover(recording: Recording, target: Path) -> None:
+    """Write every intact message, in file order, and every intact metadata record to a new file.
+
+    Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises RecordingError where
+    the file cannot be written; it is then removed.
+    """
+    file = McapFile(target, library=LIBRARY)
+    with file.discarding():
+        for source in recording.sources.values():
+            file.define(source.schema, source.channel)
+        for name, entries in recording.metadata.items():
+            if name != RECOVERED:
+                file.add_metadata(name, entries)
+        file.add_metadata(RECOVERED, sealed(_note(recording)))
+        for chunk in recording.chunks():
+            file.add_chunk(*chunk.records())
+        file.close()
+
+
+def summary(recording: Recording) -> str:
+    """One line: what was saved, and what is known to be lost."""
+    saved = f"saved {recording.counts.total()} messages of {len(recording.counts)} topics"
+    if recording.complete:
+        return f"{saved}; the recording was complete"
+    ending = "closed" if recording.closed else "not closed"
+    if not recording.damage:
+        return f"{saved}; it was {ending}, nothing in it is lost"
+    count = f"{recording.lost} messages" if recording.lost else "an unknown number of messages"
+    return f"{saved}; it was {ending}, {count} lost in {len(recording.damage)} places"
+
+
+def _note(recording: Recording) -> dict[str, str]:
+    """What is not in the new file, with what an earlier recovery noted."""
+    earlier = recording.recovered
+    damage = [line for line in (earlier.get("damage", ""), *recording.damage) if line]
+    lost = recording.lost + int(earlier.get("lost", "0"))
+    return {"from": recording.path.name, "lost": str(lost), "damage": "\n".join(damage)}

@@ -1,0 +1,117 @@
+"""Importers without anybody's data: the folder of rigs, the clocks, and files that are not what they should be."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tools.command import CommandError
+from tools.import_rig import main
+from tools.importers import mgst, rigs
+from tools.importers._recording import counts
+
+RIG = "20210208-165209-trio-s20-p925.rig.csv"
+SENSOR = "1-g_20-165209.processed.csv"
+
+
+def mgst_files(folder: Path, seconds: float = 6.0, lag: float = 0.4) -> Path:
+    """Both logs of a made-up trial: constant speeds, a torque that fluctuates in both logs."""
+    seen = np.random.default_rng(3).standard_normal(100)
+
+    def noise(t: float) -> float:
+        return float(np.interp(t, np.linspace(-1.0, seconds + 1.0, 100), seen))
+
+    rig, sensor = np.arange(0.0, seconds, 0.01), np.arange(0.0, seconds - lag, 0.0036)
+    rows = [f"16:52:{18 + t:09.6f},{800 + 200 * noise(t):.0f},34.4,-27.5,7000" for t in rig]
+    (folder / RIG).write_text("timestamp,maxon_current,maxon_velmes,akd_velmes,sinkage\n" + "\n".join(rows))
+    rows = [f"0 days 00:00:{t:09.6f},10,160,{3.5 + noise(t + lag)},5" for t in sensor]
+    (folder / SENSOR).write_text("Timestamp,dp,fn,torque,dp_raw\n" + "\n".join(rows))
+    return folder
+
+
+def complaint(*arguments: object) -> str:
+    with pytest.raises(CommandError) as caught:
+        main([*map(str, arguments)])
+    assert caught.value.code == 3
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_every_module_of_the_folder_is_a_rig() -> None:
+    found = rigs()
+    assert set(found) >= {"mgst"}
+    for name, rig in found.items():
+        assert re.fullmatch("[a-z]+", name)
+        assert 20 < len(rig.SUMMARY) < 100
+
+
+def test_unknown_rig_is_a_usage_error() -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["nowhere", "x", "-o", "y"])
+    assert caught.value.code == 2
+
+
+@given(speed=st.floats(0.001, 0.1), quanta=st.integers(1, 50))
+@settings(max_examples=50, deadline=None)
+def test_counts_travel_as_far_as_the_speed_says(speed: float, quanta: int) -> None:
+    t = np.linspace(0.0, 2.0, 201)
+    per_count = speed * 0.01 / quanta
+    travelled = counts(t, np.full(t.shape, speed), per_count)
+    np.testing.assert_array_equal(np.diff(travelled), quanta)
+
+
+@pytest.mark.parametrize("lag", [0.25, 0.4, 0.73])
+def test_the_lag_between_the_two_clocks_is_found(tmp_path: Path, lag: float) -> None:
+    folder = mgst_files(tmp_path, seconds=12.0, lag=lag)
+    trial = mgst.read_trial(folder / RIG, folder / SENSOR, mgst.RIG_FILE.fullmatch(RIG))  # type: ignore[arg-type]
+    found, correlation = mgst.find_lag(trial)
+    assert found == pytest.approx(lag, abs=0.02)
+    assert correlation > 0.9
+    reversed_current = replace(trial, rig=replace(trial.rig, current=-trial.rig.current))
+    assert mgst.find_lag(reversed_current)[1] < 0.9
+
+
+def test_imports_a_made_up_trial(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mgst", str(mgst_files(tmp_path)), "-o", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "out" / "mgst-20-165209.mcap")
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "expected"),
+    [
+        (RIG, lambda text: text.replace("akd_velmes", "speed"), "found no column akd_velmes; expected the columns"),
+        (RIG, lambda text: text.replace("7000", "seven", 1), "row 2: sinkage: found 'seven'; expected a finite number"),
+        (RIG, lambda text: text.replace("7000", "nan", 1), "row 2: sinkage: found 'nan'; expected a finite number"),
+        (RIG, lambda text: text.replace("16:52", "noon", 1), "row 2: found 'noon"),
+        (RIG, lambda text: text[: text.index("\n")], "found no rows; expected data"),
+        (RIG, lambda text: text[: text.rindex(",")], "found no sinkage; expected 5 fields"),
+        (SENSOR, lambda text: text.replace("00:00:00.0", "00:00:09.0", 1), "row 3: Timestamp does not rise"),
+        (SENSOR, lambda text: "\n".join(text.splitlines()[:300]), "expected 4.5 s or more, or --lag"),
+    ],
+)
+def test_one_line_says_what_is_wrong_with_a_file(tmp_path: Path, name: str, damage, expected: str) -> None:  # type: ignore[no-untyped-def]
+    file = mgst_files(tmp_path) / name
+    file.write_text(damage(file.read_text()))
+    said = complaint("mgst", tmp_path, "-o", tmp_path / "out")
+    assert expected in said
+    assert file.name in said or "--lag" in said
+
+
+def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
+    assert complaint("mgst", tmp_path / "none", "-o", tmp_path).startswith(f"{tmp_path / 'none'}: found nothing there")
+    assert "found no rig log" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+    mgst_files(tmp_path)
+    packed = gzip.compress((tmp_path / RIG).read_bytes())
+    (tmp_path / RIG).unlink()
+    (tmp_path / f"{RIG}.gz").write_bytes(packed[:-100])
+    assert f"{RIG}.gz: cannot be read" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+    (tmp_path / f"{RIG}.gz").write_bytes(packed)
+    (tmp_path / SENSOR).unlink()
+    assert f"found no sensor log; expected {SENSOR}" in complaint("mgst", tmp_path, "-o", tmp_path / "out")

@@ -1,0 +1,34 @@
+"""Importers of other rigs' public data, one file a rig. A module here with the names of `Rig` is found by itself."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol, cast
+
+Progress = Callable[[str], None]
+
+
+class Rig(Protocol):
+    """What a module of this folder offers. `run` gets `paths` and `output` beside its own arguments."""
+
+    NAME: str
+    SUMMARY: str
+
+    @staticmethod
+    def add_arguments(parser: argparse.ArgumentParser) -> None:
+        """Options of this rig alone."""
+
+    @staticmethod
+    def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+        """Write the recordings and their configuration; returns what was written. Raises RigFileError."""
+
+
+def rigs() -> dict[str, Rig]:
+    """Every importer by its name; modules with a leading underscore are shared helpers."""
+    names = sorted(info.name for info in pkgutil.iter_modules(__path__) if not info.name.startswith("_"))
+    modules = (cast(Rig, importlib.import_module(f"{__name__}.{name}")) for name in names)
+    return {module.NAME: module for module in modules}

@@ -1,0 +1,78 @@
+"""From a rig's arrays to a recording: the same readings a daemon would have logged, in the order of their stamps."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator import config
+from estimator.readings import CHANNELS, Reading
+from estimator.recording import RunInfo, RunWriter
+from tools.importers._files import Array, RigFileError
+
+NS = 1_000_000_000
+TEMPLATES = resources.files("config")
+UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measure: no information
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The readings of one channel: stamps [ns since the epoch], shape (n,); raw values, shape (n,), wrench (n, 6)."""
+
+    channel: str
+    stamps: NDArray[np.int64]
+    values: NDArray[np.int64] | Array
+
+    def readings(self) -> Iterator[Reading]:
+        wrench = self.values.ndim == 2
+        for stamp, value in zip(self.stamps.tolist(), self.values.tolist(), strict=True):
+            yield Reading(stamp, self.channel, tuple(value) if wrench else value, stamp)
+
+
+def stamps(start: int, seconds: Array) -> NDArray[np.int64]:
+    """Stamps [ns] of times [s], shape (n,), after a start [ns since the epoch]."""
+    return start + np.round(np.asarray(seconds) * NS).astype(np.int64)
+
+
+def counts(seconds: Array, speed: Array, per_count: float) -> NDArray[np.int64]:
+    """Encoder counts that a measured speed implies: its trapezoidal integral in units of `per_count`, shape (n,).
+
+    With `per_count` the quantum of the speed times the sampling interval, a count is the least travel the rig's log
+    can tell, so that the integral claims no resolution the log does not have.
+    """
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(seconds)
+    return np.round(np.concatenate(([0.0], np.cumsum(steps))) / per_count).astype(np.int64)
+
+
+def configuration(template: str, output: Path, name: str, **values: str) -> config.Configuration:
+    """Fill a template of config/ and write it into the output folder; returns it as loaded. Raises RigFileError."""
+    text = Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(values)
+    path = output / name
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RigFileError(f"{path}: cannot be written: {error.strerror}; expected a folder for the output") from None
+    return config.load(path)
+
+
+def write(path: Path, streams: Sequence[Stream], configured: config.Configuration, run: RunInfo) -> Path:
+    """One recording of raw topics, readings by stamp and then by the order of the channels. Replaces an earlier import.
+
+    Raises RecordingError.
+    """
+    path.unlink(missing_ok=True)
+    order = {channel: place for place, channel in enumerate(CHANNELS)}
+    writer = RunWriter(path, (), configured.text, run)
+    merged = heapq.merge(*(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel]))
+    for reading in merged:
+        writer.reading(reading)
+    writer.close()
+    return path

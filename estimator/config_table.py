@@ -19,6 +19,7 @@ from estimator.schema import (
     NEEDED,
     UNLIMITED,
     Choice,
+    FilePath,
     Flag,
     Impossible,
     Integer,
@@ -51,7 +52,7 @@ from estimator.settings import (
 )
 from estimator.terramechanics.soil import PressureSinkage, Wheel
 from estimator.yamltree import Mapping as Tree
-from estimator.yamltree import Node, Scalar
+from estimator.yamltree import Node
 
 EffectSchema = Callable[[str], Mapping[str, str] | None]
 """Effect name → unit of each of its parameters; None for a name that is no effect."""
@@ -143,19 +144,6 @@ SIGNAL = {
 
 def _signal(**values: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
-
-
-@dataclass(frozen=True)
-class FilePath:
-    """A path. A relative one counts from the folder and stands absolute in the effective configuration."""
-
-    folder: Path | None
-    expected: str = "a path"
-
-    def read(self, node: Node) -> tuple[str, Node]:
-        text, _ = Text(self.expected).read(node)
-        path = str(self.folder / text) if self.folder and text else text
-        return path, Scalar(node.place, path, "str")
 
 
 def _can(folder: Path | None) -> dict[str, Key]:

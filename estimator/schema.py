@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 from estimator import units
@@ -186,6 +187,19 @@ class Text:
             quotes = "" if _tag(node) in ("str", "null") else " in quotes"
             raise node.place.error(describe(node), self.expected + quotes)
         return text, node
+
+
+@dataclass(frozen=True)
+class FilePath:
+    """A path. A relative one counts from the folder and stands absolute in the effective configuration."""
+
+    folder: Path | None
+    expected: str = "a path"
+
+    def read(self, node: Node) -> tuple[str, Node]:
+        text, _ = Text(self.expected).read(node)
+        path = str(self.folder / text) if self.folder and text else text
+        return path, Scalar(node.place, path, "str")
 
 
 @dataclass(frozen=True)

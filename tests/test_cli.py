@@ -16,6 +16,7 @@ import pytest
 from config import packaged
 from drivers.errors import DeviceError, DeviceSettingsError
 from estimator import config
+from estimator.readings import ENCODERS
 from estimator.settings import Settings
 from tools import check_config, cli, config_reference
 from tools.command import CommandError
@@ -131,17 +132,13 @@ def test_reference_is_current() -> None:
 def test_slip_resolution_is_what_a_simulated_window_shows(testbed: Settings) -> None:
     """The stated resolution against slopes fitted to noisy counts."""
     random = np.random.default_rng(7)
+    noisy = {name: replace(testbed.channels[name], noise=0.5) for name in ENCODERS}
+    testbed = replace(testbed, channels={**testbed.channels, **noisy})
     count = check_config.window_readings(testbed)
     times = np.arange(count) / testbed.rates.tick
-    slopes = []
-    for name, radius, speed in (
-        ("wheel_encoder", testbed.wheel.radius, 0.02),
-        ("carriage_encoder", testbed.pulley_radius, 0.016),
-    ):
-        encoder = replace(testbed.channels[name], noise=0.3)
-        per_count = encoder.calibration.scale.value * radius
-        start = random.uniform(0, 1, (4000, 1))
-        counts = speed / per_count * times + start + random.normal(0, encoder.noise, (4000, count))
-        slopes.append(np.polyfit(times, (counts * per_count).T, 1)[0])
-    slip = 1 - slopes[1] / slopes[0]
-    assert np.std(slip) == pytest.approx(check_config.slip_sigma(testbed), rel=0.05)
+    speeds = []
+    for name, radius, speed in zip(ENCODERS, (testbed.wheel.radius, testbed.pulley_radius), (0.02, 0.016), strict=True):
+        per_count = noisy[name].calibration.scale.value * radius
+        counts = speed / per_count * times + random.normal(0, 0.5, (4000, count))
+        speeds.append(np.polyfit(times, (counts * per_count).T, 1)[0])
+    assert np.std(1 - speeds[1] / speeds[0]) == pytest.approx(check_config.slip_sigma(testbed), rel=0.05)

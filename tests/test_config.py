@@ -263,6 +263,12 @@ def test_files_that_are_no_text(content: bytes, tmp_path: Path) -> None:
         config.load(path)
 
 
+def test_file_above_the_limit_is_called_so(tmp_path: Path) -> None:
+    (tmp_path / "rig.yaml").write_text("##" + "é" * 200_000, encoding="utf-8")  # the limit falls inside a character
+    with pytest.raises(ConfigError, match=r"rig\.yaml: found more than 256 KiB"):
+        config.load(tmp_path / "rig.yaml")
+
+
 def test_missing_file_folder_and_endless_device(tmp_path: Path) -> None:
     for path in (tmp_path / "none.yaml", tmp_path, Path("/dev/zero"), tmp_path / "a\0b"):
         with pytest.raises(ConfigError, match="expected a configuration file"):

@@ -16,6 +16,8 @@ from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 # command -> (module, what it does)
 COMMANDS = {
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),
+    "recover": ("tools.recover", "salvage an unclosed or damaged recording"),
+    "import": ("tools.import_rig", "other rigs' public data to recordings"),
 }
 
 

@@ -40,11 +40,12 @@ class DeviceClock:
         self._modulus = modulus_us * 1000
         self._slope = 0.0
         self._start(0, 0)
-        self._started = False
+        self.restart()
 
     def restart(self) -> None:
         """Forget the mapping: the device was reopened. The drift of its crystal is kept."""
         self._started = False
+        self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
 
     def stamps(self, device_us: Sequence[int], received: int) -> list[int]:
         """When the samples of one chunk were taken [ns, our clock]; `received` [ns] is when the chunk came.
@@ -59,6 +60,7 @@ class DeviceClock:
                 stamps += self._settle(times, received)
                 times = []
                 self.resets += 1
+                self._last = None
                 self._start(time, received)
             elif time > self._newest:
                 self._newest = time
@@ -91,7 +93,6 @@ class DeviceClock:
         self._blocks: deque[Point] = deque(maxlen=BLOCKS)
         self._lowest: Point = (0.0, 0.0)
         self._block_end = BLOCK
-        self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
 
     def _observe(self, time: int, received: int) -> None:
         at, offset = float(time - self._first), float(received - time - self._origin)

@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 
 
 def needs(rig: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(
-        not (REAL / rig).is_dir(), reason=f"no {REAL.name}/{rig} beside the repository; {REST_OF_LINE}"
-    )
+    """Skip where a rig's files are absent; docs/importing.md says where the public ones come from."""
+    folder = REAL / rig
+    return pytest.mark.skipif(not folder.is_dir(), reason=f"no real recordings in {folder}; see docs/importing.md")
 
 
 class Physical:

@@ -21,7 +21,7 @@ from estimator.situation import ContactLaw, Motion, Reaction, Sensed, Situation,
 from estimator.terramechanics.original import Forces
 from estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
-HEATING_ROUNDS = 4  # current and torque factor depend on each other; each round gains about a factor of ten
+HEATING_ROUNDS = 30  # at most; current and torque factor depend on each other and settle in a few rounds
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,12 @@ def drive(situation: Situation, effects: Sequence[Effect], torque_constant: floa
     """
     motor_torque = reduce(lambda torque, e: torque + e.torque_loss(situation), effects, situation.torque)
     situation = replace(situation, current=motor_torque / torque_constant)
-    for _ in range(HEATING_ROUNDS if any(e.stage in ("drivetrain", "sensor") for e in effects) else 0):
-        factor = torque_factor(situation, effects)
-        situation = replace(situation, current=motor_torque / (torque_constant * factor))
+    for _ in range(HEATING_ROUNDS):
+        current = motor_torque / (torque_constant * torque_factor(situation, effects))
+        settled = np.allclose(current, situation.current, rtol=1e-9, atol=1e-12)
+        situation = replace(situation, current=current)
+        if settled:
+            break
     return situation, motor_torque
 
 

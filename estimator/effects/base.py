@@ -82,7 +82,8 @@ class Fingerprint(NamedTuple):
     """Where the effect shows most."""
 
     channel: str  # torque, drawbar_pull, sinkage, load
-    covariate: str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant, rate (the channel's own), heat (∫I²dt)
+    covariate: str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant,
+    #                 rate (of the channel itself), heat (∫I² since the run began)
     sentence: str
 
 

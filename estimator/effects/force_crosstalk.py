@@ -18,7 +18,7 @@ class ForceCrosstalk(Effect):
     Source: off-diagonal terms of a six-axis sensor's calibration matrix.
     """
 
-    from_torque: float = strength("pull read per torque, a", "N/(N·m)", typical=0.5, low=-5.0, high=5.0)
+    from_torque: float = strength("pull read per torque, a", "1/m", typical=0.5, low=-5.0, high=5.0)
     from_load: float = strength("pull read per load, b", "", typical=0.02, low=-0.3, high=0.3)
 
     stage = "sensor"

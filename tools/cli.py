@@ -18,6 +18,7 @@ COMMANDS = {
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),
     "recover": ("tools.recover", "salvage an unclosed or damaged recording"),
     "import": ("tools.import_rig", "other rigs' public data to recordings"),
+    "reproduce": ("tools.reproduce", "the paper's numbers beside ours"),
 }
 
 

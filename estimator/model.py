@@ -62,7 +62,8 @@ class WheelModel:
         if best in (0, len(SLIPS) - 1):
             return SLIPS[best]
         before, peak, after = pulls[best - 1 : best + 2]
-        return SLIPS[best] + 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (before - 2.0 * peak + after)
+        step = 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (before - 2.0 * peak + after)
+        return SLIPS[best] + float(step)
 
     def load(self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float) -> Measured:
         """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli and of θ₁."""

@@ -1,0 +1,201 @@
+"""The daemon: readers, loop and writer as threads of one process, started, watched and stopped in order.
+
+Readers are handed in (they come from `drivers`, which the estimator does not know). If a thread dies the daemon stops
+with a named reason and a closed log, so that the service manager starts it anew; it never runs on without a thread.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import gc
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from typing import Protocol
+
+from estimator.cdr import Topic
+from estimator.clock import Clock
+from estimator.config import Configuration
+from estimator.loop import Loop, LoopRecord, Source
+from estimator.pipeline import Pipeline, TickRecord
+from estimator.readings import Reading
+from estimator.record import LOOP_FIELDS, TICK_FIELDS
+from estimator.recording import LOG_TOPIC, RunInfo
+from estimator.writer import WriterStatus, WriterThread
+
+TICK_TOPIC = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
+LOOP_TOPIC = Topic("/loop", "gritd_msgs/msg/Loop", LOOP_FIELDS)
+TOPICS = (TICK_TOPIC, LOOP_TOPIC)
+
+SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from another thread
+PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
+WATCH = 0.1  # [s] between looks at the threads
+INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
+WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
+
+
+class DaemonError(Exception):
+    """The daemon cannot start or cannot go on: one line."""
+
+
+class ReaderThread(Protocol):
+    """What the daemon needs of a reader."""
+
+    device: str
+
+    @property
+    def alive(self) -> bool: ...
+
+    def start(self) -> None: ...
+
+    def stop(self) -> bool: ...
+
+
+class LogSink:
+    """Hands ticks to the writer thread, readings first: file order is consumption order."""
+
+    def __init__(self, writer: WriterThread) -> None:
+        self._writer = writer
+
+    def put(self, readings: Sequence[Reading], tick: TickRecord, loop: LoopRecord) -> None:
+        stamp = loop.stamp
+        self._writer.put(readings, [(TICK_TOPIC.name, stamp, tick), (LOOP_TOPIC.name, stamp, loop)])
+
+    def counts(self) -> tuple[int, int]:
+        status = self._writer.status()
+        return status.queued, status.dropped
+
+
+class Daemon:
+    """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last word.
+
+    Raises DaemonError, and what WriterThread raises if the first file cannot be created.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        path: Path,
+        run: RunInfo,
+        readers: Sequence[ReaderThread],
+        source: Source,
+        clock: Clock,
+    ) -> None:
+        logging = configuration.settings.logging
+        self.readers = readers
+        self.clock = clock
+        self.writer = WriterThread(
+            path,
+            TOPICS,
+            configuration.text,
+            run,
+            compression=logging.compression,
+            flush_interval=logging.flush_interval,
+        )
+        self.loop = Loop(Pipeline(configuration.settings), source, LogSink(self.writer), clock)
+        self._stop = Event()
+        self._failure = ""
+        self._wall_offset = 0.0
+
+    def stop(self) -> None:
+        """Ask `serve` to end; may be called from a signal handler."""
+        self._stop.set()
+
+    def say(self, level: int, text: str) -> None:
+        """A line into the recording's /log."""
+        now = self.clock.now()
+        self.writer.put((), [(LOG_TOPIC.name, now, (now, level, "gritd", text, "", "", 0))])
+
+    def serve(self, watch: Callable[[Daemon], None] = lambda daemon: None) -> WriterStatus:
+        """Run until stopped. `watch` is called about ten times a second from the caller's thread."""
+        self.writer.start()
+        for reader in self.readers:
+            reader.start()
+        loop = Thread(target=self._run_loop, name="loop", daemon=True)
+        with _undisturbed():
+            loop.start()
+            while not self._stop.wait(WATCH):
+                self._check(loop)
+                watch(self)
+            loop.join(2.0)
+        return self._close()
+
+    def _run_loop(self) -> None:
+        try:
+            self.loop.run(self._stop)
+        except Exception as error:  # named, and the daemon stops: a dead loop must not look like a quiet one
+            self._failure = f"the loop failed: {type(error).__name__}: {error}"
+            self._stop.set()
+
+    def _check(self, loop: Thread) -> None:
+        """Stop with a reason if a thread died; note a step of the wall clock."""
+        dead = [f"reader {reader.device}" for reader in self.readers if not reader.alive]
+        dead += [] if self.writer.alive else ["writer"]
+        dead += [] if loop.is_alive() or self._stop.is_set() else ["loop"]
+        if dead:
+            self._failure = self._failure or f"thread died: {', '.join(dead)}"
+            self._stop.set()
+        offset = self.clock.wall_offset()
+        if abs(offset - self._wall_offset) > WALL_STEP:
+            self.say(WARNING, f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the old one")
+            self._wall_offset = offset
+
+    def _close(self) -> WriterStatus:
+        for reader in self.readers:
+            reader.stop()
+        if self._failure:
+            self.say(ERROR, self._failure)
+        status = self.writer.stop()
+        if self._failure:
+            raise DaemonError(self._failure)
+        return status
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Short switch interval, and no garbage collection of what was built at start."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(interval)
+
+
+def real_time() -> str:
+    """Real-time scheduling for this thread and those it starts; '' or one line why not."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        return ""
+    except (OSError, AttributeError) as error:
+        return f"no real-time scheduling ({getattr(error, 'strerror', None) or error}): ticks may be late under load"
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Only one daemon writes into a log folder. Raises DaemonError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = open(folder / ".gritd.lock", "w")  # noqa: SIM115  held for the life of the daemon
+    except OSError as error:
+        raise DaemonError(f"{folder}: cannot keep logs here: {error.strerror}") from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise DaemonError(f"{folder}: another gritd is logging here") from None
+        yield
+
+
+def run_path(folder: Path, name: str, started: int) -> Path:
+    """RUN-YYYYmmdd-HHMMSS.mcap, in UTC, not yet taken."""
+    stem = f"{name or 'run'}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime(started / 1e9))}"
+    paths = (folder / f"{stem}{suffix}.mcap" for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
+    return next(path for path in paths if not path.exists())

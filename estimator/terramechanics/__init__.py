@@ -1,0 +1,1 @@
+"""Wheel-soil mechanics after Shibly, Iagnemma and Dubowsky (2005)."""

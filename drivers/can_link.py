@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import stat
 import struct
 from collections.abc import Sequence
 from contextlib import suppress
@@ -66,7 +67,7 @@ class CanLink:
     def _discard_damage(self, error: Exception) -> None:
         """Count a message that could not be read, and go on."""
         self.damaged += 1
-        if isinstance(error, UnicodeDecodeError) and self._bus is not None:
+        if isinstance(error.__cause__, UnicodeDecodeError) and self._bus is not None:
             with suppress(Exception):  # slcan keeps an undecodable line for ever, unless it is told to drop it
                 self._bus._buffer.clear()  # type: ignore[attr-defined]
 
@@ -94,7 +95,7 @@ def _is_damage(interface: str, error: Exception) -> bool:
     if isinstance(error, struct.error):
         return True
     if interface == "slcan":
-        return isinstance(error, ValueError | IndexError)
+        return isinstance(error.__cause__ or error, ValueError | IndexError)
     if interface == "udp_multicast":
         unpacking = isinstance(error, can.CanError) and error.__cause__ is not None
         return isinstance(error, TypeError) or (unpacking and not isinstance(error.__cause__, OSError))
@@ -103,8 +104,9 @@ def _is_damage(interface: str, error: Exception) -> bool:
 
 def _enlarge_receive_buffer(bus: can.BusABC) -> None:
     """Where the bus is a socket; a duplicate descriptor reaches the same one."""
-    with suppress(Exception):
-        if isinstance(number := bus.fileno(), int) and number >= 0:
+    with suppress(Exception):  # a smaller buffer is no failure
+        number = bus.fileno()
+        if stat.S_ISSOCK(os.fstat(number).st_mode):
             with socket.socket(fileno=os.dup(number)) as same:
                 same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
 

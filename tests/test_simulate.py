@@ -1,0 +1,159 @@
+"""`gritd simulate`: the recording holds what the sensors of the configured testbed would have sent."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from config import packaged
+from estimator import config, effects
+from estimator.yamltree import ConfigError
+from tools import schedule as schedules
+from tools.command import CommandError
+from tools.schedule import Schedule, Segment, motion_of
+from tools.simulate import main, simulate_run, soil_of
+
+SHORT = """
+ramp: 200 ms
+segments:
+  - {duration: 1 s, load: 40 N, slip: 0.1, speed: 0 mm/s}
+  - {duration: 2 s, load: 40 N, slip: 0.2, speed: 20 mm/s}
+  - {duration: 2 s, load: 80 N, slip: 0.5, speed: 20 mm/s}
+  - {duration: 1 s, load: 60 N, slip: -0.1, speed: -20 mm/s}
+  - {duration: 1 s, load: 0 N, slip: 0.5, speed: 20 mm/s}
+"""
+
+
+@pytest.fixture
+def schedule(tmp_path: Path) -> Path:
+    path = tmp_path / "schedule.yaml"
+    path.write_text(SHORT)
+    return path
+
+
+def messages(path: Path) -> dict[str, list[object]]:
+    """Messages by topic, read by another library than ours."""
+    found: dict[str, list[object]] = {}
+    with path.open("rb") as stream:
+        for _, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            found.setdefault(channel.topic, []).append(message)
+    return found
+
+
+def test_recording_holds_the_truth_through_the_calibration(schedule: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.mcap"
+    assert main(["--schedule", str(schedule), "--effect", "coulomb_friction.loss=0.5", "-o", str(out)]) == 0
+    settings = config.load(packaged()).settings
+    truth, found = np.load(tmp_path / "run.truth.npz"), messages(out)
+    for name, expected in (
+        ("wheel_encoder", truth["wheel_angle"]),
+        ("carriage_encoder", truth["carriage_position"] / settings.pulley_radius),
+        ("sinkage_pot", truth["sensed_sinkage"]),
+        ("motor_shunt", truth["sensed_current"]),
+    ):
+        channel = settings.channels[name]
+        raw = np.array([getattr(m, "count", None) or getattr(m, "volts", 0.0) for m in found[f"/raw/{name}"]])
+        error = raw * channel.calibration.scale.value + channel.calibration.offset.value - expected
+        expected_spread = abs(channel.calibration.scale.value) * np.hypot(channel.noise, 0.3 if "enc" in name else 0.0)
+        assert np.std(error) == pytest.approx(expected_spread, rel=0.1), name
+        assert abs(np.mean(error)) < 5.0 * expected_spread / np.sqrt(raw.size)
+    wrench = found["/raw/wrench"]
+    assert np.mean([m.fz for m in wrench] - truth["sensed_load"]) == pytest.approx(0.0, abs=0.05)  # type: ignore[attr-defined]
+    assert np.mean([m.ty for m in wrench] - truth["sensed_torque"]) == pytest.approx(0.0, abs=0.005)  # type: ignore[attr-defined]
+
+
+def test_truth_names_soil_effects_and_seed(schedule: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.mcap"
+    options = ["--effect", "coulomb_friction.loss=1800 mN*m", "--soil", "cohesion=1.2 kPa", "--seed", "4"]
+    main(["--schedule", str(schedule), *options, "-o", str(out)])
+    truth = json.loads((tmp_path / "run.truth.json").read_text())
+    assert truth["effects"] == {"coulomb_friction": {"loss": 1.8}}
+    assert truth["soil"]["cohesion"] == 1200.0 and truth["seed"] == 4
+
+
+def test_the_recording_does_not_tell_the_effect(schedule: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.mcap"
+    main(["--schedule", str(schedule), "--effect", "rear_contact.ratio=0.3", "-o", str(out)])
+    assert b"rear_contact" not in out.read_bytes()
+
+
+def test_same_seed_same_bytes(schedule: Path, tmp_path: Path) -> None:
+    for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+        main(["--schedule", str(schedule), "--seed", seed, "-o", str(tmp_path / f"{name}.mcap")])
+    first, again, other = (messages(tmp_path / f"{name}.mcap")["/raw/sinkage_pot"] for name in "abc")
+    volts = [[m.volts for m in run] for run in (first, again, other)]  # type: ignore[attr-defined]
+    assert volts[0] == volts[1] and volts[0] != volts[2]
+
+
+def test_motion_follows_the_schedule() -> None:
+    schedule = Schedule((Segment(4.0, 50.0, 0.25, 0.02), Segment(4.0, 80.0, -0.2, -0.03)), 0.5)
+    motion = motion_of(schedule, 0.1, 100.0)
+    early, late = 100, -100
+    assert motion.wheel_speed[early] == pytest.approx(0.2) and motion.carriage_speed[early] == pytest.approx(0.015)
+    assert motion.wheel_speed[late] == pytest.approx(-0.3) and motion.carriage_speed[late] == pytest.approx(-0.0375)
+    assert motion.load[early] == 50.0 and motion.load[late] == 80.0
+    np.testing.assert_allclose(np.gradient(motion.wheel_angle, motion.time)[1:-1], motion.wheel_speed[1:-1], atol=5e-3)
+
+
+def test_packaged_schedule_drives_three_loads_and_five_slips() -> None:
+    schedule = schedules.read(packaged("schedule.yaml"))
+    driving = [s for s in schedule.segments if s.speed > 0.0]
+    assert {s.load for s in driving} == {40.0, 70.0, 100.0} and len({s.slip for s in driving}) == 5
+
+
+def test_library_call_gives_readings_in_order_of_receipt() -> None:
+    settings = config.load(packaged()).settings
+    motion = motion_of(Schedule((Segment(1.0, 50.0, 0.2, 0.02),), 0.1), settings.wheel.radius, 250.0)
+    run = simulate_run(settings, soil_of(settings), motion, [effects.make("sinkage_datum", {"offset": 0.001})], seed=1)
+    received = [reading.received for reading in run.readings]
+    assert received == sorted(received) and len(received) == 5 * 250 + 1
+    assert all(reading.received > reading.stamp for reading in run.readings)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("segments: []", "segments: found a list of 0; expected a list of segments"),
+        ("segments:\n  - {duration: 1 s, load: 40 N, slip: 2, speed: 0 m/s}", ":2: segments.0.slip: found 2"),
+        ("segments:\n  - {duration: 1 s, load: 40 N, slip: 0.1}", "speed: found nothing"),
+        ("segments:\n  - {duration: 1 s, load: 40, slip: 0.1, speed: 0 m/s}", "load: found 40"),
+        ("parts: 3", "found an unknown key"),
+    ],
+)
+def test_wrong_schedule_is_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        schedules.read(path)
+    assert str(error.value).startswith(str(path)) and said in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--effect", "gremlins.size=3"], "--effect gremlins.size=3: found 'gremlins'; expected one of"),
+        (["--effect", "rear_contact.c3=0.2"], "found 'c3'; expected one of ratio"),
+        (["--effect", "rear_contact.ratio=9"], "9 is outside 0 … 0.8"),
+        (["--effect", "coulomb_friction.loss=2 mm"], "found '2 mm'"),
+        (["--effect", "coulomb_friction.loss=much"], "found 'much'"),
+        (["--soil", "moisture=3"], "found 'moisture'; expected one of cohesion"),
+        (["--soil", "cohesion=-3"], "expected a positive value"),
+    ],
+)
+def test_wrong_option_is_one_line(tmp_path: Path, options: list[str], said: str) -> None:
+    with pytest.raises(CommandError) as error:
+        main([*options, "-o", str(tmp_path / "x.mcap")])
+    assert said in str(error.value) and "\n" not in str(error.value)
+    assert not (tmp_path / "x.mcap").exists()
+
+
+def test_bogged_wheel_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "heavy.yaml"
+    path.write_text("segments:\n  - {duration: 1 s, load: 5 kN, slip: 0.2, speed: 20 mm/s}")
+    main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
+    assert "exceeds what the soil carries in 250 samples" in capsys.readouterr().out

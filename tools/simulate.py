@@ -1,0 +1,247 @@
+"""`gritd simulate`: the forward model alone, from a schedule to a recording, with the truth in files beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from config import packaged
+from estimator import config, effects, units
+from estimator.effects.base import Effect
+from estimator.forward import Response, simulate_arrays
+from estimator.readings import WRENCH_FIELDS, Reading
+from estimator.recording import RunInfo, RunWriter
+from estimator.settings import Calibration, Channel, Settings, Wrench
+from estimator.situation import Motion
+from estimator.terramechanics.soil import Array, Soil
+from tools import schedule as schedules
+from tools.command import DONE, USAGE, CommandError, Parser
+
+START = 1_767_225_600_000_000_000  # [ns] 2026-01-01: a recording made twice is the same to the byte
+NS = 1_000_000_000
+TRANSPORT = 1_000_000  # [ns] from a stamp to its receipt
+ADC_STEPS = 1 << 16  # over the channel's valid range
+AMBIENT = 21.0  # [°C]
+SPARSE = 250  # samples from one temperature to the next
+SOIL_UNITS = {"cohesion": "Pa", "tan_phi": "", "shear_modulus": "m", "exponent": "", "modulus_factor": ""}
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated run: what the controller was told, what happened, and what the sensors sent."""
+
+    motion: Motion
+    response: Response
+    readings: list[Reading]
+
+
+def simulate_run(settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect], seed: int) -> Run:
+    """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
+    constant = settings.drive.torque_constant.value
+    response = simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
+    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+
+
+def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> Soil:
+    """The configured soil, with some of its values replaced; modulus_factor multiplies K."""
+    prior, changed = settings.soil, dict(changed or {})
+    factor = changed.pop("modulus_factor", 1.0)
+    soil = Soil(
+        cohesion=prior.cohesion.value,
+        tan_phi=prior.tan_phi.value,
+        shear_modulus=prior.shear_modulus.value,
+        exponent=prior.exponent.value,
+        modulus=prior.pressure_sinkage.modulus(settings.wheel.width) * factor,
+    )
+    return replace(soil, **changed)
+
+
+# ---- sensors -------------------------------------------------------------------------------------------------------
+
+
+def readings(settings: Settings, motion: Motion, response: Response, rng: np.random.Generator) -> list[Reading]:
+    """What the channels send, in order of receipt: calibration undone, latency, noise, counts and ADC steps."""
+    values = {
+        "wheel_encoder": np.asarray(motion.wheel_angle),
+        "carriage_encoder": np.asarray(motion.carriage_position) / settings.pulley_radius,
+        "sinkage_pot": np.asarray(response.sensed.sinkage),
+        "motor_shunt": np.asarray(response.sensed.current),
+        "motor_temperature": np.full(np.shape(motion.time), AMBIENT),
+    }
+    sent = []
+    for name, channel in settings.channels.items():
+        some = slice(None, None, SPARSE if name == "motor_temperature" else 1)
+        sent.append(_channel(channel, np.asarray(motion.time)[some], values[name][some], rng))
+    if settings.wrench is not None:
+        sent.append(_wrench(settings.wrench, np.asarray(motion.time), response, rng))
+    return sorted((reading for channel in sent for reading in channel), key=lambda r: (r.received, r.channel))
+
+
+def _channel(channel: Channel, time: Array, physical: Array, rng: np.random.Generator) -> Iterable[Reading]:
+    raw = _raw(channel.calibration, physical) + channel.noise * rng.standard_normal(time.size)
+    stamps = _stamps(time, channel.latency)
+    if channel.name in ("wheel_encoder", "carriage_encoder"):
+        counts = np.rint(raw).astype(np.int64).tolist()
+        return [Reading(s, channel.name, count, s + TRANSPORT) for s, count in zip(stamps, counts, strict=True)]
+    step = (channel.high - channel.low) / ADC_STEPS
+    volts = np.clip(channel.low + step * np.rint((raw - channel.low) / step), channel.low, channel.high).tolist()
+    return [Reading(s, channel.name, value, s + TRANSPORT) for s, value in zip(stamps, volts, strict=True)]
+
+
+def _wrench(wrench: Wrench, time: Array, response: Response, rng: np.random.Generator) -> Iterable[Reading]:
+    sensed = response.sensed
+    axes = dict.fromkeys(WRENCH_FIELDS, np.zeros(time.size))
+    axes["fx"] = _raw(wrench.drawbar_pull, np.asarray(sensed.drawbar_pull))
+    axes["fz"] = _raw(wrench.load, np.asarray(sensed.load))
+    axes["ty"] = _raw(wrench.torque, np.asarray(sensed.torque))
+    noise = np.repeat([wrench.force_noise, wrench.torque_noise], 3)
+    noisy = (
+        axes[name] + sigma * rng.standard_normal(time.size) for name, sigma in zip(WRENCH_FIELDS, noise, strict=True)
+    )
+    six = np.stack(list(noisy), axis=1).tolist()
+    stamps = _stamps(time, wrench.latency)
+    return [Reading(s, "wrench", tuple(row), s + TRANSPORT) for s, row in zip(stamps, six, strict=True)]
+
+
+def _raw(calibration: Calibration, physical: Array) -> Array:
+    raw: Array = (physical - calibration.offset.value) / calibration.scale.value
+    return raw
+
+
+def _stamps(time: Array, latency: float) -> list[int]:
+    stamps: list[int] = (START + np.rint((time + latency) * NS).astype(np.int64)).tolist()
+    return stamps
+
+
+# ---- files ---------------------------------------------------------------------------------------------------------
+
+
+def write(path: Path, configuration: config.Configuration, info: RunInfo, run: Run) -> None:
+    """The recording, raw topics only. Raises RecordingError."""
+    writer = RunWriter(path, (), configuration.text, info)
+    try:
+        for reading in run.readings:
+            writer.reading(reading)
+    finally:
+        writer.close()
+
+
+def write_truth(path: Path, settings: Settings, soil: Soil, acting: Sequence[Effect], run: Run, seed: int) -> None:
+    """PATH.truth.json with soil, effects and seed; PATH.truth.npz with the true arrays."""
+    said = {
+        "wheel": asdict(settings.wheel),
+        "soil": asdict(soil),
+        "effects": {effect.name: asdict(effect) for effect in acting},
+        "seed": seed,
+        "overloaded_samples": int(run.response.overloaded.sum()),
+    }
+    path.with_suffix(".truth.json").write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+    sensed = {f"sensed_{name}": value for name, value in vars(run.response.sensed).items()}
+    arrays = {**sensed, **vars(run.motion), **vars(run.response)}
+    kept = {name: value for name, value in arrays.items() if name != "sensed" and value is not None}
+    np.savez_compressed(path.with_suffix(".truth.npz"), **kept)
+
+
+# ---- command -------------------------------------------------------------------------------------------------------
+
+
+def main(argv: Sequence[str]) -> int:
+    """Simulate, write the recording and its truth. Raises ConfigError, CommandError or RecordingError."""
+    arguments = _parser().parse_args(argv)
+    configuration = config.load(arguments.config, effects.units)
+    settings, soil = configuration.settings, soil_of(configuration.settings, _soil_changes(arguments.soil))
+    acting = _acting(settings, arguments.effect)
+    info = replace(configuration.run, pass_number=arguments.pass_number or configuration.run.pass_number)
+    info = replace(info, name=info.name or arguments.output.stem)
+    schedule = schedules.read(arguments.schedule)
+    motion = schedules.motion_of(
+        schedule, settings.wheel.radius, settings.rates.tick, float(info.pass_number), info.start_position
+    )
+    run = simulate_run(settings, soil, motion, acting, arguments.seed)
+    write(arguments.output, configuration, info, run)
+    write_truth(arguments.output, settings, soil, acting, run, arguments.seed)
+    print(_summary(arguments.output, schedule, acting, run))
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd simulate", description="Simulate a run with Eqs. (1)-(10) and the effects; write its recording."
+    )
+    parser.add_argument("--config", default=packaged(), help="the testbed; default: the packaged testbed.yaml")
+    parser.add_argument(
+        "--schedule", type=Path, default=packaged("schedule.yaml"), help="what to do; default: three loads, five slips"
+    )
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME.PARAMETER=VALUE",
+        help="added to the configured ones",
+    )
+    parser.add_argument(
+        "--soil", action="append", default=[], metavar="NAME=VALUE", help=f"one of {', '.join(SOIL_UNITS)}"
+    )
+    parser.add_argument("--pass", dest="pass_number", type=int, metavar="N", help="which pass over the soil this is")
+    parser.add_argument("--seed", type=int, default=0, help="of the noise; default 0")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="must not exist yet")
+    return parser
+
+
+def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
+    """Configured effects, with the values of the command line in their place."""
+    values = {e.name: {name: value.value for name, value in e.parameters.items()} for e in settings.effects}
+    for text in given:
+        key, _, value = text.partition("=")
+        name, _, parameter = key.partition(".")
+        known = effects.units(name)
+        if known is None or parameter not in known:
+            options = ", ".join(effects.EFFECTS if known is None else known)
+            raise CommandError(
+                f"--effect {text}: found '{name if known is None else parameter}'; expected one of {options}", USAGE
+            )
+        values.setdefault(name, {})[parameter] = _quantity(f"--effect {text}", value, known[parameter])
+    try:
+        return tuple(effects.make(name, parameters) for name, parameters in values.items())
+    except ValueError as error:
+        raise CommandError(error, USAGE) from None
+
+
+def _soil_changes(given: Sequence[str]) -> dict[str, float]:
+    changes = {}
+    for text in given:
+        name, _, value = text.partition("=")
+        if name not in SOIL_UNITS:
+            raise CommandError(f"--soil {text}: found '{name}'; expected one of {', '.join(SOIL_UNITS)}", USAGE)
+        changes[name] = _quantity(f"--soil {text}", value, SOIL_UNITS[name])
+        if changes[name] < 0.0 or (name != "cohesion" and changes[name] == 0.0):
+            raise CommandError(f"--soil {text}: found {value}; expected a positive value", USAGE)
+    return changes
+
+
+def _quantity(where: str, text: str, unit: str) -> float:
+    """A quantity with its unit, or a plain number in SI."""
+    try:
+        plain = units.NUMBER.fullmatch(text) is not None
+        return float(text) if plain else units.parse(text, unit)
+    except units.UnitError as error:
+        raise CommandError(
+            f"{where}: found '{text}' ({error}); expected a number in {unit or 'plain form'}", USAGE
+        ) from None
+
+
+def _summary(path: Path, schedule: schedules.Schedule, acting: Sequence[Effect], run: Run) -> str:
+    bogged = int(run.response.overloaded.sum())
+    lines = [
+        f"{path}: {schedule.duration:g} s, {len(schedule.segments)} segments, {len(run.readings)} readings",
+        f"effects: {', '.join(effect.name for effect in acting) or 'none'}",
+        f"truth: {path.with_suffix('.truth.json')}, {path.with_suffix('.truth.npz')}",
+    ]
+    if bogged:
+        lines.append(f"note: the load exceeds what the soil carries in {bogged} samples; the wheel is bogged there")
+    return "\n".join(lines)

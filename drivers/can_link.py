@@ -83,7 +83,9 @@ class CanLink:
 
 def packed(message: can.Message) -> bytes:
     """The message as a chunk of CanFraming. Raises struct.error, TypeError or ValueError if it is none."""
-    flags = EXTENDED * message.is_extended_id | REMOTE * message.is_remote_frame | ERROR * message.is_error_frame
+    flags = EXTENDED if message.is_extended_id else 0  # a hostile message has anything in the place of a flag
+    flags |= REMOTE if message.is_remote_frame else 0
+    flags |= ERROR if message.is_error_frame else 0
     data = bytes(message.data)
     if message.dlc != len(data) and not message.is_remote_frame:
         raise ValueError(f"length {message.dlc}, but {len(data)} bytes")

@@ -22,6 +22,7 @@ from estimator.clock import Clock
 from estimator.config import Configuration
 from estimator.loop import Loop, LoopRecord, Source
 from estimator.pipeline import Pipeline, TickRecord
+from estimator.playback import settings_for
 from estimator.readings import Reading
 from estimator.record import LOOP_FIELDS, TICK_FIELDS
 from estimator.recording import LOG_TOPIC, RunInfo
@@ -96,7 +97,7 @@ class Daemon:
             compression=logging.compression,
             flush_interval=logging.flush_interval,
         )
-        self.loop = Loop(Pipeline(configuration.settings), source, LogSink(self.writer), clock)
+        self.loop = Loop(Pipeline(settings_for(configuration.settings, run)), source, LogSink(self.writer), clock)
         self._stop = Event()
         self._failure = ""
         self._wall_offset = 0.0

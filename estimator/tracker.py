@@ -31,7 +31,7 @@ from estimator.plain import PlainEngine
 from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
 from estimator.segments import CAPACITY, Memory, Stretch
 from estimator.settings import Settings
-from estimator.sync import NS, Snapshot
+from estimator.sync import NS, Measured, Snapshot
 from estimator.wheel_state import REQUIRED_BITS, WheelState, classify, wheel_state
 
 SLIP_MEMORY = 20.0  # [s] k is estimated while slip has varied within this time …
@@ -140,7 +140,7 @@ class Tracker:
         self, state: TrackState, now: WheelState, prediction: Prediction, elapsed: float
     ) -> tuple[TrackState, tuple[Aid, ...]]:
         """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
-        state = _remember_slip(replace(state, estimate=self._walk(state.estimate, elapsed)), now.slip.value, elapsed)
+        state = _remember_slip(replace(state, estimate=self._walk(state.estimate, elapsed)), now.slip, elapsed)
         update = self.measurement.linearise(now, prediction)
         aids = self._gate(state.estimate, now, update)
         taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
@@ -246,12 +246,13 @@ class Tracker:
         return Flag(sum(flag for flag, holds in raised.items() if holds))
 
 
-def _remember_slip(state: TrackState, slip: float, elapsed: float) -> TrackState:
-    """Exponentially forgotten mean and variance of slip."""
+def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackState:
+    """Exponentially forgotten mean and variance of slip, the variance of its own noise left out."""
     keep = exp(-elapsed / SLIP_MEMORY) if state.updates else 0.0
-    step = slip - state.slip_mean
+    step = slip.value - state.slip_mean
     mean = state.slip_mean + (1.0 - keep) * step
-    return replace(state, slip_mean=mean, slip_variance=keep * (state.slip_variance + (1.0 - keep) * step * step))
+    spread = state.slip_variance + (1.0 - keep) * (step * step - slip.sigma**2)
+    return replace(state, slip_mean=mean, slip_variance=keep * spread)
 
 
 def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:

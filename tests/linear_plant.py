@@ -6,9 +6,9 @@ from math import cos
 
 import numpy as np
 
-from estimator.readings import Reading
+from estimator.readings import ENCODERS, Reading
 from estimator.terramechanics import linear
-from tests.testbed import COUNT, NS, PULLEY, PULLEY_COUNT
+from tests.testbed import NS
 
 START = 1_700_000_000 * NS
 THREE_LOADS = tuple((4.0, load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6))
@@ -34,10 +34,13 @@ def readings(settings, truth, schedule, *, seed, rate=50):
     """Yield, every tick of 0.1 s, its time [ns] and its readings. truth = (c, tan φ, k); `rate` readings a second."""
     rng = np.random.default_rng(seed)
     wheel, clock, turned, travelled, batch = settings.wheel, 0.0, 0.0, 0.0, []
-    pot = settings.channels["sinkage_pot"].calibration
+    pot, shunt = (settings.channels[name].calibration for name in ("sinkage_pot", "motor_shunt"))
+    wheel_count, pulley_count = (settings.channels[name].calibration.scale.value for name in ENCODERS)
     for duration, load, slip in schedule:
         theta_1, forces = entry_angle(settings, truth, load, slip)
         volts = (wheel.radius * (1.0 - cos(theta_1)) - pot.offset.value) / pot.scale.value
+        current = forces.torque / settings.drive.torque_constant.value
+        amplifier = (current - shunt.offset.value) / shunt.scale.value
         for _ in range(round(duration * rate)):
             clock += 1.0 / rate
             turned += OMEGA / rate
@@ -45,10 +48,10 @@ def readings(settings, truth, schedule, *, seed, rate=50):
             stamp = START + round(clock * NS)
             noise = rng.normal(size=4) * (2e-3, 2e-3, 0.3, 0.3)
             values = {
-                "wheel_encoder": int(turned // COUNT),
-                "carriage_encoder": int(travelled / PULLEY // PULLEY_COUNT),
+                "wheel_encoder": int(turned // wheel_count),
+                "carriage_encoder": int(travelled / settings.pulley_radius // pulley_count),
                 "sinkage_pot": float(volts + noise[0]),
-                "motor_shunt": float(forces.torque / 4.0 + noise[1]),
+                "motor_shunt": float(amplifier + noise[1]),
             }
             if settings.wrench is not None:
                 pull, weight = float(forces.drawbar_pull + noise[2]), float(load + noise[3])

@@ -15,6 +15,8 @@ from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 
 # command -> (module, what it does)
 COMMANDS = {
+    "run": ("tools.run", "the daemon: sensors in, c and tan φ out, everything logged"),
+    "replay": ("tools.replay", "the on-line filter over recordings"),
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),
     "recover": ("tools.recover", "salvage an unclosed or damaged recording"),
     "import": ("tools.import_rig", "other rigs' public data to recordings"),

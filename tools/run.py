@@ -36,10 +36,11 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the configuration."""
     arguments = _parser().parse_args(argv)
     configuration = load(arguments.config)
+    run = _run_info(configuration.run, arguments)
     folder = Path(arguments.directory or configuration.settings.logging.directory)
     try:
         with locked(folder):
-            return _serve(configuration, folder, _run_info(configuration.run, arguments), arguments.status)
+            return _serve(configuration, folder, run, arguments.status)
     except (DaemonError, RecordingError) as error:
         raise CommandError(error, FAILED) from None
 

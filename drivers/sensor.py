@@ -102,6 +102,11 @@ class Analog(Sensor):
         self.low = settings.low
         self.high = settings.high
 
+    def check_signals(self, signals: Sequence[SignalShape]) -> None:
+        if len(signals) != 1:
+            names = ", ".join(signal.name for signal in signals)
+            raise DeviceSettingsError(f"channel {self.channel}", f"its signals are {names}, expected one signal")
+
     def value(self, frame: Frame) -> float | None:
         value = frame.values[0]
         if len(frame.values) != 1 or not within(value, self.low, self.high):

@@ -56,8 +56,7 @@ DESIGN = set(
 )
 
 
-@pytest.fixture(scope="module")
-def hard_run() -> Motion:
+def run_of_everything() -> Motion:
     """Standstill, both directions, braking, stall, lifted wheel and a heavy load, with ramps between."""
     rows = np.array(
         [  # load [N], ω [rad/s], v [m/s]
@@ -76,6 +75,11 @@ def hard_run() -> Motion:
     return Motion(
         time, np.cumsum(speed) * 0.04, speed, np.cumsum(travel) * 0.04, travel, load, pass_number=2.0, temperature=25.0
     )
+
+
+@pytest.fixture(scope="module")
+def hard_run() -> Motion:
+    return run_of_everything()
 
 
 def every(response: Response) -> dict[str, Array]:

@@ -21,6 +21,7 @@ LOADS, SLIPS, SPEEDS = (35.0, 65.0, 95.0), (0.05, 0.2, 0.4, 0.6), (0.1, 0.25, 0.
 RATE, SEGMENT, RAMP = 25.0, 4.0, 1.0  # [Hz, s, s]
 RUNS = 4
 BINS = 12
+LEAST = 0.2  # [-] share below which a covariate explains nothing worth naming
 TIE = 0.1  # [-] shares closer than this are no different
 HIGHEST_ORDER = 60  # [cycles a turn] tried for the wheel angle
 
@@ -97,11 +98,12 @@ class Shown:
         return max(self.strength, key=lambda channel: self.strength[channel])
 
     def stands_out(self, channel: str, covariate: str) -> bool:
-        """Whether no other covariate explains clearly more; a constant must explain nearly all."""
+        """Whether the covariate explains some, and no other clearly more; a constant must explain nearly all."""
         share = self.share[channel]
         if covariate == "constant":
             return share[covariate] > 0.95
-        return share[covariate] > max(value for name, value in share.items() if name != "constant") - TIE
+        others = (value for name, value in share.items() if name != "constant")
+        return share[covariate] > max(LEAST, max(others) - TIE)
 
 
 def shown(effect: Effect) -> Shown:

@@ -6,7 +6,7 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import metadata
 
 from drivers.errors import DeviceError, DeviceSettingsError
@@ -31,9 +31,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not given:
         parser.error("expected a command")
     arguments = parser.parse_args(given)
+    return guarded(lambda: importlib.import_module(COMMANDS[arguments.command][0]).main(arguments.arguments))
+
+
+def guarded(command: Callable[[], int | None]) -> int:
+    """The exit code of a command, whatever it raises."""
     try:
-        module = importlib.import_module(COMMANDS[arguments.command][0])
-        code = int(module.main(arguments.arguments) or DONE)
+        code = int(command() or DONE)
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:

@@ -11,18 +11,12 @@ from drivers.errors import DeviceSettingsError
 from drivers.queue import ReadingQueue
 from drivers.wire import CanWire, SerialWire
 from estimator.config import load
-from estimator.readings import CHANNELS
+from estimator.readings import CHANNELS, ENCODERS
 from tests.drivers_rig import CAN_SIGNALS, Ticking, can_device, channel, serial_device, wiring, wrench
 from tests.test_framing_can import chunk
 
-VALUES = {
-    "wheel_encoder": (70_000,),
-    "carriage_encoder": (12,),
-    "sinkage_pot": (1.25,),
-    "motor_shunt": (2.5,),
-    "motor_temperature": (21.5,),
-    "wrench": (1.0, 2.0, 3.0, 0.5, 0.25, -0.5),
-}
+VALUES = {name: (70_000 if name in ENCODERS else 1.25,) for name in CHANNELS}
+VALUES["wrench"] = (1.0, 2.0, 3.0, 0.5, 0.25, -0.5)
 WRENCH_MESSAGES = {"WrenchForce": slice(0, 3), "WrenchTorque": slice(3, 6)}
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import random
+import re
 import struct
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given
@@ -228,3 +230,9 @@ def test_cobs_kinds_of_value(kind, value):
 def test_cobs_frame_too_long_is_refused_when_sent():
     with pytest.raises(ValueError, match="at most 253"):
         framing_cobs.encode(Frame("k", 0, None, (0.5,) * 40))
+
+
+def test_the_line_in_the_documentation_is_right():
+    page = (Path(__file__).parent.parent / "docs" / "adding-a-sensor.md").read_text()
+    line = re.search(r"`(\$pot,[^`]*)`", page)[1]
+    assert AsciiFraming().decode(line.encode() + b"\r\n") == [Frame("pot", 17, 1234567, (2.4961,))]

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
+from estimator import config, salvage
 from tools.command import CommandError
 from tools.import_rig import main
 from tools.importers import mgst, rigs
@@ -46,7 +48,7 @@ def complaint(*arguments: object) -> str:
 
 def test_every_module_of_the_folder_is_a_rig() -> None:
     found = rigs()
-    assert set(found) >= {"mgst"}
+    assert set(found) >= {"mgst", "cmu", "emps", "table"}
     for name, rig in found.items():
         assert re.fullmatch("[a-z]+", name)
         assert 20 < len(rig.SUMMARY) < 100
@@ -104,6 +106,19 @@ def test_one_line_says_what_is_wrong_with_a_file(tmp_path: Path, name: str, dama
     assert file.name in said or "--lag" in said
 
 
+@pytest.mark.parametrize("lag", ["0", "-1", "nan", "soon"])
+def test_a_lag_is_a_number_above_zero(tmp_path: Path, lag: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["mgst", str(tmp_path), "-o", str(tmp_path), f"--lag={lag}"])
+    assert caught.value.code == 2
+    assert f"found {lag!r}; expected a number above 0" in capsys.readouterr().err
+
+
+def test_a_lag_beyond_the_logs_is_refused(tmp_path: Path) -> None:
+    said = complaint("mgst", mgst_files(tmp_path), "-o", tmp_path / "out", "--lag", "60")
+    assert "found a lag of 60 s; expected less, the log has 6.0 s" in said
+
+
 def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
     assert complaint("mgst", tmp_path / "none", "-o", tmp_path).startswith(f"{tmp_path / 'none'}: found nothing there")
     assert "found no rig log" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
@@ -115,3 +130,67 @@ def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
     (tmp_path / f"{RIG}.gz").write_bytes(packed)
     (tmp_path / SENSOR).unlink()
     assert f"found no sensor log; expected {SENSOR}" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+
+
+TABLE = """source,wheel_radius_m,wheel_width_m,soil_simulant,soil_shear_modulus_k_m,vertical_load_n,slip,\
+meas_drawbar_pull_n,meas_sinkage_m,meas_torque_nm
+made up,0.1,0.05,sand,0.01,50,0.2,5,0.01,1.5
+made up,0.1,0.05,sand,0.01,60,-0.3,-8,0.012,-0.5
+""".replace("\\\n", "")
+SOILS = """simulant,n,k_c_kN_per_m_n_plus_1,k_phi_kN_per_m_n_plus_2,cohesion_kPa,friction_angle_deg
+sand,1.0,1.0,1000,0.5,30
+"""
+
+
+def table_files(folder: Path, table: str = TABLE, soils: str = SOILS) -> Path:
+    (folder / "made_up.csv").write_text(table)
+    (folder / "soils.csv").write_text(soils)
+    return folder
+
+
+def test_a_table_drives_and_brakes(tmp_path: Path) -> None:
+    assert main(["table", str(table_files(tmp_path)), "-o", str(tmp_path / "out"), "--speed", "0.02"]) == 0
+    rows = salvage.read(tmp_path / "out" / "made_up.mcap")
+    settings_ = config.load(tmp_path / "out" / "made_up.yaml").settings
+    scale = settings_.channels["wheel_encoder"].calibration.scale.value
+    wheel = rows.arrays("/raw/wheel_encoder")["count"] * scale * settings_.wheel.radius
+    carriage = rows.arrays("/raw/carriage_encoder")["count"] * 1e-6
+    assert len(wheel) == 1000
+    for segment, speeds in ((slice(0, 500), (0.02, 0.016)), (slice(500, 1000), (0.014, 0.02))):
+        travelled = (np.ptp(wheel[segment]), np.ptp(carriage[segment]))
+        assert travelled == pytest.approx(tuple(speed * 4.99 for speed in speeds), abs=3e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "soils", "expected"),
+    [
+        (TABLE.replace("60,-0.3", "60,-1.3"), SOILS, "row 3: found slip -1.3, load 60; expected -1 … 1, above 0 N"),
+        (TABLE.replace("made up,0.1", "made up,0.2", 1), SOILS, "wheel_radius_m: found '0.1' and '0.2'; expected one"),
+        (TABLE, SOILS.replace("sand", "clay"), "soil_simulant: found 'sand' in no table of soils"),
+        (TABLE.replace("meas_torque_nm", "torque"), SOILS, "found no column meas_torque_nm"),
+        (SOILS, SOILS, "found no table; expected a CSV file with source"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused(tmp_path: Path, table: str, soils: str, expected: str) -> None:
+    assert expected in complaint("table", table_files(tmp_path, table, soils), "-o", tmp_path / "out")
+
+
+def test_a_log_without_numbers_is_refused(tmp_path: Path) -> None:
+    log = tmp_path / "gr810_vx_10__11-26-20__10_20_0_1.txt"
+    for text, expected in (
+        ("1,2,3,4,5,6\n", "row 1: found 6 fields; expected 7"),
+        ("1,2,3,4,5,6,7\n1,2,x,4,5,7,8\n", "row 2: found 'x'; expected a finite number"),
+        ("1,2,3,4,5,6,7\n1,2,inf,4,5,7,8\n", "row 2: found a number that is not finite"),
+        ("1,2,3,4,5,6,7\n", "found 1 rows; expected a log of two or more"),
+        ("1,2,3,4,5,6,7\n1,2,3,4,5,6,8\n", "row 2: the clock does not rise"),
+    ):
+        log.write_text(text)
+        said = complaint("cmu", log, "-o", tmp_path / "out")
+        assert said.startswith(str(log)) and expected in said
+
+
+def test_a_matlab_file_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "DATA_EMPS.mat").write_bytes(b"no MATLAB file at all, and too short for one" * 10)
+    assert "DATA_EMPS.mat: cannot be read" in complaint("emps", tmp_path, "-o", tmp_path / "out")
+    savemat(tmp_path / "DATA_EMPS.mat", {"t": np.arange(5.0), "qm": np.zeros(4), "gtau": 35.0, "vir": np.zeros(5)})
+    assert "qm: found 4 values; expected 5" in complaint("emps", tmp_path, "-o", tmp_path / "out")

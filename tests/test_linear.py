@@ -7,10 +7,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from estimator.terramechanics import linear, original
+from estimator.terramechanics import linear
 from estimator.terramechanics.linear import ARRAYS, GRADIENT, Integrals, integrals, predict, predict_batch
 from estimator.terramechanics.soil import Wheel
-from estimator.terramechanics.soils import DRY_SAND
 from tests.helpers import assert_jacobian
 
 WHEEL = Wheel(radius=0.072, width=0.071)
@@ -194,26 +193,3 @@ def test_stress_triangles() -> None:
     assert tau_m == pytest.approx((1000 + 5770) * (1 - math.exp(-f * 0.3)), rel=1e-12)
     shear = linear.triangular_shear_stress(0.6, 0.2, tau_m, 800.0, theta[:5])
     np.testing.assert_allclose(shear[[0, 2, 4]], [800.0, tau_m, 0.0], atol=1e-9)
-
-
-@pytest.mark.parametrize(("load", "low", "high"), [(40.0, 1.01, 1.06), (70.0, 0.69, 0.73), (120.0, 0.48, 0.52)])
-def test_cohesion_and_friction_are_told_apart_by_load_and_not_by_slip(load: float, low: float, high: float) -> None:
-    """∂T/∂c per 100 Pa over ∂T/∂tan φ per 0.01 in dry sand hardly moves with slip and strongly with load."""
-    soil = DRY_SAND.under(WHEEL.width)
-    slip = np.linspace(0.05, 0.8, 8)
-    theta_1 = entry_angle(soil, slip, load)
-    gradient = predict_batch(
-        WHEEL, soil.cohesion, soil.tan_phi, soil.shear_modulus, theta_1, slip, load
-    ).torque_gradient
-    ratio = 1e4 * gradient[0] / gradient[1]
-    assert np.all((ratio > low) & (ratio < high)), ratio
-
-
-def entry_angle(soil, slip: np.ndarray, load: float) -> np.ndarray:
-    """θ₁ at which the original model carries the load, by bisection."""
-    low, high = np.full_like(slip, 1e-3), np.full_like(slip, 1.5)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        heavy = original.forces(WHEEL, soil, middle, slip).load > load
-        low, high = np.where(heavy, low, middle), np.where(heavy, middle, high)
-    return middle

@@ -109,8 +109,8 @@ def test_a_concealed_sensor_is_not_in_the_recording(tmp_path: Path) -> None:
         assert len(trial.time("sinkage_pot")) > 1000
 
 
-def test_importing_twice_gives_the_same_bytes(imported: Path, tmp_path: Path) -> None:
+def test_importing_again_gives_the_same_bytes_and_replaces_what_was_there(imported: Path, tmp_path: Path) -> None:
+    (tmp_path / "mgst-20-165209.mcap").write_bytes(b"an earlier import")
     run(tmp_path)
-    run(tmp_path)  # and replaces what an earlier import left
     for path in imported.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes()

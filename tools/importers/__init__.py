@@ -32,3 +32,14 @@ def rigs() -> dict[str, Rig]:
     names = sorted(info.name for info in pkgutil.iter_modules(__path__) if not info.name.startswith("_"))
     modules = (cast(Rig, importlib.import_module(f"{__name__}.{name}")) for name in names)
     return {module.NAME: module for module in modules}
+
+
+def positive(text: str) -> float:
+    """A command-line number that is finite and above zero. Raises ArgumentTypeError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number above 0")
+    return value

@@ -85,11 +85,34 @@ def number(path: Path, where: str, text: str) -> float:
     return value
 
 
-def increasing(path: Path, what: str, values: Array) -> Array:
-    """The values, shape (n,), if there are two or more and they only rise. Raises RigFileError."""
+def matrix(path: Path, columns: int, skip: int = 0) -> Array:
+    """Rows of comma-separated finite numbers without a header, shape (n, columns); more columns are ignored.
+
+    Raises RigFileError naming the row.
+    """
+    lines = [line for line in read_text(path).splitlines() if line.strip()][skip:]
+    rows = [line.split(",")[:columns] for line in lines]
+    for place, row in enumerate(rows, start=skip + 1):
+        if len(row) < columns:
+            raise RigFileError(f"{path}: row {place}: found {len(row)} fields; expected {columns}")
+    try:
+        values = np.array(rows, dtype=float).reshape(len(rows), columns)
+    except ValueError:
+        values = np.array([[number(path, f"row {i}", text) for text in row] for i, row in enumerate(rows, skip + 1)])
+    if not np.all(np.isfinite(values)):
+        bad = int(np.argmin(np.all(np.isfinite(values), axis=1))) + skip + 1
+        raise RigFileError(f"{path}: row {bad}: found a number that is not finite; expected {columns} finite numbers")
+    return values
+
+
+def increasing(path: Path, what: str, values: Array, first: int = 2) -> Array:
+    """The values, shape (n,), if there are two or more and they only rise; `first` is the row they begin in.
+
+    Raises RigFileError.
+    """
     if len(values) < 2:
         raise RigFileError(f"{path}: found {len(values)} rows; expected a log of two or more")
     if np.any(np.diff(values) <= 0):
-        row = int(np.argmax(np.diff(values) <= 0)) + 3
+        row = int(np.argmax(np.diff(values) <= 0)) + first + 1
         raise RigFileError(f"{path}: row {row}: {what} does not rise; expected times in order")
     return values

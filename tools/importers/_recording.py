@@ -68,6 +68,7 @@ def write(path: Path, streams: Sequence[Stream], configured: config.Configuratio
 
     Raises RecordingError.
     """
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
     order = {channel: place for place, channel in enumerate(CHANNELS)}
     writer = RunWriter(path, (), configured.text, run)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from estimator.recording import RunInfo
-from tools.importers import Progress
+from tools.importers import Progress, positive
 from tools.importers._files import Array, RigFileError, find, increasing, numbers, read_table
 from tools.importers._recording import UNKNOWN, Stream, configuration, counts, stamps, write
 
@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave a channel out of the recordings; may be repeated",
     )
     parser.add_argument(
-        "--lag", type=float, metavar="SECONDS", help="of the force/torque log behind the rig's; default: correlate"
+        "--lag", type=positive, metavar="SECONDS", help="of the force/torque log behind the rig's; default: correlate"
     )
 
 
@@ -102,7 +102,11 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     written = [args.output / "mgst.yaml"]
     progress(HEADER)
     for trial in trials:
-        lag, correlation = (args.lag, float("nan")) if args.lag is not None else find_lag(trial)
+        lag, correlation = find_lag(trial) if args.lag is None else (args.lag, float("nan"))
+        if lag + STEADY >= trial.rig.t[-1]:
+            raise RigFileError(
+                f"{trial.name}: found a lag of {lag:g} s; expected less, the log has {trial.rig.t[-1]:.1f} s"
+            )
         progress(_row(trial, lag, correlation))
         streams = _streams(trial, lag, args.drawbar_pull, set(args.conceal))
         info = _info(trial, lag, args.drawbar_pull, args.conceal)

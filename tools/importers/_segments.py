@@ -1,0 +1,81 @@
+"""Steady-state tables as recordings: every condition a segment of constant speed, a short silence between segments.
+
+A table gives a mean and a standard deviation. Within a segment the readings alternate between one standard deviation
+above and below the mean, so that the segment has both exactly and needs no random numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.settings import Uncertain
+from tools.importers._files import Array
+from tools.importers._recording import NS, Stream, stamps
+
+START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
+RATE = 100  # [Hz] even in the filter's window of 100 ms, so that the alternation averages out
+DURATION = 5.0  # [s] of a segment
+PAUSE = 1.0  # [s] between segments
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One row of a table, SI. A pull, a torque, a lateral force that was not measured is None."""
+
+    rim_speed: float  # rω [m/s]
+    carriage_speed: float  # v [m/s]
+    sinkage: Uncertain  # z [m], mean ± standard deviation of the readings
+    load: Uncertain  # W [N]
+    drawbar_pull: Uncertain | None = None  # [N]
+    lateral_force: Uncertain | None = None  # [N]
+    current: Uncertain | None = None  # [A]
+
+
+@dataclass(frozen=True)
+class Counting:
+    """How motion becomes counts, and sinkage volts."""
+
+    rim: float  # [m] of rim travel a count
+    carriage: float  # [m] a count
+    pot_scale: float  # [m/V]
+    pot_offset: float  # [m]
+
+
+def streams(conditions: Sequence[Condition], counting: Counting) -> list[Stream]:
+    """The segments one after the other, as the channels of a recording."""
+    seconds = np.arange(round(RATE * DURATION)) / RATE
+    spacing = DURATION + PAUSE
+    times = np.concatenate([stamps(START, seconds + spacing * number) for number in range(len(conditions))])
+    found = [
+        Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
+        Stream("carriage_encoder", times, _travel([c.carriage_speed for c in conditions], counting.carriage)),
+        Stream(
+            "sinkage_pot", times, (_all([c.sinkage for c in conditions]) - counting.pot_offset) / counting.pot_scale
+        ),
+    ]
+    if any(c.current is not None for c in conditions):
+        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions])))
+    axes = np.zeros((len(times), 6))
+    axes[:, 0] = _all([c.drawbar_pull for c in conditions])
+    axes[:, 1] = _all([c.lateral_force for c in conditions])
+    axes[:, 2] = _all([c.load for c in conditions])
+    return [*found, Stream("wrench", times, axes)]
+
+
+def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
+    """Counts at constant speed within each segment, standing still in the silences."""
+    seconds = np.arange(1, round(RATE * DURATION) + 1) / RATE
+    begins = np.concatenate(([0.0], np.cumsum(speeds)[:-1])) * DURATION
+    travel = begins[:, None] + np.asarray(speeds)[:, None] * seconds
+    return np.asarray(np.round(travel.ravel() / per_count), dtype=np.int64)
+
+
+def _all(values: Sequence[Uncertain | None]) -> Array:
+    """One array of mean ± standard deviation in turn, segment by segment; zero where nothing was measured."""
+    sign = np.where(np.arange(round(RATE * DURATION)) % 2 == 0, 1.0, -1.0)
+    known = [value or Uncertain(0.0) for value in values]
+    return np.concatenate([value.value + value.sigma * sign for value in known])

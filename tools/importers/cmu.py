@@ -1,0 +1,226 @@
+"""CMU: a smooth and a grousered wheel in dry sand (Pavlov and Johnson, robomechanics/3d-terramechanics).
+
+Four campaigns, a folder each: the steady-state tables of either wheel (motion, sinkage, forces; one condition a
+segment) and its raw logs (motion and sinkage). The plates and wheels that were pressed into the sand become one table,
+penetration.csv. Only straight driving, steering angle 0, is taken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimator import config
+from estimator.recording import RunInfo
+from estimator.settings import Uncertain
+from tools.importers import Progress
+from tools.importers._files import Array, RigFileError, find, increasing, matrix, number, numbers, read_table, read_text
+from tools.importers._recording import NS, Stream, configuration, counts, stamps, write
+from tools.importers._segments import Condition, Counting, streams
+
+NAME = "cmu"
+SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
+
+COUNT = 1e-6  # [m] of rim and of carriage travel; 0.01 mm/s, the speeds' last digit, over a sample is 0.14 of it
+START_HEIGHT = 31.5  # [mm] of the wheel above the sand where a log begins
+LEAST_SCATTER = 5e-6  # [m] half a digit of the height: a table's own deviation can be less than the log can tell
+TRUSTED_MATCH = 0.4  # residual under which a log is known to belong to a table row
+CONTACT = 2.0  # [N] force at which a plate has met the sand
+
+TABLE = re.compile(r"(smooth|grouser)_(?:all_trials|first_trial)_steady_state\.csv")
+LOG = re.compile(r"gr\d+_(vx_10|grouser)__([\d-]+)__10_(\d+)_0_(\d+)\.txt(?:\.gz)?")
+INDEX = re.compile(r"beta0_trials_index\.csv")
+PRESSED = re.compile(r"(f-d-large-box|testbed-deflection)__force-displacement_(\w+)\.ft\.csv(?:\.gz)?")
+COLUMNS = ("avg_Fx", "std_Fx", "avg_Fy", "std_Fy", "avg_Fz", "std_Fz", "avg_Vx", "avg_Vry", "avg_Z", "std_Z")
+PLATES = {"1": 60, "2": 60, "3": 60, "4": 100, "5": 100, "6": 100, "7": 80, "8": 80, "9": 80}  # run -> diameter [mm]
+HOURS_BEHIND = {"f-d-large-box": 5, "testbed-deflection": 4}  # of the rig's clock, by time of year
+
+COUNTING = Counting(COUNT, COUNT, pot_scale=-1e-3, pot_offset=-START_HEIGHT * 1e-3)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both")
+
+
+def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+    """Recordings by wheel and kind, one configuration, penetration.csv. Raises RigFileError, RecordingError."""
+    wheels = [args.wheel] if args.wheel else ["smooth", "grouser"]
+    tables, logs, pressed = (find(args.paths, pattern) for pattern in (TABLE, LOG, PRESSED))
+    if not (tables or logs or pressed):
+        raise RigFileError(f"{args.paths[0]}: found none of the rig's files; expected {TABLE.pattern} or the like")
+    configured = configuration("rig_cmu.yaml", args.output, "cmu.yaml")
+    written = [args.output / "cmu.yaml"]
+    for file, match in tables:
+        if match[1] in wheels:
+            written += _import_table(file, match[1], args.output, configured, progress)
+    loads = {name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()}
+    for file, match in logs:
+        wheel = "smooth" if match[1] == "vx_10" else "grouser"
+        if wheel in wheels:
+            written.append(_import_log(file, wheel, loads, args.output, configured))
+    if pressed:
+        written.append(_import_pressed([(file, match[1], match[2]) for file, match in pressed], args.output))
+    return written
+
+
+# ---- steady-state tables -------------------------------------------------------------------------------------------
+
+
+def _import_table(
+    path: Path, wheel: str, output: Path, configured: config.Configuration, progress: Progress
+) -> list[Path]:
+    """The k-th repeat of every commanded speed is recording k."""
+    repeats = _repeats(_straight(path))
+    written = []
+    progress("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
+    for number_, conditions in enumerate(repeats, start=1):
+        name = f"{wheel}-table-{number_}"
+        for condition in conditions:
+            progress(_row(name, condition))
+        load = float(np.mean([condition.load.value for condition in conditions]))
+        info = RunInfo(name=name, nominal_load=round(load, 2), notes=f"{wheel} wheel; {len(conditions)} steady states")
+        folder = output / f"{wheel}-table"
+        written.append(write(folder / f"{name}.mcap", streams(conditions, COUNTING), configured, info))
+    return written
+
+
+def _straight(path: Path) -> list[tuple[float, Condition]]:
+    """Commanded rim speed and condition of each row with steering angle 0."""
+    table = read_table(path, ("beta", "Vry", *COLUMNS))
+    straight = numbers(path, table, "beta") == 0.0
+    commanded = numbers(path, table, "Vry")[straight]
+    columns = {name: numbers(path, table, name)[straight] for name in COLUMNS}
+    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    if not rows:
+        raise RigFileError(f"{path}: found no row with beta 0; expected straight driving")
+    return [(float(speed), _condition(row)) for speed, row in zip(commanded, rows, strict=True)]
+
+
+def _condition(row: dict[str, float]) -> Condition:
+    """The rig's axes: x sideways, y against the pull, z up."""
+    return Condition(
+        rim_speed=row["avg_Vry"] * 1e-3,
+        carriage_speed=row["avg_Vx"] * 1e-3,
+        sinkage=Uncertain(-row["avg_Z"] * 1e-3, max(row["std_Z"] * 1e-3, LEAST_SCATTER)),
+        load=Uncertain(-row["avg_Fz"], row["std_Fz"]),
+        drawbar_pull=Uncertain(-row["avg_Fy"], row["std_Fy"]),
+        lateral_force=Uncertain(row["avg_Fx"], row["std_Fx"]),
+    )
+
+
+def _repeats(rows: list[tuple[float, Condition]]) -> list[list[Condition]]:
+    """The first of each commanded speed, the second, and so on; each by rising speed."""
+    repeats: list[dict[float, Condition]] = []
+    for speed, condition in rows:
+        free = next((repeat for repeat in repeats if speed not in repeat), None)
+        if free is None:
+            repeats.append(free := {})
+        free[speed] = condition
+    return [[repeat[speed] for speed in sorted(repeat)] for repeat in repeats]
+
+
+def _row(name: str, condition: Condition) -> str:
+    rim, speed = condition.rim_speed, condition.carriage_speed
+    slip = (rim - speed) / max(rim, speed)
+    pull = condition.drawbar_pull.value if condition.drawbar_pull else float("nan")
+    return (
+        f"{name:<16} {rim * 1e3:10.2f} {slip:7.3f} {condition.load.value:7.2f} {pull:7.2f} "
+        f"{condition.sinkage.value * 1e3:7.2f}"
+    )
+
+
+# ---- raw logs ------------------------------------------------------------------------------------------------------
+
+
+def _loads(path: Path) -> dict[str, float]:
+    """Load [N] by log, from the table row it is known to belong to."""
+    table = read_table(path, ("file", "W_N", "match_resid"))
+    return {
+        name: number(path, f"{name}: W_N", load)
+        for name, load, residual in zip(table["file"], table["W_N"], table["match_resid"], strict=True)
+        if load and residual and number(path, f"{name}: match_resid", residual) < TRUSTED_MATCH
+    }
+
+
+def _import_log(
+    path: Path, wheel: str, loads: dict[str, float], output: Path, configured: config.Configuration
+) -> Path:
+    """X [mm], Vx, Vry [mm/s], angle [deg], Z [mm], clock [ms], unix time [s] become motion and height.
+
+    The carriage's travel is the integral of Vx. X by the log's clock is 2.8 % faster than Vx in every log: the
+    controller underestimates its period, and both speeds with it. Their ratio, and so the slip, is right.
+    """
+    rows = matrix(path, 7)
+    clock = increasing(path, "the clock", rows[:, 5] / 1000, first=1)
+    seconds = clock - clock[0]
+    times = stamps(round(rows[0, 6] * 1e3) * (NS // 1000), seconds)
+    logged = [
+        Stream("wheel_encoder", times, counts(seconds, rows[:, 2] * 1e-3, COUNT)),
+        Stream("carriage_encoder", times, counts(seconds, rows[:, 1] * 1e-3, COUNT)),
+        Stream("sinkage_pot", times, rows[:, 4] - rows[0, 4]),
+    ]
+    plain = path.name.removesuffix(".gz")
+    name = plain.removesuffix(".txt")
+    info = RunInfo(name=name, nominal_load=loads.get(plain), notes=f"{wheel} wheel; raw log; no forces recorded")
+    return write(output / f"{wheel}-logs" / f"{name}.mcap", logged, configured, info)
+
+
+# ---- penetration tests ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Penetration:
+    """One body pressed down: force [N] and depth [mm] below the height of contact, arrays of shape (n,)."""
+
+    name: str
+    body: str
+    force: Array
+    depth: Array
+
+
+def _import_pressed(tests: list[tuple[Path, str, str]], output: Path) -> Path:
+    """penetration.csv: test, body, depth below contact [mm], force [N], up to the largest force, 20 rows a second."""
+    lines = ["test,body,depth_mm,force_N"]
+    for file, series, which in tests:
+        test = read_penetration(file, series, which)
+        lines += [
+            f"{test.name},{test.body},{depth:.3f},{force:.2f}"
+            for depth, force in zip(test.depth[::5], test.force[::5], strict=True)
+        ]
+    path = output / "penetration.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def read_penetration(path: Path, series: str, which: str) -> Penetration:
+    """Force log (100 Hz) with the height of the rig's log at the same times. Raises RigFileError."""
+    zero, forces = _forces(path)
+    rig = path.with_name(re.sub(r"\.ft\.csv(\.gz)?$", r".rig.txt\1", path.name))
+    rows = matrix(rig, 7)
+    clock = increasing(rig, "the time", rows[:, 6] + 3600.0 * HOURS_BEHIND[series], first=1)
+    force = np.convolve(zero - forces[:, 3], np.full(10, 0.1), "same")
+    last = int(np.argmax(force))
+    before = np.flatnonzero(force[:last] < CONTACT)
+    if not before.size or last - before[-1] < 100:
+        raise RigFileError(f"{path}: found no loading from under {CONTACT:g} N over a second; expected one")
+    height = np.interp(forces[:, 0], clock, rows[:, 4])
+    pressed = slice(int(before[-1]), last + 1)
+    return Penetration(f"{series}-{which}", _body(series, which), force[pressed], height[before[-1]] - height[pressed])
+
+
+def _forces(path: Path) -> tuple[float, Array]:
+    """Zero of Fz [N], and rows of time [s], Fx … Tz."""
+    found = re.match(r"# zero offsets[^:]*:((?: *,? *-?[\d.]+){6})\n", read_text(path))
+    if not found:
+        raise RigFileError(f"{path}: row 1: found no zero offsets; expected '# zero offsets …: Fx,Fy,Fz,Tx,Ty,Tz'")
+    return number(path, "row 1", found[1].split(",")[2]), matrix(path, 7, skip=2)
+
+
+def _body(series: str, which: str) -> str:
+    if series == "testbed-deflection":
+        return "rigid stop"
+    return f"plate {PLATES[which]} mm" if which in PLATES else f"{which.split('_')[0]} wheel"

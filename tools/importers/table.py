@@ -1,0 +1,156 @@
+"""A table of steady states, one condition a row: slip, load, drawbar pull, sinkage and torque, as papers print them.
+
+The columns are those of the public roverdevkit repository's digitised experiments (Ding et al. 2011 among them). Torque
+at the axle stands as the current of a drive of 1 N·m/A, so that the on-line filter runs on it. A table has no speed, so
+one is assumed; nothing in Eqs. (1)–(22) depends on it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from estimator.recording import RunInfo
+from estimator.settings import Uncertain
+from tools.importers import Progress, positive
+from tools.importers._files import RigFileError, Table, find, number, numbers, read_table, read_text
+from tools.importers._recording import configuration, write
+from tools.importers._segments import Condition, Counting, streams
+
+NAME = "table"
+SUMMARY = "steady states from a table, one condition a row: slip, load, drawbar pull, sinkage, torque"
+
+CSV = re.compile(r".*\.csv(?:\.gz)?")
+CONSTANTS = ("source", "wheel_radius_m", "wheel_width_m", "soil_simulant", "soil_shear_modulus_k_m")
+MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m", "meas_torque_nm")
+SOIL = ("simulant", "n", "k_c_kN_per_m_n_plus_1", "k_phi_kN_per_m_n_plus_2", "cohesion_kPa", "friction_angle_deg")
+COUNT = 1e-6  # [m] of rim or carriage travel
+COUNTING = Counting(COUNT, COUNT, pot_scale=1.0, pot_offset=0.0)
+NOT_TAKEN = "not taken from the tables but left to be found: dry sands in general."
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--speed", type=positive, default=0.01, metavar="M/S", help="of the faster of rim and carriage, default 0.01"
+    )
+    for name, unit, default in (("drawbar-pull", "N", 0.5), ("sinkage", "m", 0.25e-3), ("torque", "N·m", 0.1)):
+        explained = f"standard deviation of a tabulated value [{unit}], default {default:g}"
+        parser.add_argument(f"--{name}-sigma", type=positive, default=default, metavar="SIGMA", help=explained)
+    parser.add_argument(
+        "--soil-strength",
+        choices=("unknown", "table"),
+        default="unknown",
+        help="cohesion and friction angle before the run: dry sands in general, or as tabulated",
+    )
+
+
+def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+    """One recording and one configuration a table. Raises RigFileError, RecordingError."""
+    files = [file for file, _ in find(args.paths, CSV)]
+    tables = [file for file in files if _has(file, "slip")]
+    if not tables:
+        raise RigFileError(
+            f"{args.paths[0]}: found no table; expected a CSV file with {', '.join(CONSTANTS + MEASURED)}"
+        )
+    soils = [file for file in files if _has(file, SOIL[0])]
+    written = []
+    for path in tables:
+        written += _import(path, soils, args, progress)
+    return written
+
+
+def _has(path: Path, column: str) -> bool:
+    return column in read_text(path).partition("\n")[0].strip().split(",")
+
+
+def _import(path: Path, soils: list[Path], args: argparse.Namespace, progress: Progress) -> list[Path]:
+    table = read_table(path, CONSTANTS + MEASURED)
+    conditions = _conditions(path, table, args)
+    stem = path.name.partition(".")[0]
+    configured = configuration("rig_table.yaml", args.output, f"{stem}.yaml", **_values(path, table, soils, args))
+    load = float(np.mean([condition.load.value for condition in conditions]))
+    info = RunInfo(name=stem, nominal_load=round(load, 2), notes=f"{len(conditions)} steady states from a table")
+    progress(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
+    recording = write(args.output / f"{stem}.mcap", streams(conditions, COUNTING), configured, info)
+    return [args.output / f"{stem}.yaml", recording]
+
+
+def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Condition]:
+    columns = [numbers(path, table, name).tolist() for name in MEASURED]
+    conditions = []
+    for row, (load, slip, pull, sinkage, torque) in enumerate(zip(*columns, strict=True), start=2):
+        if not -1.0 <= slip <= 1.0 or load <= 0.0:
+            raise RigFileError(f"{path}: row {row}: found slip {slip:g}, load {load:g}; expected -1 … 1, above 0 N")
+        conditions.append(
+            Condition(
+                rim_speed=args.speed * min(1.0, 1.0 + slip),
+                carriage_speed=args.speed * min(1.0, 1.0 - slip),
+                sinkage=Uncertain(sinkage, args.sinkage_sigma),
+                load=Uncertain(load),
+                drawbar_pull=Uncertain(pull, args.drawbar_pull_sigma),
+                current=Uncertain(torque, args.torque_sigma),
+            )
+        )
+    return conditions
+
+
+def _values(path: Path, table: Table, soils: list[Path], args: argparse.Namespace) -> dict[str, str]:
+    """What the configuration's template asks for."""
+    constant = {name: _constant(path, table, name) for name in CONSTANTS}
+    soil = _soil(path, soils, constant["soil_simulant"])
+    radius = number(path, "wheel_radius_m", constant["wheel_radius_m"])
+    shear = number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
+    values: dict[str, float] = {
+        "radius": radius,
+        "width": number(path, "wheel_width_m", constant["wheel_width_m"]),
+        "wheel_count": 1e3 * COUNT / radius,
+        "load": float(np.mean(numbers(path, table, "vertical_load_n"))),
+        "shear_modulus": shear,
+        "shear_modulus_sigma": 0.2 * shear,
+        "exponent": soil["n"],
+        "exponent_sigma": 0.1 * soil["n"],
+        "k_c": soil["k_c_kN_per_m_n_plus_1"],
+        "k_phi": soil["k_phi_kN_per_m_n_plus_2"],
+        "sinkage_sigma": args.sinkage_sigma,
+        "torque_sigma": args.torque_sigma,
+        "drawbar_pull_sigma": args.drawbar_pull_sigma,
+    }
+    strength, comment = _strength(soil, args.soil_strength)
+    return {name: f"{value:.9f}" for name, value in (values | strength).items()} | {
+        "source": constant["source"],
+        "strength": comment,
+    }
+
+
+def _strength(soil: dict[str, float], source: str) -> tuple[dict[str, float], str]:
+    """Prior of cohesion [Pa] and tan φ, and the sentence that says where it is from."""
+    if source == "unknown":
+        return {"cohesion": 500.0, "cohesion_sigma": 500.0, "tan_phi": 0.6, "tan_phi_sigma": 0.15}, NOT_TAKEN
+    cohesion, tan_phi = soil["cohesion_kPa"] * 1e3, math.tan(math.radians(soil["friction_angle_deg"]))
+    sigmas = {"cohesion_sigma": max(100.0, 0.5 * cohesion), "tan_phi_sigma": 0.1 * tan_phi}
+    return {"cohesion": cohesion, "tan_phi": tan_phi, **sigmas}, "as tabulated."
+
+
+def _constant(path: Path, table: Table, name: str) -> str:
+    """The one value of a column. Raises RigFileError where rows differ."""
+    values = sorted(set(table[name]))
+    if len(values) > 1:
+        raise RigFileError(f"{path}: {name}: found {values[0]!r} and {values[1]!r}; expected one value for all rows")
+    return values[0]
+
+
+def _soil(path: Path, soils: Iterable[Path], name: str) -> dict[str, float]:
+    """The soil's row among the tables of soils. Raises RigFileError."""
+    for file in soils:
+        table = read_table(file, SOIL)
+        if name in table[SOIL[0]]:
+            row = table[SOIL[0]].index(name)
+            return {key: number(file, f"{name}: {key}", table[key][row]) for key in SOIL[1:]}
+    raise RigFileError(
+        f"{path}: soil_simulant: found {name!r} in no table of soils; expected one with {', '.join(SOIL)}"
+    )

@@ -148,12 +148,12 @@ class Walk:
 
     def _read_closing(self) -> None:
         """Footer, magic and summary: trusted if the checksum holds, else the walk goes to the end of the file."""
-        tail = self._read(self._size - _CLOSING, _CLOSING)
+        tail = self._read(max(0, self._size - _CLOSING), _CLOSING)
         if len(tail) < _CLOSING or not tail.endswith(MAGIC):
             return
         opcode, length, start, _, crc = _FOOTER.unpack(tail[: _FOOTER.size])
         end = self._size - _CLOSING
-        if opcode != Opcode.FOOTER or length != 20 or not (start == 0 or 0 < start <= end):
+        if opcode != Opcode.FOOTER or length != 20 or not (start == 0 or _DATA_END_SIZE <= start <= end):
             return
         self._take_summary(start or end, end, crc, tail)
 
@@ -175,10 +175,10 @@ class Walk:
         head = self._read(position, RECORD_HEAD.size)
         try:
             if len(head) < RECORD_HEAD.size:
-                raise Damaged("the file is cut off")
+                raise Damaged("the data ends inside a record")
             opcode, length = RECORD_HEAD.unpack(head)
             if position + RECORD_HEAD.size + length > self._limit:
-                raise Damaged(f"a record of {length} bytes runs past the end of the data")
+                raise Damaged(f"the data ends inside a record of {length} bytes")
             return self._record(opcode, position, length)
         except Damaged as why:
             return self._skip(position, str(why))
@@ -264,8 +264,8 @@ class Walk:
         if following is None and self._cut_in_index(position):
             return None
         lost = (following or self._limit) - position
-        rest = "" if following else f"; no chunk follows within {SEARCH} bytes"
-        self.found.damage.append(f"byte {position}: {why}; skipped {lost} bytes{rest}")
+        rest = f"; no chunk follows within {SEARCH} bytes, so" if lost > SEARCH else ","
+        self.found.damage.append(f"byte {position}: {why}{rest} {lost} bytes skipped")
         return following
 
     def _cut_in_index(self, position: int) -> bool:
@@ -375,7 +375,7 @@ def _indexed(file: BinaryIO, block: Block) -> Starts:
     found = []
     for _, start, stop in records(data):
         found.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
-    return np.sort(np.concatenate(found)).astype(np.int64)
+    return np.sort(np.concatenate(found).astype(np.int64))  # one that is too large becomes negative, and stands first
 
 
 def records(data: bytes, stop: int | None = None) -> Iterator[tuple[int, int, int]]:

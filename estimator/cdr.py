@@ -164,7 +164,7 @@ def parse_schema(text: str) -> tuple[Field, ...] | None:
 def _parse_line(line: str) -> Field | None:
     code, _, comment = line.partition("#")
     words = code.split()
-    if len(words) < 2 or "=" in code:  # blank, or a constant
+    if len(words) < 2 or re.match(r"\s*\S+\s+\w+\s*=", code):  # blank, or a constant
         return None
     kind = words[0].partition("<=")[0]  # a bounded string is a string
     return words[1], ALIASES.get(kind, kind), comment.strip()

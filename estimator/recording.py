@@ -20,7 +20,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from estimator.cdr import ENCAPSULATION, TIME, Field, Topic, Values
-from estimator.mcapfile import MESSAGE_HEAD, McapFile, RecordingError
+from estimator.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
 from estimator.readings import WRENCH_FIELDS, Reading
 
 __all__ = ["LOG_TOPIC", "RAW_TOPICS", "RecordingError", "RunInfo", "RunWriter", "Topic", "part_path", "parts"]
@@ -111,19 +111,19 @@ def _number(entries: Mapping[str, str], key: str, kind: type[int] | type[float],
         raise ValueError(f"{RUN}: {key}: {text!r} is not a number") from None
 
 
-def sealed(entries: Mapping[str, str]) -> dict[str, str]:
-    """The entries and their checksum: MCAP has none for metadata, and a flipped bit must not pass for a setting."""
-    return {**entries, CHECKSUM: _checksum(entries)}
-
-
-def seal_holds(entries: Mapping[str, str]) -> bool:
-    """Whether the entries are as sealed; true where another writer left no seal."""
+def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
+    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not pass for a setting."""
     kept = {key: value for key, value in entries.items() if key != CHECKSUM}
-    return entries.get(CHECKSUM, _checksum(kept)) == _checksum(kept)
+    return {**kept, CHECKSUM: _checksum(name, kept)}
 
 
-def _checksum(entries: Mapping[str, str]) -> str:
-    text = "\0".join(f"{key}\0{value}" for key, value in sorted(entries.items()))
+def seal_holds(name: str, entries: Mapping[str, str], required: bool) -> bool:
+    """Whether the entries are as sealed; without a seal (another writer's), whether none is required."""
+    return sealed(name, entries) == entries if CHECKSUM in entries else not required
+
+
+def _checksum(name: str, entries: Mapping[str, str]) -> str:
+    text = "\0".join((name, *(part for item in sorted(entries.items()) for part in item)))
     return f"{zlib.crc32(text.encode()):08x}"
 
 
@@ -175,8 +175,8 @@ class RunWriter:
         self._file = McapFile(self.path, compression)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
         with self._file.discarding():
-            self._file.add_metadata(CONFIG, sealed({"yaml": config_yaml, **versions()}))
-            self._file.add_metadata(RUN, sealed(run.entries()))
+            self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **versions()}))
+            self._file.add_metadata(RUN, sealed(RUN, run.entries()))
 
     def reading(self, reading: Reading) -> None:
         """One raw reading, under its receive time."""
@@ -247,18 +247,24 @@ class _Encoder:
         self._channel = channel
         self._codec = topic.codec
         self._sequence = 0
-        self._length = MESSAGE_HEAD.size - 9 + self._codec.size
+        self._length = MESSAGE_HEAD.size - RECORD_HEAD.size + self._codec.size
         self._pack = struct.Struct(MESSAGE_HEAD.format + self._codec.format).pack
 
     def __call__(self, log_time: int, values: Values) -> bytes:
-        self._sequence = sequence = (self._sequence + 1) & 0xFFFFFFFF
+        number = (self._sequence + 1) & 0xFFFFFFFF
+        record = self._record(number, log_time, values)
+        self._sequence = number  # only now: a message that does not fit leaves no gap
+        return record
+
+    def _record(self, number: int, log_time: int, values: Values) -> bytes:
         if self._codec.flat:
             flat = self._codec.flatten(values)
             return self._pack(
-                Opcode.MESSAGE, self._length, self._channel, sequence, log_time, log_time, ENCAPSULATION, *flat
+                Opcode.MESSAGE, self._length, self._channel, number, log_time, log_time, ENCAPSULATION, *flat
             )
         body = self._codec.encode(values)
-        return MESSAGE_HEAD.pack(Opcode.MESSAGE, 22 + len(body), self._channel, sequence, log_time, log_time) + body
+        length = MESSAGE_HEAD.size - RECORD_HEAD.size + len(body)
+        return MESSAGE_HEAD.pack(Opcode.MESSAGE, length, self._channel, number, log_time, log_time) + body
 
 
 def _define(file: McapFile, topics: Iterable[Topic]) -> dict[str, _Encoder]:

@@ -17,7 +17,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from estimator.blocks import MAX_WASTE, Block, Contents, Damaged, Texts, Walk, records, split, unpack
+from estimator.blocks import MAX_CHUNK, MAX_WASTE, Block, Contents, Damaged, Texts, Walk, records, split, unpack
 from estimator.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
 from estimator.mcapfile import (
     LIBRARY,
@@ -33,6 +33,7 @@ from estimator.recording import CHECKSUM, CONFIG, RAW_TOPICS, RECOVERED, RUN, Ru
 
 MAX_KEPT = 64 << 20  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_LINES = 100
+_COST = 100  # [bytes] that could be read in the time one message takes that then is not good
 _PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
 _CDR_LE = 0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
 
@@ -109,7 +110,8 @@ class Recording:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)  # all intact records
     damage: list[str] = field(default_factory=list)  # what is not right, one line each
     closed: bool = False  # ends with an intact index
-    lost: int = 0  # messages known to be missing, by the file's own count; a cut end is not known
+    lost: int = 0  # messages known to be missing, by the file's own count
+    counted: bool = False  # the file says how many messages it had, so that `lost` is all that is lost
     unverified: int = 0  # messages under no checksum; other writers may leave such
     attachments: int = 0
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
@@ -121,6 +123,11 @@ class Recording:
     def complete(self) -> bool:
         """Closed, and nothing is missing."""
         return self.closed and not self.damage
+
+    @property
+    def saved(self) -> bool:
+        """Nothing that was written is lost, though the file may be unclosed or its index damaged."""
+        return not self.damage or (self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys())
 
     @property
     def recovered(self) -> dict[str, str]:
@@ -205,10 +212,12 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
 def _with_metadata(recording: Recording, contents: Contents) -> Recording:
     recording.attachments = contents.attachments
     for name, entries in contents.metadata.items():
-        if seal_holds(entries):
+        if seal_holds(name, entries, required=contents.library.startswith(LIBRARY) and name.startswith("gritd.")):
             recording.metadata[name] = entries
         else:
             recording.damage.append(f"metadata {name}: its checksum does not hold; ignored")
+    if contents.library == LIBRARY:
+        recording.damage += [f"metadata {name} is missing" for name in (CONFIG, RUN) if name not in recording.metadata]
     config = dict(recording.metadata.get(CONFIG, {}))
     recording.config_yaml = config.pop("yaml", None)
     recording.versions = {key: value for key, value in config.items() if key != CHECKSUM}
@@ -238,7 +247,7 @@ class _Check:
                 self._block(file, block)
             except Damaged as why:
                 self._recording.damage.append(f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}")
-                self._waste += block.stored + min(block.size, MAX_WASTE // 4)
+                self._waste += block.stored + min(block.size, MAX_CHUNK)
             if self._waste > MAX_WASTE:
                 self._recording.damage.append(f"byte {block.start}: too much damage; the rest is not read")
                 break
@@ -251,6 +260,7 @@ class _Check:
             self._define(opcode, content[start:end])
         chunk, complaints = _select(content, starts, self._recording.sources)
         self._recording.damage += [f"byte {block.start}: {complaint}" for complaint in complaints]
+        self._waste += _COST * (len(starts) - len(chunk.starts))
         self._keep(block, chunk)
 
     def _keep(self, block: Block, chunk: Chunk) -> None:
@@ -281,6 +291,7 @@ class _Check:
 
     def _count_lost(self, expected: dict[int, int], numbered: bool) -> None:
         if expected:
+            self._recording.counted = True
             counted = {channel: entry[2] for channel, entry in self._numbers.items()}
             lost = sum(max(0, count - counted.get(channel, 0)) for channel, count in expected.items())
         else:

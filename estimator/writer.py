@@ -104,7 +104,10 @@ class WriterThread:
         A disk that hangs is left alone after `timeout` [s]; the state is then not "closed".
         """
         self._stopping.set()
-        self._thread.join(timeout)
+        if self._thread.ident is None:  # never started
+            self._attempt(self._finish)
+        else:
+            self._thread.join(timeout)
         return self.status()
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of everything that a damaged or unclosed one still holds."""
+"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of all that a damaged or unclosed one still holds."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def main(argv: Sequence[str]) -> int:
     for line in recording.damage:
         print(f"{source}: {line}", file=sys.stderr)
     print(f"{target}: {summary(recording)}")
-    return 3 if recording.damage or recording.attachments else 0
+    return 0 if recording.saved and not recording.attachments else 3
 
 
 def recover(recording: Recording, target: Path) -> None:
@@ -49,8 +49,8 @@ def recover(recording: Recording, target: Path) -> None:
             file.define(source.schema, source.channel)
         for name, entries in recording.metadata.items():
             if name != RECOVERED:
-                file.add_metadata(name, entries)
-        file.add_metadata(RECOVERED, sealed(_note(recording)))
+                file.add_metadata(name, sealed(name, entries) if name.startswith("gritd.") else entries)
+        file.add_metadata(RECOVERED, sealed(RECOVERED, _note(recording)))
         for chunk in recording.chunks():
             file.add_chunk(*chunk.records())
         file.close()
@@ -62,10 +62,10 @@ def summary(recording: Recording) -> str:
     if recording.complete:
         return f"{saved}; the recording was complete"
     ending = "closed" if recording.closed else "not closed"
-    if not recording.damage:
+    if recording.saved:
         return f"{saved}; it was {ending}, nothing in it is lost"
-    count = f"{recording.lost} messages" if recording.lost else "an unknown number of messages"
-    return f"{saved}; it was {ending}, {count} lost in {len(recording.damage)} places"
+    count = f"{recording.lost}" if recording.counted else f"{recording.lost} or more"
+    return f"{saved}; it was {ending}, {count} messages are lost"
 
 
 def _note(recording: Recording) -> dict[str, str]:

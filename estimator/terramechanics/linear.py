@@ -17,6 +17,7 @@ stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,15 @@ class Exponent(NamedTuple):
     slip: Value
 
 
+class Shift(NamedTuple):
+    """What another stress distribution adds to A₁ … C₃, and its derivatives (see estimator/correction.py)."""
+
+    value: Integrals
+    theta_1: Integrals
+    slip: Integrals
+    ln_k: Integrals
+
+
 class Prediction(NamedTuple):
     """What the closed forms say of a wheel under load, and the gradients in the order of GRADIENT."""
 
@@ -74,20 +84,30 @@ class Forces(NamedTuple):
 
 
 def predict(
-    wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, load: Value, maths: Maths = NUMBERS
+    wheel: Wheel,
+    c: Value,
+    tan_phi: Value,
+    k: Value,
+    theta_1: Value,
+    slip: Value,
+    load: Value,
+    maths: Maths = NUMBERS,
+    shift: Shift | None = None,
 ) -> Prediction:
     """T, DP, resistance and σₘ under a load W, with gradients with respect to GRADIENT. Eqs. (20)-(22), (19), (5).
 
-    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats.
+    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are those of the stresses it
+    stands for.
     """
     ratio, ratio_slip = _peak_ratio(wheel, slip, maths)
     exponent = shear_exponent(wheel, k, theta_1, slip, maths)
     both = _kernels(theta_1, ratio, exponent.f, maths)
-    x = _integrals(theta_1, exponent.f, both, maths)
+    bare = _integrals(theta_1, exponent.f, both, maths)
+    x = _added(bare, shift.value) if shift else bare
     s = _scaled_peak(wheel, x, c, tan_phi, theta_1, load)
 
     at = _At(wheel, x, tan_phi, s)
-    by_theta_1 = at.along(c, *_theta_1_derivative(theta_1, exponent.f, x, both, maths))
+    by_theta_1 = at.along(c, *_theta_1_derivative(theta_1, exponent.f, bare, both, maths))
     by_f = at.along(c, *_f_derivative(theta_1, both, maths))
     by_ratio = at.along(c, *_ratio_derivative(theta_1, exponent.f, both, maths)) if wheel.c2 else (0.0, 0.0, 0.0)
     columns = (
@@ -98,6 +118,8 @@ def predict(
         [exponent.slip * f + ratio_slip * by for f, by in zip(by_f, by_ratio, strict=True)],
         at.response(1.0 / (wheel.radius * wheel.width), 0.0, 0.0, 0.0),
     )
+    if shift:
+        columns = tuple(map(_summed, columns, at.along_shift(c, theta_1, shift)))
     forces = _forces(wheel, x, c * theta_1, tan_phi, s)
     gradients = tuple(zip(*columns, strict=True))
     return Prediction(forces.torque, forces.drawbar_pull, forces.resistance, maths.divide(s, theta_1), *gradients)
@@ -115,10 +137,19 @@ def predict_batch(
 
 
 def forces_under_load(
-    wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, load: Value, maths: Maths = NUMBERS
+    wheel: Wheel,
+    c: Value,
+    tan_phi: Value,
+    k: Value,
+    theta_1: Value,
+    slip: Value,
+    load: Value,
+    maths: Maths = NUMBERS,
+    shift: Shift | None = None,
 ) -> Forces:
     """`predict` without gradients: a third of its cost, for a search over slip."""
     x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], shear_exponent(wheel, k, theta_1, slip, maths).f, maths)
+    x = _added(x, shift.value) if shift else x
     return _forces(wheel, x, c * theta_1, tan_phi, _scaled_peak(wheel, x, c, tan_phi, theta_1, load))
 
 
@@ -278,6 +309,14 @@ def _forces(wheel: Wheel, x: Integrals, c: Value, tan_phi: Value, s: Value) -> F
     return Forces(drawbar_pull, load, torque, resistance)
 
 
+def _added(x: Integrals, change: Integrals) -> Integrals:
+    return Integrals(*[a + b for a, b in zip(x, change, strict=True)])
+
+
+def _summed(column: Sequence[Value], change: Sequence[Value]) -> list[Value]:
+    return [a + b for a, b in zip(column, change, strict=True)]
+
+
 class _At(NamedTuple):
     """The point at which (20)-(22), with s = σₘθ₁ from (21), are differentiated."""
 
@@ -310,3 +349,10 @@ class _At(NamedTuple):
             c * cohesive.c1 + friction * dx.c2,
             s * dx.c3,
         )
+
+    def along_shift(self, c: Value, theta_1: Value, shift: Shift) -> tuple[Sequence[Value], ...]:
+        """What a shift adds to the columns of the gradient, in the order of GRADIENT."""
+        none = (0.0, 0.0, 0.0)
+        grown = Integrals(*[a + theta_1 * b for a, b in zip(shift.value, shift.theta_1, strict=True)])
+        by_ln_k, by_slip = (self.along(c, Integrals(*[theta_1 * d for d in dx]), dx) for dx in (shift.ln_k, shift.slip))
+        return none, none, by_ln_k, self.along(c, grown, shift.theta_1), by_slip, none

@@ -1,0 +1,29 @@
+"""What the filter's closed forms miss of the integrals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from estimator.effects.base import Effect, Fingerprint, strength, told_apart
+
+
+@dataclass(frozen=True)
+class StressLinearisation(Effect):
+    """The filter's triangular stresses stand for the true ones; this gives back what they miss.
+
+    T = T₂₂ [1 + s (ratio − 1)],   DP = DP₂₀ + s W pull
+
+    ratio and pull are surfaces over θ₁ and i, from Eqs. (8)-(10) at the prior soil.
+
+    Acts in the on-line filter alone, through estimator/correction.py: simulator and diagnosis integrate (3), (4), (7)
+    themselves. Source: difference of (8)-(10) from (20)-(22), Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42.
+    """
+
+    share: float = strength("share of the difference given back, s", "", typical=1.0, low=0.0, high=1.0)
+
+    stage = "contact"
+    fingerprint = Fingerprint(
+        "torque", "slip", "closed-form torque too small at low slip and deep sinkage; c seems smaller, tan φ larger"
+    )
+    confusable_with = told_apart(torque_constant_error="slip_step", stress_peak_shift="penetration")
+    only_on_line = True

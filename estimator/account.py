@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from estimator.filter import KPA, LN_K, TAN_PHI, C, Estimate
-from estimator.measurement import COMPONENTS, Measurement, Predicted, soil
-from estimator.model import Prediction, Quantity
+from estimator.measurement import COMPONENTS, Measurement, soil
 from estimator.record import NOT_A_NUMBER
 from estimator.sync import Measured
 from estimator.tracker import Account, Aid, Tracker, TrackState
@@ -15,27 +14,24 @@ from estimator.wheel_state import WheelState
 Record = dict[str, float]
 
 NO_AID = Aid(0.0, 0.0, 0.0, 0.0, 0.0, False)
-LABELS: dict[Predicted, str] = {
-    "torque": "torque_predicted",
-    "drawbar_pull": "drawbar_pull_predicted",
-    "resistance": "rolling_resistance",
-}
+NOTHING = Measured(NOT_A_NUMBER, NOT_A_NUMBER)
+Pull = tuple[float, float, float]  # largest drawbar pull [N], its σ [N], its slip
 
 
-def record(tracker: Tracker, state: TrackState, account: Account) -> Record:
-    """The fields of /tick that the tracker knows; times in ns, everything else SI."""
+def record(tracker: Tracker, state: TrackState, account: Account, pull: Pull) -> Record:
+    """The fields of /tick that the tracker knows, and the largest pull; times in ns, everything else SI."""
     return {
         **_condition(tracker, state, account),
         **_measured(account),
         **_estimated(state.estimate),
-        **_predicted(tracker.measurement, state.estimate, account.now, account.prediction),
+        **_predicted(tracker.measurement, state.estimate, account),
+        **_largest(pull),
         **_aids(account.aids),
     }
 
 
 def _condition(tracker: Tracker, state: TrackState, account: Account) -> Record:
     snapshot = account.snapshot
-    pull, pull_sigma, pull_slip = state.largest_pull
     return {
         "evaluated": snapshot.evaluated,
         "status": int(account.status),
@@ -46,9 +42,6 @@ def _condition(tracker: Tracker, state: TrackState, account: Account) -> Record:
         "consistency": state.consistency,
         "updates": state.updates,
         "resets": state.resets,
-        "drawbar_pull_max": pull,
-        "drawbar_pull_max_sigma": pull_sigma,
-        "drawbar_pull_max_slip": pull_slip,
     }
 
 
@@ -84,18 +77,25 @@ def _estimated(estimate: Estimate) -> Record:
     }
 
 
-def _predicted(measurement: Measurement, estimate: Estimate, now: WheelState, prediction: Prediction | None) -> Record:
-    if prediction is None:
-        nothing = Measured(NOT_A_NUMBER, NOT_A_NUMBER)
-        return {
-            key: value for label in (*LABELS.values(), "load_predicted") for key, value in _pair(label, nothing).items()
-        }
-    record: Record = {}
-    for which, label in LABELS.items():
-        quantity: Quantity = getattr(prediction, which)
-        record |= _pair(label, Measured(quantity.value, measurement.sigma(estimate, now, prediction, which)))
-    load = measurement.model.load(*soil(estimate), _angle(now), now.theta_m, now.slip.value)
-    return record | _pair("load_predicted", load)
+def _predicted(measurement: Measurement, estimate: Estimate, account: Account) -> Record:
+    """What the estimate says of this window: NaN where the wheel touches nothing."""
+    torque = pull = resistance = load = NOTHING
+    now = account.now
+    if account.touching:
+        prediction = measurement.predict(estimate, now)
+        sigmas = measurement.sigmas(estimate, now, prediction)
+        torque, pull, resistance = [Measured(q.value, sigma) for q, sigma in zip(prediction, sigmas, strict=True)]
+        load = measurement.model.load(*soil(estimate), _angle(now), now.theta_m, now.slip.value)
+    return {
+        **_pair("torque_predicted", torque),
+        **_pair("drawbar_pull_predicted", pull),
+        **_pair("rolling_resistance", resistance),
+        **_pair("load_predicted", load),
+    }
+
+
+def _largest(pull: Pull) -> Record:
+    return dict(zip(("drawbar_pull_max", "drawbar_pull_max_sigma", "drawbar_pull_max_slip"), pull, strict=True))
 
 
 def _aids(aids: tuple[Aid, ...]) -> Record:

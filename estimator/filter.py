@@ -12,6 +12,7 @@ zeroed rows included, so the covariance stays symmetric and positive.
 
 from __future__ import annotations
 
+from operator import mul
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -96,42 +97,45 @@ def _rows(matrix: np.ndarray) -> Matrix:
 
 def predict(estimate: Estimate, walk: Vector) -> Estimate:
     """Random walk: add the variances `walk` (3,) to the diagonal of P."""
-    P = estimate.P
-    grown = tuple(tuple(value + walk[i] if i == j else value for j, value in enumerate(row)) for i, row in enumerate(P))
-    return Estimate(estimate.x, grown, estimate.cross)
+    (a, b, c), (_, d, e), (_, _, f) = estimate.P
+    a, d, f = a + walk[0], d + walk[1], f + walk[2]
+    return Estimate(estimate.x, ((a, b, c), (b, d, e), (c, e, f)), estimate.cross)
 
 
 def innovation_covariance(estimate: Estimate, update: Update, variances: Vector) -> Matrix:
     """S = H P Hᵀ + H C Gᵀ + G Cᵀ Hᵀ + G V Gᵀ + R (m, m), with C the cross covariance and V the nuisances' variances."""
-    state, nuisance = crossed(estimate, update, variances)
-    m = range(len(update.innovation))
+    seen = [crossed(estimate, variances, h, g) for h, g in zip(update.H, update.G, strict=True)]
     return tuple(
-        tuple(dot(update.H[a], state[b]) + dot(update.G[a], nuisance[b]) + update.R[a][b] for b in m) for a in m
+        [
+            tuple([dot(h, state) + dot(g, nuisance) + r for (state, nuisance), r in zip(seen, row, strict=True)])
+            for h, g, row in zip(update.H, update.G, update.R, strict=True)
+        ]
     )
 
 
-def crossed(estimate: Estimate, update: Update, variances: Vector) -> tuple[Matrix, Matrix]:
-    """Covariance of state and nuisances with each predicted component: (m, 3) and (m, q)."""
-    state = tuple(
-        tuple([dot(row, h) + dot(cross, g) for row, cross in zip(estimate.P, estimate.cross, strict=True)])
-        for h, g in zip(update.H, update.G, strict=True)
+def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tuple[Vector, Vector]:
+    """Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and g (q,)."""
+    h0, h1, h2 = h
+    (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
+    c0, c1, c2 = estimate.cross
+    state = (
+        p00 * h0 + p01 * h1 + p02 * h2 + dot(c0, g),
+        p01 * h0 + p11 * h1 + p12 * h2 + dot(c1, g),
+        p02 * h0 + p12 * h1 + p22 * h2 + dot(c2, g),
     )
-    (c0, c1, c2) = estimate.cross
-    nuisance = tuple(
-        tuple([a * h[0] + b * h[1] + c * h[2] + v * w for a, b, c, v, w in zip(c0, c1, c2, variances, g, strict=True)])
-        for h, g in zip(update.H, update.G, strict=True)
-    )
-    return state, nuisance
+    nuisance = [a * h0 + b * h1 + c * h2 + v * w for a, b, c, v, w in zip(c0, c1, c2, variances, g, strict=True)]
+    return state, tuple(nuisance)
 
 
 def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
     """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never negative."""
-    state, nuisance = crossed(estimate, Update((0.0,), (h,), (g,), ((0.0,),)), variances)
-    return max(dot(h, state[0]) + dot(g, nuisance[0]), 0.0)
+    state, nuisance = crossed(estimate, variances, h, g)
+    return max(dot(h, state) + dot(g, nuisance), 0.0)
 
 
 def dot(a: Vector, b: Vector) -> float:
-    return sum([u * v for u, v in zip(a, b, strict=True)])
+    total: float = sum(map(mul, a, b))
+    return total
 
 
 def project(estimate: Estimate, bounds: tuple[tuple[float, float], ...]) -> Estimate:
@@ -139,6 +143,8 @@ def project(estimate: Estimate, bounds: tuple[tuple[float, float], ...]) -> Esti
 
     The covariance is kept: a bound is knowledge of the state, not a measurement that narrows it.
     """
+    if all([low <= value <= high for value, (low, high) in zip(estimate.x, bounds, strict=True)]):
+        return estimate
     x, P = list(estimate.x), estimate.P
     for j, (low, high) in enumerate(bounds):
         step = min(max(x[j], low), high) - x[j]

@@ -22,10 +22,12 @@ class Slip(NamedTuple):
 
 
 def slip(rim_speed: float, travel_speed: float) -> Slip:
-    """Slip i from the rim speed rω and the travel speed v, both [m/s] along the direction of travel, not both zero.
+    """Slip i from the rim speed rω and the travel speed v, both [m/s] along the direction of travel; 0 at rest.
 
     Defined for rω ≥ 0 or v ≥ 0; opposed motions saturate at ±1 with zero derivatives.
     """
+    if rim_speed == travel_speed == 0.0:
+        return Slip(0.0, 0.0, 0.0)
     if rim_speed >= travel_speed:
         if travel_speed < 0.0:
             return Slip(1.0, 0.0, 0.0)

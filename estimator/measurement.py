@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from math import exp, isnan, sqrt
-from typing import Literal
+from operator import mul
 
-from estimator.filter import KPA, Estimate, Matrix, Update, Vector, variance
+from estimator.filter import KPA, Estimate, Matrix, Update, Vector, dot, variance
 from estimator.model import Prediction, Quantity, WheelModel
 from estimator.nuisance import Sensitivity, nuisances
 from estimator.settings import Settings
 from estimator.wheel_state import WheelState
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
-
-Predicted = Literal["torque", "drawbar_pull", "resistance"]
 
 
 class Measurement:
@@ -30,52 +28,55 @@ class Measurement:
 
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
         """Innovation, H, G and R of the components that are measured: T always, DP where there is a sensor."""
-        sensed = [(now.torque, prediction.torque)]
-        if not isnan(now.drawbar_pull.value):
-            sensed.append((now.drawbar_pull, prediction.drawbar_pull))
+        torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity = _sensitivity(now, prediction)
-        columns = [nuisance.gradient(sensitivity) for nuisance in self.nuisances]
-        return Update(
-            innovation=tuple([measured.value - quantity.value for measured, quantity in sensed]),
-            H=tuple([_state_gradient(quantity) for _, quantity in sensed]),
-            G=tuple([tuple([column[row] for column in columns]) for row in range(len(sensed))]),
-            R=self._noise(now, sensitivity, [measured.sigma for measured, _ in sensed]),
+        update = Update(
+            innovation=(now.torque.value - torque.value, now.drawbar_pull.value - pull.value),
+            H=(_state_gradient(torque), _state_gradient(pull)),
+            G=self._nuisance_gradients(sensitivity),
+            R=self._noise(now, sensitivity),
+        )
+        return selected(update, (0,)) if isnan(now.drawbar_pull.value) else update
+
+    def _nuisance_gradients(self, s: Sensitivity) -> Matrix:
+        """G (2, q)."""
+        columns = [nuisance.gradient(s) for nuisance in self.nuisances]
+        return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
+
+    def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
+        """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians, which T and DP share."""
+        sigmas = (now.sinkage.sigma, now.slip.sigma, now.load.sigma)
+        by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
+        torque, pull = tuple(map(mul, by_torque, sigmas)), tuple(map(mul, by_pull, sigmas))
+        torque_model, pull_model = self.model.residual_sigma(s)
+        common = dot(torque, pull)
+        return (
+            (dot(torque, torque) + now.torque.sigma**2 + torque_model**2, common),
+            (common, dot(pull, pull) + now.drawbar_pull.sigma**2 + pull_model**2),
         )
 
-    def _noise(self, now: WheelState, s: Sensitivity, own: list[float]) -> Matrix:
-        """Each component's own noise, and that of z, i and W through the Jacobians, which T and DP share."""
-        shared = ((s.by_sinkage, now.sinkage.sigma), (s.by_slip, now.slip.sigma), (s.by_load, now.load.sigma))
-        model = self.model.residual_sigma(s)
+    def sigmas(self, estimate: Estimate, now: WheelState, prediction: Prediction) -> tuple[float, float, float]:
+        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's z, i and W."""
+        torque, pull = self._nuisance_gradients(_sensitivity(now, prediction))
+        return (
+            self._sigma(estimate, now, prediction.torque, torque),
+            self._sigma(estimate, now, prediction.drawbar_pull, pull),
+            self._sigma(estimate, now, prediction.resistance, (0.0,) * len(torque)),
+        )
 
-        def entry(a: int, b: int) -> float:
-            common = sum([gradient[a] * gradient[b] * sigma * sigma for gradient, sigma in shared])
-            return common + own[a] ** 2 + model[a] ** 2 if a == b else common
-
-        size = range(len(own))
-        return tuple([tuple([entry(a, b) for b in size]) for a in size])
-
-    def sigma(self, estimate: Estimate, now: WheelState, prediction: Prediction, which: Predicted) -> float:
-        """σ of a predicted quantity: of the state, of the nuisances, and of this window's z, i and W."""
-        quantity: Quantity = getattr(prediction, which)
-        sensitivity = _sensitivity(now, prediction)
-        if which in COMPONENTS:
-            row = COMPONENTS.index(which)
-            nuisance = tuple([nuisance.gradient(sensitivity)[row] for nuisance in self.nuisances])
-        else:
-            nuisance = (0.0,) * len(self.nuisances)
+    def _sigma(self, estimate: Estimate, now: WheelState, quantity: Quantity, nuisance: Vector) -> float:
         noise = (
             quantity.by_theta_1 * now.theta_1.d_sinkage * now.sinkage.sigma,
             quantity.by_slip * now.slip.sigma,
             quantity.by_load * now.load.sigma,
         )
-        state = variance(estimate, self.variances, _state_gradient(quantity), nuisance)
-        return sqrt(state + sum([part * part for part in noise]))
+        return sqrt(variance(estimate, self.variances, _state_gradient(quantity), nuisance) + dot(noise, noise))
 
     def largest_pull(self, estimate: Estimate, now: WheelState) -> tuple[float, float, float]:
         """Largest DP over slip at this load and sinkage [N], its σ, and its slip."""
         best = self.model.best_slip(*soil(estimate), now.theta_1.value, now.load.value)
         prediction = self.model.predict(*soil(estimate), now.theta_1.value, best, now.load.value)
-        return prediction.drawbar_pull.value, self.sigma(estimate, now, prediction, "drawbar_pull"), best
+        return prediction.drawbar_pull.value, self.sigmas(estimate, now, prediction)[1], best
 
 
 def soil(estimate: Estimate) -> tuple[float, float, float]:
@@ -86,6 +87,8 @@ def soil(estimate: Estimate) -> tuple[float, float, float]:
 
 def selected(update: Update, components: tuple[int, ...]) -> Update:
     """The measurement reduced to some of its components."""
+    if len(components) == len(update.innovation):
+        return update
     return Update(
         tuple([update.innovation[a] for a in components]),
         tuple([update.H[a] for a in components]),

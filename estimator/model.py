@@ -8,7 +8,7 @@ from typing import NamedTuple
 from estimator.nuisance import Sensitivity
 from estimator.settings import Settings
 from estimator.sync import Measured
-from estimator.terramechanics import linear
+from estimator.terramechanics import linear, scalar
 
 SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)  # where the largest drawbar pull is looked for
 
@@ -42,7 +42,7 @@ class WheelModel:
 
     def predict(self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
-        p = linear.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
+        p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
         return Prediction(
             Quantity(p.torque, *p.torque_gradient),
             Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.account import Record, record
+from estimator.account import Pull, Record, record
 from estimator.readings import Reading
 from estimator.record import NOT_A_NUMBER, TICK_FIELDS, Flag
 from estimator.settings import Settings
@@ -23,6 +23,7 @@ class State:
 
     sync: Sync
     track: TrackState
+    pull: Pull = (NOT_A_NUMBER,) * 3  # as of the last update
     first: int = -1  # time of the first tick [ns]
     late: int = 0
     jumps: int = 0
@@ -45,12 +46,13 @@ class Pipeline:
         for reading in readings:
             sync.push(reading)
         track, account = self.tracker.step(state.track, sync.snapshot(t))
+        pull = self.tracker.measurement.largest_pull(track.estimate, account.now) if account.aids else state.pull
         first = t if state.first < 0 else state.first
         counters = sync.counters
         flags = account.flags
         flags |= Flag.LATE_READINGS if counters.late > state.late else Flag.NONE
         flags |= Flag.COUNTER_JUMP if counters.jumps > state.jumps else Flag.NONE
-        fields = _DEFAULTS | record(self.tracker, track, account)
+        fields = _DEFAULTS | record(self.tracker, track, account, pull)
         fields.update(
             stamp=t,
             sequence=round((t - first) / self._period),
@@ -61,4 +63,4 @@ class Pipeline:
             jumps=counters.jumps,
             invalid=counters.invalid,
         )
-        return State(sync, track, first, counters.late, counters.jumps), tuple(fields.values())
+        return State(sync, track, pull, first, counters.late, counters.jumps), tuple(fields.values())

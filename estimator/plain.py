@@ -1,7 +1,10 @@
 """The filter's algebra in plain floats: the engine of fast replay, equal to filterpy's to rounding.
 
-One or two measured components; the gain is formed with the explicit inverse of the 1×1 or 2×2 innovation covariance,
-and only the rows of the state are touched, because a considered nuisance never changes.
+Only the rows of the state are touched, because a considered nuisance never changes. With M = P Hᵀ + C Gᵀ and
+N = Cᵀ Hᵀ + V Gᵀ, the covariances of state and nuisances with what is predicted, and S that of the innovations,
+Joseph's form reads, for any gain K,
+
+    P − K Mᵀ + (K S − M) Kᵀ        and for the correlation with the nuisances        C − K Nᵀ
 """
 
 from __future__ import annotations
@@ -10,63 +13,70 @@ from estimator.filter import LN_K, STATES, Estimate, Matrix, Update, Vector, cro
 
 
 class PlainEngine:
-    """See filter.Engine."""
+    """See filter.Engine. One or two measured components, written out: loops over two cost more than the algebra."""
 
     def __init__(self, nuisance_variances: Vector) -> None:
         self._variances = nuisance_variances
 
     def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
-        state, nuisance = crossed(estimate, update, self._variances)
-        inverse = _inverse(_innovation(state, nuisance, update))
-        gain = [tuple([dot(row, column) for row in inverse]) for column in zip(*state, strict=True)]
-        if consider_k:
-            gain[LN_K] = (0.0,) * len(inverse)
-        x = tuple([value + dot(k, update.innovation) for value, k in zip(estimate.x, gain, strict=True)])
-        cross = _shrink(estimate.cross, gain, nuisance)
-        return Estimate(x, _joseph(_shrink(estimate.P, gain, state), cross, gain, update), cross)
+        apply = self._one if len(update.innovation) == 1 else self._two
+        return apply(estimate, update, LN_K if consider_k else STATES)
 
-
-def _innovation(state: Matrix, nuisance: Matrix, update: Update) -> Matrix:
-    """S, from the covariances of state and nuisances with the predicted components."""
-    h, g = update.H[0], update.G[0]
-    first = dot(h, state[0]) + dot(g, nuisance[0]) + update.R[0][0]
-    if len(update.H) == 1:
-        return ((first,),)
-    both = dot(h, state[1]) + dot(g, nuisance[1]) + update.R[0][1]
-    second = dot(update.H[1], state[1]) + dot(update.G[1], nuisance[1]) + update.R[1][1]
-    return ((first, both), (both, second))
-
-
-def _inverse(S: Matrix) -> Matrix:
-    if len(S) == 1:
-        return ((1.0 / S[0][0],),)
-    (a, b), (_, d) = S
-    determinant = a * d - b * b
-    return ((d / determinant, -b / determinant), (-b / determinant, a / determinant))
-
-
-def _shrink(rows: Matrix, gain: list[Vector], seen: Matrix) -> Matrix:
-    """rows − K seen: the left factor (I − KH) of Joseph's form."""
-    if len(seen) == 1:
-        only = seen[0]
-        return tuple(
-            [tuple([r - k[0] * s for r, s in zip(row, only, strict=True)]) for row, k in zip(rows, gain, strict=True)]
+    def _one(self, estimate: Estimate, update: Update, states: int) -> Estimate:
+        (y,), (h,), (g,), ((r,),) = update
+        m, n = crossed(estimate, self._variances, h, g)
+        s = dot(h, m) + dot(g, n) + r
+        gain = _kept([value / s for value in m], states)
+        x = tuple([value + k * y for value, k in zip(estimate.x, gain, strict=True)])
+        cross = tuple(
+            [
+                tuple([c - k * seen for c, seen in zip(row, n, strict=True)])
+                for row, k in zip(estimate.cross, gain, strict=True)
+            ]
         )
-    first, second = seen
-    return tuple(
-        [
-            tuple([r - k[0] * s - k[1] * t for r, s, t in zip(row, first, second, strict=True)])
-            for row, k in zip(rows, gain, strict=True)
+        rest = [k * s - value for k, value in zip(gain, m, strict=True)]
+        P = [
+            [p + e * k - d * value for p, k, value in zip(row, gain, m, strict=True)]
+            for row, d, e in zip(estimate.P, gain, rest, strict=True)
         ]
-    )
+        return Estimate(x, _symmetric(P), cross)
+
+    def _two(self, estimate: Estimate, update: Update, states: int) -> Estimate:
+        (y, z), (h_y, h_z), (g_y, g_z), ((r_y, r_yz), (_, r_z)) = update
+        m_y, n_y = crossed(estimate, self._variances, h_y, g_y)
+        m_z, n_z = crossed(estimate, self._variances, h_z, g_z)
+        s_y = dot(h_y, m_y) + dot(g_y, n_y) + r_y
+        s_yz = dot(h_y, m_z) + dot(g_y, n_z) + r_yz
+        s_z = dot(h_z, m_z) + dot(g_z, n_z) + r_z
+        determinant = s_y * s_z - s_yz * s_yz
+        a, b, d = s_z / determinant, -s_yz / determinant, s_y / determinant
+        k_y = _kept([a * u + b * v for u, v in zip(m_y, m_z, strict=True)], states)
+        k_z = _kept([b * u + d * v for u, v in zip(m_y, m_z, strict=True)], states)
+        x = tuple([value + k * y + q * z for value, k, q in zip(estimate.x, k_y, k_z, strict=True)])
+        cross = tuple(
+            [
+                tuple([c - k * u - q * v for c, u, v in zip(row, n_y, n_z, strict=True)])
+                for row, k, q in zip(estimate.cross, k_y, k_z, strict=True)
+            ]
+        )
+        e_y = [k * s_y + q * s_yz - u for k, q, u in zip(k_y, k_z, m_y, strict=True)]
+        e_z = [k * s_yz + q * s_z - v for k, q, v in zip(k_y, k_z, m_z, strict=True)]
+        P = [
+            [
+                p - k_y[i] * u - k_z[i] * v + e_y[i] * k + e_z[i] * q
+                for p, u, v, k, q in zip(row, m_y, m_z, k_y, k_z, strict=True)
+            ]
+            for i, row in enumerate(estimate.P)
+        ]
+        return Estimate(x, _symmetric(P), cross)
 
 
-def _joseph(left: Matrix, cross: Matrix, gain: list[Vector], update: Update) -> Matrix:
-    """(I − KH) P (I − KH)ᵀ + K R Kᵀ on the state's rows, for any gain K; left and cross carry the left factor."""
-    components = list(zip(update.H, update.G, strict=True))
-    seen = [[dot(row, h) + dot(c, g) for h, g in components] for row, c in zip(left, cross, strict=True)]
-    pull = [
-        [dot(k, noise) - s for noise, s in zip(update.R, row, strict=True)] for k, row in zip(gain, seen, strict=True)
-    ]  # K R − (I − KH) P Hᵀ
-    lower = [[left[i][j] + dot(tuple(pull[i]), gain[j]) for j in range(i + 1)] for i in range(STATES)]
-    return tuple(tuple(lower[max(i, j)][min(i, j)] for j in range(STATES)) for i in range(STATES))
+def _kept(gain: list[float], states: int) -> list[float]:
+    """The gain with the rows of considered states set to zero."""
+    return gain if states == STATES else [*gain[:states], *(0.0,) * (STATES - states)]
+
+
+def _symmetric(P: list[list[float]]) -> Matrix:
+    """The lower triangle, mirrored."""
+    (a, _, _), (b, d, _), (c, e, f) = P
+    return (a, b, c), (b, d, e), (c, e, f)

@@ -6,7 +6,6 @@ clock and keeps nothing between calls.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from math import exp, hypot, log, sqrt
 from typing import NamedTuple
 
@@ -26,7 +25,6 @@ from estimator.filter import (
     project,
 )
 from estimator.measurement import Measurement, selected
-from estimator.model import Prediction
 from estimator.plain import PlainEngine
 from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
 from estimator.segments import CAPACITY, Memory, Stretch
@@ -64,13 +62,16 @@ class Account(NamedTuple):
     snapshot: Snapshot
     now: WheelState
     status: Status
-    flags: Flag
-    prediction: Prediction | None  # at the estimate after the update; None without contact
+    flags: int  # of Flag
     aids: tuple[Aid, ...]  # empty where nothing was offered to the filter
 
+    @property
+    def touching(self) -> bool:
+        """Whether the wheel is in the soil, so that there is something to predict."""
+        return self.snapshot.ready and self.now.theta_1.value > 0.0
 
-@dataclass(frozen=True)
-class TrackState:
+
+class TrackState(NamedTuple):
     """Everything the tracker remembers from window to window."""
 
     estimate: Estimate
@@ -84,7 +85,6 @@ class TrackState:
     last_reset: int = -1
     updates: int = 0
     resets: int = 0
-    largest_pull: tuple[float, float, float] = (NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER)  # value, σ [N], slip
 
     @property
     def consistency(self) -> float:
@@ -125,33 +125,28 @@ class Tracker:
         """Classify the window; when a whole new one has passed, and it is fit for it, update the filter."""
         now = wheel_state(self.settings, snapshot)
         status = classify(self.settings, snapshot, now, state.before, self._required)
-        touching = snapshot.ready and now.theta_1.value > 0.0
-        prediction = self.measurement.predict(state.estimate, now) if touching else None
         aids: tuple[Aid, ...] = ()
         if snapshot.evaluated - state.window_end >= self._window:
             elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
-            state = replace(state, window_end=snapshot.evaluated, before=now if snapshot.ready else None)
-            if status == Status.TRACKING and prediction is not None:
-                state, aids = self._update(state, now, prediction, elapsed)
-                prediction = self.measurement.predict(state.estimate, now)
-        return state, Account(snapshot, now, status, now.flags | self._flags(state, aids), prediction, aids)
+            state = state._replace(window_end=snapshot.evaluated, before=now if snapshot.ready else None)
+            if status == Status.TRACKING:
+                state, aids = self._update(state, now, elapsed)
+        return state, Account(snapshot, now, status, int(now.flags) | self._flags(state, aids), aids)
 
-    def _update(
-        self, state: TrackState, now: WheelState, prediction: Prediction, elapsed: float
-    ) -> tuple[TrackState, tuple[Aid, ...]]:
+    def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
         """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
-        state = _remember_slip(replace(state, estimate=self._walk(state.estimate, elapsed)), now.slip, elapsed)
-        update = self.measurement.linearise(now, prediction)
+        state = _remember_slip(state, now.slip, elapsed)
+        state = state._replace(estimate=self._walk(state.estimate, elapsed))
+        update = self.measurement.linearise(now, self.measurement.predict(state.estimate, now))
         aids = self._gate(state.estimate, now, update)
         taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
         if taken:
             estimate = self.engine.update(state.estimate, selected(update, taken), not self.estimates_k(state))
-            state = replace(state, estimate=project(estimate, self._bounds), updates=state.updates + 1)
+            state = state._replace(estimate=project(estimate, self._bounds), updates=state.updates + 1)
             state = self._remember(state, now, taken, elapsed)
         else:
-            state = replace(state, memory=state.memory.waited(elapsed))
-        state = self._judge(state, aids, elapsed)
-        return replace(state, largest_pull=self.measurement.largest_pull(state.estimate, now)), aids
+            state = state._replace(memory=state.memory.waited(elapsed))
+        return self._judge(state, aids, elapsed), aids
 
     def _walk(self, estimate: Estimate, elapsed: float) -> Estimate:
         """Random walk of the soil over the elapsed time [s]."""
@@ -179,14 +174,14 @@ class Tracker:
         """Add the window to the memory; when a new stretch begins, linearise all of them anew."""
         memory, begun = state.memory.extended(now, taken, self.settings.wheel.radius, elapsed)
         if not begun or len(memory.stretches) == 1:
-            return replace(state, memory=memory)
+            return state._replace(memory=memory)
         if len(memory.stretches) > CAPACITY:
             anchor = self._absorb(memory.anchor, memory.stretches[0], state)
             memory = Memory(anchor, memory.stretches[1:])
         estimate = memory.anchor
         for stretch in memory.stretches:
             estimate = self._absorb(estimate, stretch, state)
-        return replace(state, memory=memory, estimate=project(estimate, self._bounds))
+        return state._replace(memory=memory, estimate=project(estimate, self._bounds))
 
     def _absorb(self, estimate: Estimate, stretch: Stretch, state: TrackState) -> Estimate:
         """Update with a whole stretch, its Jacobians taken at the present estimate of `state`."""
@@ -206,13 +201,12 @@ class Tracker:
         """Keep the running consistency figure; back to the prior's covariance when it is out of all measure."""
         keep = exp(-elapsed / CONSISTENCY_MEMORY)
         surprise = keep * state.surprise + sum([aid.innovation**2 / aid.s for aid in aids])
-        state = replace(state, surprise=surprise, components=keep * state.components + len(aids))
+        state = state._replace(surprise=surprise, components=keep * state.components + len(aids))
         rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
         if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):
             return state
         estimate = self._unsure(state.estimate.x)
-        return replace(
-            state,
+        return state._replace(
             estimate=estimate,
             memory=Memory(estimate),
             surprise=0.0,
@@ -235,7 +229,7 @@ class Tracker:
         b = P[C][TAN_PHI] / (sigma_c * sigma_t)
         return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
 
-    def _flags(self, state: TrackState, aids: tuple[Aid, ...]) -> Flag:
+    def _flags(self, state: TrackState, aids: tuple[Aid, ...]) -> int:
         raised = {
             Flag.NOT_SEPARABLE: self.separability(state.estimate) > SEPARABLE,
             Flag.K_ESTIMATED: self.estimates_k(state),
@@ -243,7 +237,7 @@ class Tracker:
             Flag.RESET: bool(aids) and state.last_reset == state.window_end,
             Flag.MISMATCH: self._experienced(state) and state.consistency > MISMATCH,
         }
-        return Flag(sum(flag for flag, holds in raised.items() if holds))
+        return sum([flag for flag, holds in raised.items() if holds])
 
 
 def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackState:
@@ -252,7 +246,7 @@ def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackSt
     step = slip.value - state.slip_mean
     mean = state.slip_mean + (1.0 - keep) * step
     spread = state.slip_variance + (1.0 - keep) * (step * step - slip.sigma**2)
-    return replace(state, slip_mean=mean, slip_variance=keep * spread)
+    return state._replace(slip_mean=mean, slip_variance=keep * spread)
 
 
 def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:

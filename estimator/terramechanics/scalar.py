@@ -1,0 +1,115 @@
+"""`linear.predict` for one sample, spelled out: the loop and the replay spend most of their time here.
+
+With v = (θ₁ − θ)/θ₁ from 0 at entry to 1 at bottom dead centre, and hat(v) the triangle of (11), (12) with its peak at
+v = α = 1 − λ, λ = θₘ/θ₁, the integrals of (20)-(22) are values of two Laplace transforms,
+
+    E(s) = ∫₀¹ e^(−sv) dv = (1 − e^(−s))/s       H(s) = ∫₀¹ hat(v) e^(−sv) dv = [1/α − e^(−αs)/(αλ) + e^(−s)/λ]/s²
+
+at s = η = fθ₁, iθ₁ and η + iθ₁, because cos θ + i sin θ = e^(iθ₁) e^(−iθ₁v). They lose digits as s → 0 and as θₘ nears
+an end of the contact, and f < 0 is braking: there `linear`, stable in every limit, gives the answer.
+"""
+
+from __future__ import annotations
+
+from cmath import exp as turn
+from math import exp, sin
+from typing import Any
+
+from estimator.terramechanics import linear
+from estimator.terramechanics.linear import Prediction
+from estimator.terramechanics.soil import Wheel
+
+SMALLEST = 0.1  # of |s|: below it a derivative of H has lost four digits
+NEAREST = 0.02  # likewise of λ and of 1 − λ
+
+Number = Any  # real or complex: the transforms are the same
+Integrals = tuple[float, float, complex, complex, complex]  # see _integrals
+Forces = tuple[float, float, float, float]  # T, DP, resistance, W, or their changes
+NONE: Forces = (0.0, 0.0, 0.0, 0.0)
+
+
+def predict(wheel: Wheel, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
+    """T, DP, resistance and σₘ under a load W, with gradients: arguments and result are those of `linear.predict`."""
+    lam = wheel.c1 + wheel.c2 * slip
+    rise, scale = sin(0.5 * theta_1) ** 2, wheel.radius / k
+    f = scale * (slip + (1.0 - slip) * rise)  # Eq. (19)
+    if slip < 0.0 or min(theta_1, f * theta_1) < SMALLEST or not NEAREST < lam < 1.0 - NEAREST:
+        return linear.predict(wheel, c, tan_phi, k, theta_1, slip, load)
+    x, by_theta_1, by_f = _integrals(theta_1, f * theta_1, lam)
+    a1, a2, bare, one, hat = x
+    area, arm = wheel.radius * wheel.width, wheel.radius * wheel.radius * wheel.width
+    cohesion, carry = c * theta_1, bare.real + tan_phi * hat.imag
+    s = (load / area - cohesion * one.imag) / carry  # σₘθ₁ by Eq. (21)
+    friction = s * tan_phi
+
+    def forces(a1: float, a2: float, bare: complex, one: complex, hat: complex) -> Forces:
+        """Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same formulas."""
+        drag = area * s * bare.imag
+        return (
+            arm * (cohesion * a1 + friction * a2),
+            area * (cohesion * one.real + friction * hat.real) - drag,
+            drag,
+            area * (cohesion * one.imag + s * bare.real + friction * hat.imag),
+        )
+
+    columns = [
+        (arm * theta_1 * a1, area * theta_1 * one.real, 0.0, area * theta_1 * one.imag),
+        (arm * s * a2, area * s * hat.real, 0.0, area * s * hat.imag),
+        forces(*by_f),
+        forces(a1 + by_theta_1[0], by_theta_1[1], by_theta_1[2], one + by_theta_1[3], by_theta_1[4]),
+        forces(*_by_ratio(theta_1, f * theta_1, lam)) if wheel.c2 else NONE,
+    ]
+    # s gives way to each of them so that W stays the same
+    ds = -1.0 / (area * carry)
+    torque_s, drag_s = arm * tan_phi * a2 * ds, area * bare.imag * ds
+    pull_s = area * tan_phi * hat.real * ds - drag_s
+    by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam = [
+        (torque + torque_s * load, pull + pull_s * load, drag + drag_s * load) for torque, pull, drag, load in columns
+    ]
+    # of ln f by θ₁ and by i
+    f_theta_1, f_slip = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f, scale * (1.0 - rise) / f
+    torque, pull, drag, _ = forces(*x)
+    gradients = [
+        (by_c[q], by_tan_phi[q], -by_ln_f[q], by_ln_theta_1[q] / theta_1 + f_theta_1 * by_ln_f[q],
+         f_slip * by_ln_f[q] + wheel.c2 * by_lam[q], -by_w)
+        for q, by_w in enumerate((torque_s, pull_s, drag_s))
+    ]  # fmt: skip
+    return Prediction(torque, pull, drag, s / theta_1, *gradients)
+
+
+def _integrals(theta_1: float, eta: float, lam: float) -> tuple[Integrals, Integrals, Integrals]:
+    """A₁, A₂, B₁ + iC₃, C₁ + iB₂, C₂ + iB₃ of linear.py, and their derivatives by ln θ₁, at fixed f, and by ln f."""
+    turning, both = 1j * theta_1, complex(eta, theta_1)
+    alpha, ahead = 1.0 - lam, turn(turning)
+    e0, h0, e0_s, h0_s = _transforms(eta, exp(-eta), exp(-eta * alpha), lam)
+    e1, h1, e1_s, h1_s = _transforms(turning, turn(-turning), turn(-turning * alpha), lam)
+    e2, h2, e2_s, h2_s = _transforms(both, turn(-both), turn(-both * alpha), lam)
+    bare, one, hat = ahead * h1, ahead * (e1 - e2), ahead * (h1 - h2)
+    share = -ahead * (eta / both)
+    return (
+        (1.0 - e0, 0.5 - h0, bare, one, hat),
+        (-e0_s, -h0_s, turning * bare + ahead * h1_s, turning * one + ahead * (e1_s - e2_s),
+         turning * hat + ahead * (h1_s - h2_s)),
+        (-e0_s, -h0_s, 0j, share * e2_s, share * h2_s),
+    )  # fmt: skip
+
+
+def _transforms(s: Number, end: Number, peak: Number, lam: float) -> tuple[Number, Number, Number, Number]:
+    """E, H, s dE/ds and s dH/ds; end = e^(−s), peak = e^(−αs)."""
+    one = (1.0 - end) / s
+    fall = (peak - end) / lam
+    hat = ((1.0 - peak) / (1.0 - lam) - fall) / (s * s)
+    return one, hat, end - one, fall / s - 2.0 * hat
+
+
+def _by_ratio(theta_1: float, eta: float, lam: float) -> Integrals:
+    """Derivatives of the integrals by λ."""
+    ahead, alpha = turn(1j * theta_1), 1.0 - lam
+
+    def hat_lam(s: complex) -> complex:
+        peak = turn(-s * alpha)
+        lost = (1.0 - peak) / alpha - s * peak
+        return (lost / alpha + ((peak - turn(-s)) / lam - s * peak) / lam) / (s * s)
+
+    bare = ahead * hat_lam(1j * theta_1)
+    return 0.0, -hat_lam(complex(eta)).real, bare, 0j, bare - ahead * hat_lam(complex(eta, theta_1))

@@ -110,7 +110,7 @@ def predict(
     by_theta_1 = at.along(c, *_theta_1_derivative(theta_1, exponent.f, bare, both, maths))
     by_f = at.along(c, *_f_derivative(theta_1, both, maths))
     by_ratio = at.along(c, *_ratio_derivative(theta_1, exponent.f, both, maths)) if wheel.c2 else (0.0, 0.0, 0.0)
-    columns = (
+    columns: tuple[Sequence[Value], ...] = (
         at.response(-theta_1 * x.b2, theta_1 * x.a1, theta_1 * x.c1, 0.0),
         at.response(-s * x.b3, s * x.a2, s * x.c2, 0.0),
         [-exponent.f * by for by in by_f],

@@ -18,7 +18,6 @@ from estimator.units import unit
 from tools.fingerprints import SOIL, WHEEL, campaign, ramped, shown, typical
 
 NAMES = sorted(EFFECTS)
-FORWARD = [name for name in NAMES if not EFFECTS[name].only_on_line]
 FORWARD = [name for name in NAMES if not EFFECTS[name].filter_only]
 DESIGN = set(
     [

@@ -14,9 +14,10 @@ from matplotlib import pyplot as plt
 
 from estimator.effects import EFFECTS
 from estimator.effects.base import EXPERIMENTS, STAGES, Effect
-from estimator.forward import Response, simulate_arrays
+from estimator.forward import simulate_arrays
 from estimator.history import rate_of
 from estimator.situation import Motion
+from estimator.terramechanics import linear
 from estimator.terramechanics.soil import Array
 from tools.fingerprints import SOIL, TORQUE_CONSTANT, WHEEL, channels, typical_value
 
@@ -45,7 +46,7 @@ AXES = {
     "rate": "time [s], load stepping up and down",
     "run": "pass",
 }
-PAPER, SHADES = "#5c6672", ("#e8a33d", "#c2410c")
+SHADES = ("#5c6672", "#e8a33d", "#c2410c")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -66,17 +67,16 @@ def draw(effect: type[Effect], path: Path) -> None:
     channel, covariate, _ = effect.fingerprint
     label, unit, scale = LABELS[channel]
     motion, x = sweep(covariate, turns=TEETH / _order(effect))
-    before = scale * channels(_run(motion, ()))[channel]
+    curves = [scale * _seen(effect, motion, share)[channel] for share in (0.0, 0.5, 1.0)]
     figure, (above, below) = plt.subplots(2, 1, figsize=(5.4, 4.0), sharex=True, height_ratios=(2, 1))
-    above.plot(x, before, color=PAPER, lw=1.6, label="Eqs. (1)-(10)")
-    for share, shade in zip((0.5, 1.0), SHADES, strict=True):
-        after = scale * channels(_run(motion, (partly(effect, share),)))[channel]
-        above.plot(x, after, color=shade, lw=1.4, label="half strength" if share < 1.0 else "typical strength")
-        below.plot(x, after - before, color=shade, lw=1.4)
+    for curve, shade, name in zip(
+        curves, (PAPER, *SHADES), ("without", "half strength", "typical strength"), strict=True
+    ):
+        above.plot(x, curve, color=shade, lw=1.5, label=name)
+        below.plot(x, curve - curves[0], color=shade, lw=1.5 if name != "without" else 0.8)
     above.set_ylabel(f"{label} [{unit}]")
     below.set_ylabel(f"change [{unit}]")
     below.set_xlabel(AXES[covariate])
-    below.axhline(0.0, color=PAPER, lw=0.8)
     above.legend(frameon=False, fontsize=8)
     for axes in (above, below):
         axes.spines[["top", "right"]].set_visible(False)
@@ -87,8 +87,16 @@ def draw(effect: type[Effect], path: Path) -> None:
     plt.close(figure)
 
 
-def _run(motion: Motion, effects: Sequence[Effect]) -> Response:
-    return simulate_arrays(WHEEL, SOIL, motion, effects, torque_constant=TORQUE_CONSTANT)
+def _seen(effect: type[Effect], motion: Motion, share: float) -> dict[str, Array]:
+    """What the channels say with the effect at a share of its typical strength."""
+    acting = partly(effect, share)
+    if not effect.filter_only:
+        return channels(simulate_arrays(WHEEL, SOIL, motion, (acting,), torque_constant=TORQUE_CONSTANT))
+    true = simulate_arrays(WHEEL, SOIL, motion)
+    closed = linear.predict_batch(
+        WHEEL, SOIL.cohesion, SOIL.tan_phi, SOIL.shear_modulus, true.theta_1, true.slip, true.load
+    )
+    return {"torque": closed.torque + share * (true.torque - closed.torque)}
 
 
 def partly(effect: type[Effect], share: float) -> Effect:
@@ -172,8 +180,8 @@ INTRODUCTION = """<!-- made by `python -m tools.effect_figures`; edit the effect
 Physics that may be at work on a testbed and that Eqs. (1)-(10) leave out. Each is one file in `estimator/effects/`,
 shared by simulator, diagnosis and on-line filter; [adding an effect](adding-an-effect.md) shows how to write one.
 
-Pictures show the channel where the effect shows most, over the covariate it follows: grey the paper's model, yellow
-half and red the typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry sand (c = 1 kPa, tan φ = 0.577,
+Pictures show the channel where the effect shows most, over the covariate it follows: grey without it, yellow at half
+and red at typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry sand (c = 1 kPa, tan φ = 0.577,
 k = 25 mm, n = 1.1), 65 N, slip 30 % and 0.25 rad/s where they are not swept; load is swept up and down again.
 
 A parameter is a *strength*, which turns the effect off at the given value, or a *shape*. *Expected* is the prior: the

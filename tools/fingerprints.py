@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -108,8 +109,7 @@ class Shown:
 
 def shown(effect: Effect) -> Shown:
     """Run the campaign with and without the effect."""
-    motions = campaign()
-    plain = [simulate_arrays(WHEEL, SOIL, m, torque_constant=TORQUE_CONSTANT) for m in motions]
+    motions, plain = campaign(), _plain()
     other = [simulate_arrays(WHEEL, SOIL, m, (effect,), torque_constant=TORQUE_CONSTANT) for m in motions]
     before, after = ([channels(r) for r in responses] for responses in (plain, other))
     change = {c: np.concatenate([a[c] - b[c] for a, b in zip(after, before, strict=True)]) for c in NOISE}
@@ -117,6 +117,12 @@ def shown(effect: Effect) -> Shown:
     rate = {c: np.concatenate([rate_of(m.time, b[c]) for m, b in zip(motions, before, strict=True)]) for c in NOISE}
     strength = {c: float(np.sqrt(np.mean(change[c] ** 2))) / NOISE[c] for c in NOISE}
     return Shown(change, strength, {c: shares(change[c], {**by, "rate": rate[c]}) for c in NOISE}, by)
+
+
+@cache
+def _plain() -> list[Response]:
+    """The campaign without effects."""
+    return [simulate_arrays(WHEEL, SOIL, m, torque_constant=TORQUE_CONSTANT) for m in campaign()]
 
 
 def shares(change: Array, by: dict[str, Array]) -> dict[str, float]:

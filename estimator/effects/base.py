@@ -101,7 +101,6 @@ class Effect:
     fingerprint: ClassVar[Fingerprint]
     confusable_with: ClassVar[Mapping[str, str]] = told_apart()  # other effect -> key of EXPERIMENTS
     filter_only: ClassVar[bool] = False  # acts on the on-line filter alone; the forward model needs nothing of it
-    only_on_line: ClassVar[bool] = False  # acts in the filter alone; the forward model has it already
     needs_sinkage: ClassVar[bool] = False  # the load stage needs a predicted sinkage: the balance is solved twice
 
     def __init_subclass__(cls) -> None:

@@ -26,4 +26,4 @@ class StressLinearisation(Effect):
         "torque", "slip", "closed-form torque too small at low slip and deep sinkage; c seems smaller, tan φ larger"
     )
     confusable_with = told_apart(torque_constant_error="slip_step", stress_peak_shift="penetration")
-    only_on_line = True
+    filter_only = True

@@ -63,15 +63,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def draw(effect: type[Effect], path: Path) -> None:
-    """The channel against the covariate where the effect shows most: the paper's model, half and full strength."""
+    """The channel against the covariate where the effect shows most: off, half and typical strength."""
     channel, covariate, _ = effect.fingerprint
     label, unit, scale = LABELS[channel]
     motion, x = sweep(covariate, turns=TEETH / _order(effect))
     curves = [scale * _seen(effect, motion, share)[channel] for share in (0.0, 0.5, 1.0)]
     figure, (above, below) = plt.subplots(2, 1, figsize=(5.4, 4.0), sharex=True, height_ratios=(2, 1))
-    for curve, shade, name in zip(
-        curves, (PAPER, *SHADES), ("without", "half strength", "typical strength"), strict=True
-    ):
+    for curve, shade, name in zip(curves, SHADES, ("without", "half strength", "typical strength"), strict=True):
         above.plot(x, curve, color=shade, lw=1.5, label=name)
         below.plot(x, curve - curves[0], color=shade, lw=1.5 if name != "without" else 0.8)
     above.set_ylabel(f"{label} [{unit}]")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,84 +18,15 @@ from mcap.records import Channel, Schema
 
 from estimator.blocks import MAX_CHUNK, MAX_WASTE, Block, Contents, Damaged, Texts, Walk, records, split, unpack
 from estimator.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
-from estimator.mcapfile import (
-    LIBRARY,
-    MESSAGE_DTYPE,
-    MESSAGE_HEAD,
-    RECORD_HEAD,
-    RecordingError,
-    Starts,
-    gather,
-    reported,
-)
+from estimator.decoding import Chunk, Source, select
+from estimator.mcapfile import LIBRARY, RecordingError, Starts, reported
 from estimator.recording import CHECKSUM, CONFIG, RAW_TOPICS, RECOVERED, RUN, RunInfo, seal_holds
 
 MAX_KEPT = 64 << 20  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_LINES = 100
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good
-_PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
-_CDR_LE = 0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
 
 Message = tuple[str, int, tuple[Any, ...]]
-
-
-@dataclass(frozen=True)
-class Source:
-    """One channel of the file as defined there, and how to decode it; `codec` is None where we cannot."""
-
-    schema: Schema | None
-    channel: Channel
-    topic: Topic  # as the caller of `read` knows it, else as the file defines it
-    codec: Codec | None  # of the fields as they stand in the file
-
-    @cached_property
-    def dtype(self) -> np.dtype[np.void]:
-        """Of a whole message record, its head left out."""
-        assert self.codec is not None
-        return self.codec.record_dtype(MESSAGE_HEAD.size)
-
-    def fill(self, table: Rows, chunk: Chunk, own: Starts) -> None:
-        """Decode the messages numbered `own`, shape (n,), of a chunk into a table of n rows, by field name."""
-        assert self.codec is not None
-        self.codec.fill(table, gather(chunk.content, chunk.starts[own], self.dtype))
-
-    def values(self, chunk: Chunk, own: Starts) -> list[tuple[Any, ...]]:
-        """The values of the messages numbered `own`, in the order of the topic's fields."""
-        assert self.codec is not None
-        if self.codec.flat:
-            table = np.empty(own.shape, self.topic.codec.table_dtype)
-            self.fill(table, chunk, own)
-            return list(table.tolist())
-        order = [self.codec.names.index(name) for name in self.topic.names]
-        decoded = [self.codec.decode(chunk.body(i)) for i in own.tolist()]
-        return [tuple(values[i] for i in order) for values in decoded]
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """The good messages of one block: where their records begin in `content`, and their heads, shape (n,)."""
-
-    content: bytes
-    starts: Starts
-    heads: Rows
-
-    def body(self, i: int) -> bytes:
-        start = int(self.starts[i])
-        return self.content[start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])]
-
-    def records(self) -> tuple[bytes, Starts]:
-        """The message records, heads included, end to end, and where each begins."""
-        sizes = self.heads["length"].astype(np.int64) + RECORD_HEAD.size
-        pieces = zip(self.starts.tolist(), (self.starts + sizes).tolist(), strict=True)
-        return b"".join(self.content[start:end] for start, end in pieces), np.cumsum(sizes) - sizes
-
-    @cached_property
-    def groups(self) -> dict[int, Starts]:
-        """Channel number -> the numbers of its messages, in file order."""
-        channels = self.heads["channel"]
-        order = np.argsort(channels, kind="stable")
-        cuts = np.flatnonzero(np.diff(channels[order])) + 1
-        return {int(channels[own[0]]): own for own in np.split(order, cuts) if own.size}
 
 
 @dataclass
@@ -179,7 +109,7 @@ class Recording:
 
     def _chunk(self, file: BinaryIO, block: Block) -> Chunk:
         content = unpack(file, block)
-        return _select(content, split(file, block, content)[0], self.sources)[0]
+        return select(content, split(file, block, content)[0], self.sources)[0]
 
 
 def _table(source: Source, chunk: Chunk, own: Starts, before: int, dtype: np.dtype[np.void]) -> Rows:
@@ -205,7 +135,8 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
         recording = _with_metadata(Recording(path, damage=contents.damage, closed=contents.closed), contents)
         check = _Check(recording, {topic.name: topic for topic in topics})
         check.whole(file, contents)
-    del recording.damage[MAX_LINES:]
+    if len(recording.damage) > MAX_LINES:
+        recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
     return recording
 
 
@@ -258,7 +189,7 @@ class _Check:
         starts, definitions = split(file, block, content)
         for opcode, start, end in definitions:
             self._define(opcode, content[start:end])
-        chunk, complaints = _select(content, starts, self._recording.sources)
+        chunk, complaints = select(content, starts, self._recording.sources)
         self._recording.damage += [f"byte {block.start}: {complaint}" for complaint in complaints]
         self._waste += _COST * (len(starts) - len(chunk.starts))
         self._keep(block, chunk)
@@ -366,39 +297,3 @@ def _fits(found: str, expected: str) -> bool:
 def _channel_counts(statistics: bytes) -> dict[int, int]:
     entries = np.frombuffer(statistics[46:], [("channel", "<u2"), ("count", "<u8")])
     return {int(channel): int(count) for channel, count in entries.tolist()}
-
-
-def _select(content: bytes, starts: Starts, sources: dict[int, Source]) -> tuple[Chunk, list[str]]:
-    """The messages that are of a known channel and as long as its fields, and one line for each kind of others."""
-    whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
-    good = np.zeros(starts.shape, bool)
-    complaints = []
-    for channel, own in whole.groups.items():
-        source = sources.get(channel)
-        good[own] = _sound(whole, own, source) if source else False
-        if bad := int(np.count_nonzero(~good[own])):
-            what = f"do not fit the fields of {source.topic.name}" if source else f"are of channel {channel}, undefined"
-            complaints.append(f"{bad} messages skipped: they {what}")
-    return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
-
-
-def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
-    """Which of the messages numbered `own` are little-endian CDR of the right length, shape (n,)."""
-    codec = source.codec
-    if codec is None:
-        return True
-    if not codec.flat:
-        return [_decodes(codec, chunk.body(i)) for i in own.tolist()]
-    excess = chunk.heads["length"][own].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size)
-    fits = (excess >= 0) & (excess <= _PADDING)
-    kinds = gather(chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")]))
-    fits[fits] = kinds["kind"] == _CDR_LE
-    return fits
-
-
-def _decodes(codec: Codec, body: bytes) -> bool:
-    try:
-        codec.decode(body)
-    except ValueError:
-        return False
-    return True

@@ -312,7 +312,7 @@ while True:
 """
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 100))])
 def test_kill_9_leaves_everything_up_to_the_last_flush(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "run.mcap"
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), "OPENBLAS_NUM_THREADS": "1"}

@@ -1,0 +1,112 @@
+"""From the bytes of a block to values: one channel's definition in the file, and the messages of one block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from mcap.records import Channel, Schema
+
+from estimator.cdr import Codec, Rows, Topic
+from estimator.mcapfile import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, Starts, gather
+
+_PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
+_CDR_LE = 0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
+
+
+@dataclass(frozen=True)
+class Source:
+    """One channel of the file as defined there, and how to decode it; `codec` is None where we cannot."""
+
+    schema: Schema | None
+    channel: Channel
+    topic: Topic  # as the caller of `read` knows it, else as the file defines it
+    codec: Codec | None  # of the fields as they stand in the file
+
+    @cached_property
+    def dtype(self) -> np.dtype[np.void]:
+        """Of a whole message record, its head left out."""
+        assert self.codec is not None
+        return self.codec.record_dtype(MESSAGE_HEAD.size)
+
+    def fill(self, table: Rows, chunk: Chunk, own: Starts) -> None:
+        """Decode the messages numbered `own`, shape (n,), of a chunk into a table of n rows, by field name."""
+        assert self.codec is not None
+        self.codec.fill(table, gather(chunk.content, chunk.starts[own], self.dtype))
+
+    def values(self, chunk: Chunk, own: Starts) -> list[tuple[Any, ...]]:
+        """The values of the messages numbered `own`, in the order of the topic's fields."""
+        assert self.codec is not None
+        if self.codec.flat:
+            table = np.empty(own.shape, self.topic.codec.table_dtype)
+            self.fill(table, chunk, own)
+            return list(table.tolist())
+        order = [self.codec.names.index(name) for name in self.topic.names]
+        decoded = [self.codec.decode(chunk.body(i)) for i in own.tolist()]
+        return [tuple(values[i] for i in order) for values in decoded]
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """The good messages of one block: where their records begin in `content`, and their heads, shape (n,)."""
+
+    content: bytes
+    starts: Starts
+    heads: Rows
+
+    def body(self, i: int) -> bytes:
+        start = int(self.starts[i])
+        return self.content[start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])]
+
+    def records(self) -> tuple[bytes, Starts]:
+        """The message records, heads included, end to end, and where each begins."""
+        sizes = self.heads["length"].astype(np.int64) + RECORD_HEAD.size
+        pieces = zip(self.starts.tolist(), (self.starts + sizes).tolist(), strict=True)
+        return b"".join(self.content[start:end] for start, end in pieces), np.cumsum(sizes) - sizes
+
+    @cached_property
+    def groups(self) -> dict[int, Starts]:
+        """Channel number -> the numbers of its messages, in file order."""
+        channels = self.heads["channel"]
+        order = np.argsort(channels, kind="stable")
+        cuts = np.flatnonzero(np.diff(channels[order])) + 1
+        return {int(channels[own[0]]): own for own in np.split(order, cuts) if own.size}
+
+
+def select(content: bytes, starts: Starts, sources: Mapping[int, Source]) -> tuple[Chunk, list[str]]:
+    """The messages that are of a known channel and as long as its fields, and one line for each kind of others."""
+    whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
+    good = np.zeros(starts.shape, bool)
+    complaints = []
+    for channel, own in whole.groups.items():
+        source = sources.get(channel)
+        good[own] = _sound(whole, own, source) if source else False
+        if bad := int(np.count_nonzero(~good[own])):
+            what = f"do not fit the fields of {source.topic.name}" if source else f"are of channel {channel}, undefined"
+            complaints.append(f"{bad} messages skipped: they {what}")
+    return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
+
+
+def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
+    """Which of the messages numbered `own` are little-endian CDR of the right length, shape (n,)."""
+    codec = source.codec
+    if codec is None:
+        return True
+    if not codec.flat:
+        return [_decodes(codec, chunk.body(i)) for i in own.tolist()]
+    excess = chunk.heads["length"][own].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size)
+    fits = (excess >= 0) & (excess <= _PADDING)
+    kinds = gather(chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")]))
+    fits[fits] = kinds["kind"] == _CDR_LE
+    return fits
+
+
+def _decodes(codec: Codec, body: bytes) -> bool:
+    try:
+        codec.decode(body)
+    except ValueError:
+        return False
+    return True

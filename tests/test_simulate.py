@@ -157,3 +157,13 @@ def test_bogged_wheel_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     path.write_text("segments:\n  - {duration: 1 s, load: 5 kN, slip: 0.2, speed: 20 mm/s}")
     main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
     assert "exceeds what the soil carries in 250 samples" in capsys.readouterr().out
+
+
+def test_a_recording_drives_it_again(schedule: Path, tmp_path: Path) -> None:
+    """The run simulated from the measured motion of a run feels what that run felt."""
+    main(["--schedule", str(schedule), "-o", str(tmp_path / "first.mcap")])
+    main(["--motion", str(tmp_path / "first.mcap"), "-o", str(tmp_path / "again.mcap")])
+    first, again = (np.load(tmp_path / f"{name}.truth.npz") for name in ("first", "again"))
+    driving = (again["time"] > 1.5) & (again["time"] < 4.8)
+    expected = np.interp(again["time"], first["time"], first["torque"])
+    assert np.sqrt(np.mean((again["torque"] - expected)[driving] ** 2)) < 0.05

@@ -14,8 +14,10 @@ from config import packaged
 from estimator import config, effects, units
 from estimator.effects.base import Effect
 from estimator.forward import Response, simulate_arrays
+from estimator.measured import measured_run
 from estimator.readings import WRENCH_FIELDS, Reading
 from estimator.recording import RunInfo, RunWriter
+from estimator.salvage import read
 from estimator.settings import Calibration, Channel, Settings, Wrench
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
@@ -158,15 +160,21 @@ def main(argv: Sequence[str]) -> int:
     acting = _acting(settings, arguments.effect)
     info = replace(configuration.run, pass_number=arguments.pass_number or configuration.run.pass_number)
     info = replace(info, name=info.name or arguments.output.stem)
-    schedule = schedules.read(arguments.schedule)
-    motion = schedules.motion_of(
-        schedule, settings.wheel.radius, settings.rates.tick, float(info.pass_number), info.start_position
-    )
+    motion = _motion(arguments, settings, info)
     run = simulate_run(settings, soil, motion, acting, arguments.seed)
     write(arguments.output, configuration, info, run)
     write_truth(arguments.output, settings, soil, acting, run, arguments.seed)
-    print(_summary(arguments.output, schedule, acting, run))
+    print(_summary(arguments.output, acting, run))
     return DONE
+
+
+def _motion(arguments: argparse.Namespace, settings: Settings, info: RunInfo) -> Motion:
+    """The motion of a recording if one is given, else that of the schedule."""
+    rate = settings.rates.tick
+    if arguments.motion:
+        return measured_run(read(arguments.motion), settings, rate).motion
+    schedule = schedules.read(arguments.schedule)
+    return schedules.motion_of(schedule, settings.wheel.radius, rate, float(info.pass_number), info.start_position)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -176,6 +184,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--config", default=packaged(), help="the testbed; default: the packaged testbed.yaml")
     parser.add_argument(
         "--schedule", type=Path, default=packaged("schedule.yaml"), help="what to do; default: three loads, five slips"
+    )
+    parser.add_argument(
+        "--motion", type=Path, metavar="FILE.mcap", help="drive as this recording was driven, in place of a schedule"
     )
     parser.add_argument(
         "--effect",
@@ -235,10 +246,11 @@ def _quantity(where: str, text: str, unit: str) -> float:
         ) from None
 
 
-def _summary(path: Path, schedule: schedules.Schedule, acting: Sequence[Effect], run: Run) -> str:
+def _summary(path: Path, acting: Sequence[Effect], run: Run) -> str:
+    time = np.asarray(run.motion.time)
     bogged = int(run.response.overloaded.sum())
     lines = [
-        f"{path}: {schedule.duration:g} s, {len(schedule.segments)} segments, {len(run.readings)} readings",
+        f"{path}: {time[-1] - time[0]:.1f} s, {len(run.readings)} readings",
         f"effects: {', '.join(effect.name for effect in acting) or 'none'}",
         f"truth: {path.with_suffix('.truth.json')}, {path.with_suffix('.truth.npz')}",
     ]

@@ -15,6 +15,7 @@ from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 
 # command -> (module, what it does)
 COMMANDS = {
+    "demo": ("tools.demo", "the daemon against the simulated testbed on real wires, with verdict and figure"),
     "run": ("tools.run", "the daemon: sensors in, c and tan φ out, everything logged"),
     "replay": ("tools.replay", "the on-line filter over recordings"),
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),

@@ -24,6 +24,7 @@ import numpy as np
 from config import packaged
 from estimator import config, effects
 from estimator.config import Configuration
+from estimator.daemon import real_time
 from estimator.readings import Reading
 from estimator.terramechanics.soil import Soil
 from tools import plant, rig_config, simulate
@@ -111,12 +112,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
     configuration = config.load(arguments.config, effects.units)
-    stop = _stop_on_signals()
     prepared = experiment(configuration, arguments.seconds, arguments.plant, arguments.seed)
     write_truth(folder, prepared)
     with Rig(configuration.settings, arguments.can) as rig:
         print(f"configuration {rig_config.write(configuration, rig.devices, folder)}", flush=True)
         if not arguments.wait or sys.stdin.readline():
+            stop = _stop_on_signals()
+            real_time()  # a real rig is not held up by the computer's other work; where refused, it may be
             played = play(in_transit(prepared.run.readings, arguments.seed + 2), rig, stop.is_set)
             (folder / PLAYED).write_text(json.dumps(asdict(played), indent=2) + "\n", encoding="utf-8")
     return DONE

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from estimator.config_table import EffectSchema, table
+from estimator.effects import units
 from estimator.recording import RunInfo
 from estimator.settings import Settings
 from estimator.yamltree import MAX_BYTES, ConfigError, compose, serialise
@@ -34,12 +35,14 @@ class Configuration:
     run: RunInfo = field(default_factory=RunInfo)
 
 
-def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = None) -> Configuration:
+def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = units) -> Configuration:
     """Read a configuration file; a relative DBC path counts from its folder. Raises ConfigError."""
     return loads(_read(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
 
 
-def loads(text: str, name: str, folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Configuration:
+def loads(
+    text: str, name: str, folder: Path | None = None, effect_schema: EffectSchema | None = units
+) -> Configuration:
     """Read configuration text; `name` stands in messages. Without a folder a relative DBC path stays as it is.
 
     Raises ConfigError.

@@ -5,26 +5,64 @@ from __future__ import annotations
 from math import exp, isnan, sqrt
 from operator import mul
 
+from estimator.effects import configured
 from estimator.filter import KPA, Estimate, Matrix, Update, Vector, dot, variance
 from estimator.model import Prediction, Quantity, WheelModel
 from estimator.nuisance import Sensitivity, nuisances
+from estimator.online import Chain, Context, Here, variants
 from estimator.settings import Settings
-from estimator.wheel_state import WheelState
+from estimator.sync import Snapshot
+from estimator.wheel_state import WheelState, wheel_state
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
+
+Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
 
 
 class Measurement:
     """Settings turned into h(x), its Jacobians and R. The state is [c/kPa, tan φ, ln k]."""
 
     def __init__(self, settings: Settings) -> None:
-        self.model = WheelModel(settings)
+        self.settings = settings
+        self.chain = Chain(settings, configured(settings.effects))
+        self.model = WheelModel(settings, self.chain)
         self.nuisances = nuisances(settings)
-        self.variances = tuple(nuisance.sigma**2 for nuisance in self.nuisances)
+        self._variants = _variants(settings, self.chain)
+        self._unmoved = ((0.0, 0.0),) * len(self._variants)
+        self.variances = (*(nuisance.sigma**2 for nuisance in self.nuisances), *(1.0,) * len(self._variants))
+
+    def state(self, snapshot: Snapshot, context: Context, columns: Columns = ()) -> WheelState:
+        """The window in the wheel's own terms, effects accounted for; columns: those of the last update."""
+        now = wheel_state(self.settings, snapshot, self.chain, context)
+        return now._replace(columns=columns or self._unmoved)
+
+    def with_columns(self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate) -> WheelState:
+        """The window with the change of its innovation for one σ of each uncertain effect parameter, and of n."""
+        if not self._variants:
+            return now
+        here = _innovation(now, self._predicted(self.model, estimate, now))
+        columns = []
+        for model, chain in self._variants:
+            moved = now if chain is self.chain else wheel_state(self.settings, snapshot, chain, context)
+            there = _innovation(moved, self._predicted(model, estimate, moved))
+            columns.append((here[0] - there[0], here[1] - there[1]))
+        return now._replace(columns=tuple(columns))
 
     def predict(self, estimate: Estimate, now: WheelState) -> Prediction:
         """T, DP and resistance at the estimate, in this window's geometry."""
-        return self.model.predict(*soil(estimate), now.theta_1.value, now.slip.value, now.load.value)
+        return self._predicted(self.model, estimate, now)
+
+    @staticmethod
+    def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
+        if now.here is None:
+            return model.predict(*soil(estimate), now.theta_1.value, now.slip.value, now.load.value)
+        prediction = model.predict(*soil_here(estimate, now.here), now.theta_1.value, now.slip.value, now.load.value)
+        torque, pull, resistance = (_by_estimate(quantity, estimate, now.here) for quantity in prediction)
+        return Prediction(
+            torque._replace(value=torque.value + now.added[0]),
+            pull._replace(value=pull.value + now.added[1]),
+            resistance,
+        )
 
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
         """Innovation, H, G and R of the components that are measured: T always, DP where there is a sensor."""
@@ -33,14 +71,14 @@ class Measurement:
         update = Update(
             innovation=(now.torque.value - torque.value, now.drawbar_pull.value - pull.value),
             H=(_state_gradient(torque), _state_gradient(pull)),
-            G=self._nuisance_gradients(sensitivity),
+            G=self._nuisance_gradients(sensitivity, now.columns),
             R=self._noise(now, sensitivity),
         )
         return selected(update, (0,)) if isnan(now.drawbar_pull.value) else update
 
-    def _nuisance_gradients(self, s: Sensitivity) -> Matrix:
-        """G (2, q)."""
-        columns = [nuisance.gradient(s) for nuisance in self.nuisances]
+    def _nuisance_gradients(self, s: Sensitivity, effects: Columns) -> Matrix:
+        """G (2, q): of the calibration, then of the effects' parameters."""
+        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *effects]
         return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
 
     def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
@@ -48,16 +86,15 @@ class Measurement:
         sigmas = (now.sinkage.sigma, now.slip.sigma, now.load.sigma)
         by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
         torque, pull = tuple(map(mul, by_torque, sigmas)), tuple(map(mul, by_pull, sigmas))
-        torque_model, pull_model = self.model.residual_sigma(s)
         common = dot(torque, pull)
         return (
-            (dot(torque, torque) + now.torque.sigma**2 + torque_model**2, common),
-            (common, dot(pull, pull) + now.drawbar_pull.sigma**2 + pull_model**2),
+            (dot(torque, torque) + now.torque.sigma**2, common),
+            (common, dot(pull, pull) + now.drawbar_pull.sigma**2),
         )
 
     def sigmas(self, estimate: Estimate, now: WheelState, prediction: Prediction) -> tuple[float, float, float]:
         """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's z, i and W."""
-        torque, pull = self._nuisance_gradients(_sensitivity(now, prediction))
+        torque, pull = self._nuisance_gradients(_sensitivity(now, prediction), now.columns)
         return (
             self._sigma(estimate, now, prediction.torque, torque),
             self._sigma(estimate, now, prediction.drawbar_pull, pull),
@@ -74,8 +111,9 @@ class Measurement:
 
     def largest_pull(self, estimate: Estimate, now: WheelState) -> tuple[float, float, float]:
         """Largest DP over slip at this load and sinkage [N], its σ, and its slip."""
-        best = self.model.best_slip(*soil(estimate), now.theta_1.value, now.load.value)
-        prediction = self.model.predict(*soil(estimate), now.theta_1.value, best, now.load.value)
+        ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
+        best = self.model.best_slip(*ground, now.theta_1.value, now.load.value)
+        prediction = self.predict(estimate, now._replace(slip=now.slip._replace(value=best)))
         return prediction.drawbar_pull.value, self.sigmas(estimate, now, prediction)[1], best
 
 
@@ -83,6 +121,42 @@ def soil(estimate: Estimate) -> tuple[float, float, float]:
     """c [Pa], tan φ [-], k [m] of a state."""
     c, tan_phi, ln_k = estimate.x
     return c * KPA, tan_phi, exp(ln_k)
+
+
+def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
+    """c [Pa], tan φ [-], k [m] under this window."""
+    c, tan_phi, k = soil(estimate)
+    return (
+        here.c_slope * c + here.c_offset,
+        here.tan_phi_slope * tan_phi + here.tan_phi_offset,
+        here.k_slope * k + here.k_offset,
+    )
+
+
+def _by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity:
+    """Gradient with respect to the estimated soil, from that with respect to the soil under this window."""
+    k, k_here = soil(estimate)[2], soil_here(estimate, here)[2]
+    return quantity._replace(
+        by_c=quantity.by_c * here.c_slope,
+        by_tan_phi=quantity.by_tan_phi * here.tan_phi_slope,
+        by_ln_k=quantity.by_ln_k * here.k_slope * k / k_here,
+    )
+
+
+def _innovation(now: WheelState, prediction: Prediction) -> tuple[float, float]:
+    """Measured minus predicted T and DP; 0 where DP is not measured."""
+    pull = now.drawbar_pull.value - prediction.drawbar_pull.value
+    return now.torque.value - prediction.torque.value, 0.0 if isnan(pull) else pull
+
+
+def _variants(settings: Settings, chain: Chain) -> list[tuple[WheelModel, Chain]]:
+    """Model and effects with one uncertain effect parameter, or the exponent n, moved by its sigma."""
+    moved = [Chain(settings, effects) for effects in variants(settings)]
+    found = [(WheelModel(settings, other), other) for other in moved]
+    exponent = settings.soil.exponent.sigma
+    if exponent > 0.0 and any(e.name == "stress_linearisation" for e in chain.effects):
+        found.append((WheelModel(settings, chain, exponent), chain))
+    return found
 
 
 def selected(update: Update, components: tuple[int, ...]) -> Update:

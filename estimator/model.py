@@ -5,10 +5,13 @@ from __future__ import annotations
 from math import cos, hypot, log, sin
 from typing import NamedTuple
 
-from estimator.nuisance import Sensitivity
+from estimator.effects.stress_linearisation import StressLinearisation
+from estimator.online import Chain
 from estimator.settings import Settings
+from estimator.shift import IntegralShift
 from estimator.sync import Measured
 from estimator.terramechanics import linear, scalar
+from estimator.terramechanics.soil import Soil
 
 SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)  # where the largest drawbar pull is looked for
 
@@ -34,29 +37,36 @@ class Prediction(NamedTuple):
 class WheelModel:
     """Eqs. (20)-(22) for one wheel, σₘ eliminated through (21)."""
 
-    def __init__(self, settings: Settings) -> None:
-        self._wheel = settings.wheel
+    def __init__(self, settings: Settings, chain: Chain, exponent_error: float = 0.0) -> None:
+        self._wheel = chain.wheel
         self._soil = settings.soil
         self._modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
-        self._model_sigma = settings.filter.model_sigma
+        self._exponent_error = exponent_error
+        self._shift = _shift(settings, chain)
 
     def predict(self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
-        p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
+        shift = self._at(k, theta_1, slip)
+        if shift is None:
+            p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
+        else:
+            p = linear.predict(self._wheel, c, tan_phi, k, theta_1, slip, load, shift=shift)
         return Prediction(
             Quantity(p.torque, *p.torque_gradient),
             Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),
             Quantity(p.resistance, *p.resistance_gradient),
         )
 
-    def residual_sigma(self, sensitivity: Sensitivity) -> tuple[float, float]:
-        """Standard deviation of the model's own error in T [N·m] and DP [N]."""
-        return self._model_sigma * abs(sensitivity.torque), self._model_sigma * abs(sensitivity.drawbar_pull)
+    def _at(self, k: float, theta_1: float, slip: float) -> linear.Shift | None:
+        return None if self._shift is None else self._shift.at(k, theta_1, slip, self._exponent_error)
 
     def best_slip(self, c: float, tan_phi: float, k: float, theta_1: float, load: float) -> float:
         """Slip of the largest drawbar pull at this load and sinkage: the best of SLIPS, refined by a parabola."""
         pulls = [
-            linear.forces_under_load(self._wheel, c, tan_phi, k, theta_1, slip, load).drawbar_pull for slip in SLIPS
+            linear.forces_under_load(
+                self._wheel, c, tan_phi, k, theta_1, slip, load, shift=self._at(k, theta_1, slip)
+            ).drawbar_pull
+            for slip in SLIPS
         ]
         best = max(range(len(SLIPS)), key=pulls.__getitem__)
         if best in (0, len(SLIPS) - 1):
@@ -76,3 +86,20 @@ class WheelModel:
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
         relative = hypot(soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma)
         return Measured(load, abs(load) * relative)
+
+
+def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
+    """The shift of the integrals, if the true stresses or a contact effect are configured."""
+    share = sum(e.share for e in chain.effects if isinstance(e, StressLinearisation))
+    shaping = tuple(e for e in chain.effects if e.stage in ("contact", "soil", "wheel") and not e.filter_only)
+    if not share and not shaping:
+        return None
+    soil = settings.soil
+    prior = Soil(
+        soil.cohesion.value,
+        soil.tan_phi.value,
+        soil.shear_modulus.value,
+        soil.exponent.value,
+        soil.pressure_sinkage.modulus(settings.wheel.width),
+    )
+    return IntegralShift(chain.wheel, prior, shaping, share)

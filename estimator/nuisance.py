@@ -54,6 +54,9 @@ def _all(settings: Settings) -> Iterator[Nuisance]:
     elif wrench is not None:
         yield Nuisance("torque scale [-]", _relative(wrench.torque.scale), lambda s: (s.torque, 0.0))
         yield Nuisance("torque offset [N·m]", wrench.torque.offset.sigma, lambda s: (1.0, 0.0))
+    radius, model = settings.wheel.radius, settings.filter.model_sigma
+    yield Nuisance("closed forms, torque [-]", model, lambda s: (s.torque, 0.0))
+    yield Nuisance("closed forms, pull [-]", model, lambda s: (0.0, s.torque / radius))  # of the thrust, about T/r
     if wrench is None:
         yield Nuisance("load [N]", settings.load.nominal.sigma, lambda s: _scaled(-1.0, s.by_load))
         return

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.account import Pull, Record, record
+from estimator.account import Pull, record
+from estimator.online import with_latencies
 from estimator.readings import Reading
-from estimator.record import NOT_A_NUMBER, TICK_FIELDS, Flag
+from estimator.record import NOT_A_NUMBER, Flag
 from estimator.settings import Settings
 from estimator.sync import NS, Sync
 from estimator.tracker import Tracker, TrackState
 
 TickRecord = tuple[float, ...]  # values in the order of record.TICK_FIELDS; times are integer ns
-
-_DEFAULTS: Record = {name: 0 if kind != "float64" else NOT_A_NUMBER for name, kind, _ in TICK_FIELDS}
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Pipeline:
     """The settings compiled once; `start` gives the prior state, `step` the next one."""
 
     def __init__(self, settings: Settings, engine: str | None = None) -> None:
-        self.settings = settings
+        self.settings = settings = with_latencies(settings)
         self.tracker = Tracker(settings, engine)
         self._period = NS / settings.rates.tick
 
@@ -52,15 +51,19 @@ class Pipeline:
         flags = account.flags
         flags |= Flag.LATE_READINGS if counters.late > state.late else Flag.NONE
         flags |= Flag.COUNTER_JUMP if counters.jumps > state.jumps else Flag.NONE
-        fields = _DEFAULTS | record(self.tracker, track, account, pull)
-        fields.update(
-            stamp=t,
-            sequence=round((t - first) / self._period),
-            consumed=len(readings),
-            flags=int(flags),
-            late=counters.late,
-            duplicates=counters.duplicates,
-            jumps=counters.jumps,
-            invalid=counters.invalid,
+        fields = (
+            t,
+            account.snapshot.evaluated,
+            round((t - first) / self._period),
+            len(readings),
+            int(account.status),
+            int(flags),
+            account.snapshot.stale,
+            account.snapshot.stuck,
+            counters.late,
+            counters.duplicates,
+            counters.jumps,
+            counters.invalid,
+            *record(self.tracker, track, account, pull),
         )
-        return State(sync, track, pull, first, counters.late, counters.jumps), tuple(fields.values())
+        return State(sync, track, pull, first, counters.late, counters.jumps), fields

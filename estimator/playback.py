@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from estimator.readings import CHANNELS, Reading
 from estimator.recording import RunInfo
 from estimator.salvage import Message, Recording
-from estimator.settings import Settings
+from estimator.settings import Place, Settings
 from estimator.sync import NS
 
 TICK = "/tick"
@@ -71,7 +71,8 @@ def _in_order(messages: Iterable[Message]) -> list[Reading]:
 
 
 def settings_for(settings: Settings, run: RunInfo) -> Settings:
-    """The settings of one run: its nominal load, where it states one."""
+    """The settings of one run: its place on the bed, and its nominal load where it states one."""
+    settings = replace(settings, place=Place(run.pass_number, run.start_position))
     if run.nominal_load is None:
         return settings
     nominal = replace(settings.load.nominal, value=run.nominal_load)

@@ -11,10 +11,11 @@ oldest stretch is absorbed into the anchor when there are more than CAPACITY.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from estimator.filter import Estimate
 from estimator.geometry import EntryAngle, entry_angle
+from estimator.online import Here
 from estimator.sync import Measured
 from estimator.wheel_state import WheelState
 
@@ -62,8 +63,15 @@ class Stretch(NamedTuple):
             torque=mean(old.torque, now.torque),
             load=mean(old.load, now.load),
             drawbar_pull=mean(old.drawbar_pull, now.drawbar_pull),
+            added=_blend(old.added, now.added, weight),
+            here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
+            columns=tuple(_blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)),
         )
         return Stretch(state, self.windows + 1, self.components, self.elapsed + elapsed)
+
+
+def _blend(old: tuple[float, ...], now: tuple[float, ...], weight: float) -> Any:
+    return tuple([a + (b - a) * weight for a, b in zip(old, now, strict=True)])
 
 
 class Memory(NamedTuple):

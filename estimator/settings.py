@@ -138,6 +138,14 @@ class Logging:
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where on the bed a run takes place; from the run's own metadata."""
+
+    pass_number: int = 1  # how many times the wheel has gone over this soil, this run included
+    start_position: float = 0.0  # [m]
+
+
+@dataclass(frozen=True)
 class ConfiguredEffect:
     """An effect the filter and the simulator apply, with its parameters ± sigma in SI."""
 
@@ -160,3 +168,4 @@ class Settings:
     filter: FilterSettings
     logging: Logging
     effects: tuple[ConfiguredEffect, ...] = ()
+    place: Place = Place()

@@ -6,6 +6,7 @@ clock and keeps nothing between calls.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import exp, hypot, log, sqrt
 from typing import NamedTuple
 
@@ -24,13 +25,14 @@ from estimator.filter import (
     predict,
     project,
 )
-from estimator.measurement import Measurement, selected
+from estimator.measurement import Columns, Measurement, selected, soil
+from estimator.online import Context
 from estimator.plain import PlainEngine
 from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
 from estimator.segments import CAPACITY, Memory, Stretch
 from estimator.settings import Settings
 from estimator.sync import NS, Measured, Snapshot
-from estimator.wheel_state import REQUIRED_BITS, WheelState, classify, wheel_state
+from estimator.wheel_state import REQUIRED_BITS, WheelState, classify
 
 SLIP_MEMORY = 20.0  # [s] k is estimated while slip has varied within this time …
 SLIP_VARIES = 0.05  # … by this standard deviation
@@ -76,6 +78,9 @@ class TrackState(NamedTuple):
 
     estimate: Estimate
     memory: Memory
+    recall: Mapping[str, float]  # what configured effects remember, by name
+    columns: Columns = ()  # of the uncertain effect parameters, at the last update
+    began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
     slip_mean: float = 0.0
@@ -113,7 +118,7 @@ class Tracker:
         """The prior."""
         soil = self.settings.soil
         estimate = self._unsure((soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value)))
-        return TrackState(estimate, Memory(estimate))
+        return TrackState(estimate, Memory(estimate), self.measurement.chain.fresh_memory())
 
     def _unsure(self, x: Vector) -> Estimate:
         """The state x with the prior's covariance."""
@@ -123,15 +128,29 @@ class Tracker:
 
     def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
         """Classify the window; when a whole new one has passed, and it is fit for it, update the filter."""
-        now = wheel_state(self.settings, snapshot)
+        elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
+        context = _context(state, snapshot, elapsed)
+        now = self.measurement.state(snapshot, context, state.columns)
         status = classify(self.settings, snapshot, now, state.before, self._required)
         aids: tuple[Aid, ...] = ()
-        if snapshot.evaluated - state.window_end >= self._window:
-            elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
-            state = state._replace(window_end=snapshot.evaluated, before=now if snapshot.ready else None)
+        if state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window:
+            state = self._closed(state, snapshot, now, elapsed)
             if status == Status.TRACKING:
-                state, aids = self._update(state, now, elapsed)
+                now = self.measurement.with_columns(now, snapshot, context, state.estimate)
+                state, aids = self._update(state._replace(columns=now.columns), now, elapsed)
         return state, Account(snapshot, now, status, int(now.flags) | self._flags(state, aids), aids)
+
+    def _closed(self, state: TrackState, snapshot: Snapshot, now: WheelState, elapsed: float) -> TrackState:
+        """A window has ended: remember what the next one is compared with, and what the effects remember."""
+        recall = state.recall
+        if now.situation is not None:
+            recall = self.measurement.chain.remember(recall, elapsed, now.situation)
+        return state._replace(
+            window_end=snapshot.evaluated,
+            began=snapshot.evaluated if state.began < 0 else state.began,
+            before=now if snapshot.ready else None,
+            recall=recall,
+        )
 
     def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
         """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
@@ -238,6 +257,17 @@ class Tracker:
             Flag.MISMATCH: self._experienced(state) and state.consistency > MISMATCH,
         }
         return sum([flag for flag, holds in raised.items() if holds])
+
+
+def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
+    """What the effects may know beside the snapshot: time, present estimate, rates of change, their memory."""
+    before = state.before
+    acceleration = sinking = 0.0
+    if before is not None and elapsed > 0.0:
+        acceleration = (snapshot.wheel_speed.value - before.read[0]) / elapsed
+        sinking = (snapshot.sinkage.value - before.read[1]) / elapsed
+    time = 0.0 if state.began < 0 else (snapshot.evaluated - state.began) / NS
+    return Context(time, *soil(state.estimate), acceleration, sinking, state.recall)
 
 
 def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackState:

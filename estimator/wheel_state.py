@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import hypot, isnan
 from typing import NamedTuple
 
 from estimator.geometry import EntryAngle, entry_angle, max_stress_angle, slip, slip_sigma
+from estimator.online import Chain, Context, Here
 from estimator.readings import REQUIRED
 from estimator.record import CHANNEL_BITS, Flag, Status
 from estimator.settings import Settings
+from estimator.situation import Situation
 from estimator.sync import Measured, Snapshot
 
 BRAKING_SLIP = -0.05  # the linearised shear displacement changes sign along the contact below about this slip
@@ -33,10 +36,38 @@ class WheelState(NamedTuple):
     load: Measured  # W [N]
     drawbar_pull: Measured  # [N], NaN ± 0 without the sensor
     flags: Flag
+    added: tuple[float, float] = (0.0, 0.0)  # torque [N·m] and pull [N] that effects add to the closed forms
+    here: Here | None = None  # the soil under this window from the estimated one; None where it is the same
+    columns: tuple[tuple[float, float], ...] = ()  # change of predicted (T, DP) with each uncertain effect parameter
+    situation: Situation | None = None
+    read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
 
 
-def wheel_state(settings: Settings, snapshot: Snapshot) -> WheelState:
-    """Slip, θ₁, θₘ, T, W and DP of one snapshot."""
+def wheel_state(
+    settings: Settings, snapshot: Snapshot, chain: Chain | None = None, context: Context | None = None
+) -> WheelState:
+    """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain accounted for."""
+    if chain is None or context is None or not chain.acting or not snapshot.ready:
+        return _plain(settings, snapshot)
+    undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
+    true = snapshot._replace(
+        wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
+        carriage_speed=snapshot.carriage_speed._replace(value=undone.travel_speed),
+        sinkage=snapshot.sinkage._replace(value=undone.sinkage),
+        drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
+    )
+    now = _plain(replace(settings, wheel=chain.wheel), true)
+    return now._replace(
+        torque=now.torque._replace(value=undone.torque),
+        load=now.load._replace(value=undone.load),
+        added=undone.added,
+        here=undone.here,
+        situation=undone.situation,
+        read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
+    )
+
+
+def _plain(settings: Settings, snapshot: Snapshot) -> WheelState:
     radius = settings.wheel.radius
     rim = Measured(snapshot.wheel_speed.value * radius, snapshot.wheel_speed.sigma * radius)
     travel = snapshot.carriage_speed
@@ -54,6 +85,7 @@ def wheel_state(settings: Settings, snapshot: Snapshot) -> WheelState:
         load=load,
         drawbar_pull=snapshot.drawbar_pull,
         flags=flags,
+        read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
     )
 
 

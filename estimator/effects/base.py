@@ -100,6 +100,7 @@ class Effect:
     stage: ClassVar[Stage]
     fingerprint: ClassVar[Fingerprint]
     confusable_with: ClassVar[Mapping[str, str]] = told_apart()  # other effect -> key of EXPERIMENTS
+    at_start: ClassVar[float] = 0.0  # what `remember` starts from
     filter_only: ClassVar[bool] = False  # acts on the on-line filter alone; the forward model needs nothing of it
     needs_sinkage: ClassVar[bool] = False  # the load stage needs a predicted sinkage: the balance is solved twice
 

@@ -32,6 +32,7 @@ class LoadAxisFriction(Effect):
     )
     confusable_with = told_apart(sensor_latency="load_step", frame_compliance="load_step")
     needs_sinkage = True
+    at_start = 1.0
 
     def load(self, load: Scalar, situation: Situation) -> Scalar:
         return load - np.minimum(self.friction, np.maximum(load, 0.0)) * self._direction(situation)

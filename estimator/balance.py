@@ -70,34 +70,37 @@ def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int
     load = np.asarray(contact.load, dtype=float)
     guess = bekker_entry_angle(wheel, contact.soil, load) if start is None else start
     theta_1, overloaded = np.zeros(load.size), np.zeros(load.size, dtype=bool)
+    kept = np.zeros((len(Forces._fields), load.size))
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
-        found, bogged = _iterate(wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order)
-        theta_1[touching], overloaded[touching] = found, bogged
-    return Balance(theta_1, Forces(*rim_forces(wheel, contact, theta_1, order)), overloaded)
+        found = _iterate(wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order)
+        theta_1[touching], kept[:, touching], overloaded[touching] = found
+    return Balance(theta_1, Forces(*kept), overloaded)
 
 
-def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> tuple[Array, Array]:
+def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balance:
     """Secant steps on ln W against ln θ₁, which is nearly straight with slope 2n + 1, kept inside a bracket."""
     solution, overloaded = np.empty(guess.size), np.zeros(guess.size, dtype=bool)
+    kept = np.empty((len(Forces._fields), guess.size))
     left = np.arange(guess.size)  # samples not yet solved
     x = np.log(np.clip(guess, 10.0 * SHALLOWEST, DEEPEST))
     slope = np.broadcast_to(2.0 * np.asarray(contact.soil.exponent) + 1.0, x.shape)
     low, high = np.full(x.size, np.log(SHALLOWEST)), np.full(x.size, np.inf)
     before = np.full((2, x.size), np.nan)  # the last x and its miss
     for _ in range(ROUNDS):
-        miss = _miss(wheel, contact, x, order)
+        forces = rim_forces(wheel, contact, np.exp(x), order)
+        miss = _miss(forces, contact)
         slope = _slope(slope, x - before[0], miss - before[1])
         low, high = np.where(miss < 0.0, x, low), np.where(miss > 0.0, x, high)
         bogged = low >= TOP
-        solution[left], overloaded[left] = x, bogged & (miss < -TOLERANCE)
+        solution[left], kept[:, left], overloaded[left] = x, forces, bogged & (miss < -TOLERANCE)
         rest = np.flatnonzero((np.abs(miss) > TOLERANCE) & (high - low > 1e-15) & ~bogged)
         if not rest.size:
             break
         before = np.stack((x[rest], miss[rest]))
         x = _ahead(before[0] - before[1] / slope[rest], low[rest], high[rest])
         left, contact, slope, low, high = left[rest], _take(contact, rest), slope[rest], low[rest], high[rest]
-    return np.exp(solution), overloaded
+    return Balance(np.exp(solution), Forces(*kept), overloaded)
 
 
 def _ahead(step: Array, low: Array, high: Array) -> Array:
@@ -106,10 +109,10 @@ def _ahead(step: Array, low: Array, high: Array) -> Array:
     return np.where((step > low) & (step < high), step, 0.5 * (low + np.minimum(high, TOP)))
 
 
-def _miss(wheel: Wheel, contact: Contact, x: Array, order: int) -> Array:
-    """ln(W/load) at θ₁ = eˣ; where the soil would pull the wheel down, a large negative number."""
-    carried = rim_forces(wheel, contact, np.exp(x), order).load
-    return np.log(np.maximum(carried / contact.load, 1e-30))
+def _miss(forces: Forces, contact: Contact) -> Array:
+    """ln(W/load); where the soil would pull the wheel down, a large negative number."""
+    miss: Array = np.log(np.maximum(forces.load / contact.load, 1e-30))
+    return miss
 
 
 def _slope(slope: Array, step: Array, change: Array) -> Array:

@@ -66,6 +66,16 @@ def simulate_arrays(
     situation = loaded(situation, wheel, solved.theta_1, solved.forces)
     reaction = react(situation, effects)
     situation, motor_torque = drive(replace(situation, torque=reaction.torque), effects, torque_constant)
+    return _response(situation, solved, reaction, motor_torque, effects)
+
+
+def _response(
+    situation: Situation,
+    solved: balance.Balance,
+    reaction: Reaction,
+    motor_torque: Scalar,
+    effects: Sequence[Effect],
+) -> Response:
     sensed = Sensed(reaction.sinkage, situation.current, reaction.drawbar_pull, reaction.load, reaction.torque)
     n = solved.theta_1.shape
     return Response(

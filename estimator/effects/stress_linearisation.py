@@ -11,12 +11,11 @@ from estimator.effects.base import Effect, Fingerprint, strength, told_apart
 class StressLinearisation(Effect):
     """The filter's triangular stresses stand for the true ones; this gives back what they miss.
 
-    T = T₂₂ [1 + s (ratio − 1)],   DP = DP₂₀ + s W pull
+    A₁ + s ΔA₁ … C₃ + s ΔC₃ in (20)-(22),   Δ(θ₁, i, k, n) = the integral over the stresses of (3), (4), (7) less that
+    over the triangles of (11)-(14) with the exponent of (19)
 
-    ratio and pull are surfaces over θ₁ and i, from Eqs. (8)-(10) at the prior soil.
-
-    Acts in the on-line filter alone, through estimator/correction.py: simulator and diagnosis integrate (3), (4), (7)
-    themselves. Source: difference of (8)-(10) from (20)-(22), Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42.
+    Acts in the on-line filter alone, through estimator/shift.py: simulator and diagnosis integrate (3), (4), (7)
+    themselves. Source: (8)-(10) against (20)-(22), Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42, 1-13.
     """
 
     share: float = strength("share of the difference given back, s", "", typical=1.0, low=0.0, high=1.0)

@@ -1,4 +1,7 @@
-"""What a tick's record says, by name: measured, estimated and predicted quantities and the account of the updates."""
+"""What a tick's record says of the tracker: measured, estimated and predicted quantities, the account of the updates.
+
+Each block is a plain tuple in the order of its names, and the blocks follow one another as in record.TICK_FIELDS.
+"""
 
 from __future__ import annotations
 
@@ -7,78 +10,89 @@ from math import sqrt
 from estimator.filter import KPA, LN_K, TAN_PHI, C, Estimate
 from estimator.measurement import COMPONENTS, Measurement, soil
 from estimator.record import NOT_A_NUMBER
-from estimator.sync import Measured
+from estimator.sync import Measured, Snapshot
 from estimator.tracker import Account, Aid, Tracker, TrackState
 from estimator.wheel_state import WheelState
 
-Record = dict[str, float]
+Row = tuple[float, ...]
+Pull = tuple[float, float, float]  # largest drawbar pull [N], its σ [N], its slip
 
 NO_AID = Aid(0.0, 0.0, 0.0, 0.0, 0.0, False)
 NOTHING = Measured(NOT_A_NUMBER, NOT_A_NUMBER)
-Pull = tuple[float, float, float]  # largest drawbar pull [N], its σ [N], its slip
 
 
-def record(tracker: Tracker, state: TrackState, account: Account, pull: Pull) -> Record:
-    """The fields of /tick that the tracker knows, and the largest pull; times in ns, everything else SI."""
-    return {
-        **_condition(tracker, state, account),
-        **_measured(account),
-        **_estimated(state.estimate),
-        **_predicted(tracker.measurement, state.estimate, account),
-        **_largest(pull),
-        **_aids(account.aids),
-    }
+def _pairs(*names: str) -> tuple[str, ...]:
+    return tuple(label for name in names for label in (name, f"{name}_sigma"))
 
 
-def _condition(tracker: Tracker, state: TrackState, account: Account) -> Record:
-    snapshot = account.snapshot
-    return {
-        "evaluated": snapshot.evaluated,
-        "status": int(account.status),
-        "flags": int(account.flags),
-        "stale": snapshot.stale,
-        "stuck": snapshot.stuck,
-        "separability": tracker.separability(state.estimate),
-        "consistency": state.consistency,
-        "updates": state.updates,
-        "resets": state.resets,
-    }
+MEASURED = (
+    "wheel_angle",
+    *_pairs("wheel_speed"),
+    "carriage_position",
+    *_pairs("carriage_speed", "slip", "sinkage", "theta_1"),
+    "theta_m",
+    "current",
+    "temperature",
+    *_pairs("torque", "load", "drawbar_pull"),
+)
+ESTIMATED = (*_pairs("cohesion", "tan_phi", "shear_modulus"), "cov_c_tan_phi", "cov_c_ln_k", "cov_tan_phi_ln_k")
+PREDICTED = _pairs("torque_predicted", "load_predicted", "drawbar_pull_predicted", "rolling_resistance")
+LARGEST = (*_pairs("drawbar_pull_max"), "drawbar_pull_max_slip")
+HEALTH = ("separability", "consistency", "updates", "resets")
+AIDED = tuple(f"{component}_{name}" for component in COMPONENTS for name in Aid._fields)
+NAMES = (*MEASURED, *ESTIMATED, *PREDICTED, *LARGEST, *HEALTH, *AIDED)
 
 
-def _measured(account: Account) -> Record:
-    snapshot, now = account.snapshot, account.now
-    return {
-        "wheel_angle": snapshot.wheel_angle,
-        "carriage_position": snapshot.carriage_position,
-        "theta_m": now.theta_m,
-        "current": snapshot.current.value,
-        "temperature": snapshot.temperature,
-        **_pair("wheel_speed", snapshot.wheel_speed),
-        **_pair("carriage_speed", snapshot.carriage_speed),
-        **_pair("slip", now.slip),
-        **_pair("sinkage", now.sinkage),
-        **_pair("theta_1", _angle(now)),
-        **_pair("torque", now.torque),
-        **_pair("load", now.load),
-        **_pair("drawbar_pull", now.drawbar_pull),
-    }
+def record(tracker: Tracker, state: TrackState, account: Account, pull: Pull) -> Row:
+    """Values in the order of NAMES, SI."""
+    return (
+        *measured(account.snapshot, account.now),
+        *estimated(state.estimate),
+        *predicted(tracker.measurement, state.estimate, account),
+        *pull,
+        *health(tracker, state),
+        *aided(account.aids),
+    )
 
 
-def _estimated(estimate: Estimate) -> Record:
+def measured(snapshot: Snapshot, now: WheelState) -> Row:
+    """In the order of MEASURED."""
+    return (
+        snapshot.wheel_angle,
+        *snapshot.wheel_speed,
+        snapshot.carriage_position,
+        *snapshot.carriage_speed,
+        *now.slip,
+        *now.sinkage,
+        *_angle(now),
+        now.theta_m,
+        snapshot.current.value,
+        snapshot.temperature,
+        *now.torque,
+        *now.load,
+        *now.drawbar_pull,
+    )
+
+
+def estimated(estimate: Estimate) -> Row:
+    """In the order of ESTIMATED."""
     P = estimate.P
     c, tan_phi, k = soil(estimate)
-    return {
-        **_pair("cohesion", Measured(c, sqrt(P[C][C]) * KPA)),
-        **_pair("tan_phi", Measured(tan_phi, sqrt(P[TAN_PHI][TAN_PHI]))),
-        **_pair("shear_modulus", Measured(k, k * sqrt(P[LN_K][LN_K]))),
-        "cov_c_tan_phi": P[C][TAN_PHI] * KPA,
-        "cov_c_ln_k": P[C][LN_K] * KPA,
-        "cov_tan_phi_ln_k": P[TAN_PHI][LN_K],
-    }
+    return (
+        c,
+        sqrt(P[C][C]) * KPA,
+        tan_phi,
+        sqrt(P[TAN_PHI][TAN_PHI]),
+        k,
+        k * sqrt(P[LN_K][LN_K]),
+        P[C][TAN_PHI] * KPA,
+        P[C][LN_K] * KPA,
+        P[TAN_PHI][LN_K],
+    )
 
 
-def _predicted(measurement: Measurement, estimate: Estimate, account: Account) -> Record:
-    """What the estimate says of this window: NaN where the wheel touches nothing."""
+def predicted(measurement: Measurement, estimate: Estimate, account: Account) -> Row:
+    """In the order of PREDICTED: what the estimate says of this window, NaN where the wheel touches nothing."""
     torque = pull = resistance = load = NOTHING
     now = account.now
     if account.touching:
@@ -86,30 +100,18 @@ def _predicted(measurement: Measurement, estimate: Estimate, account: Account) -
         sigmas = measurement.sigmas(estimate, now, prediction)
         torque, pull, resistance = [Measured(q.value, sigma) for q, sigma in zip(prediction, sigmas, strict=True)]
         load = measurement.model.load(*soil(estimate), _angle(now), now.theta_m, now.slip.value)
-    return {
-        **_pair("torque_predicted", torque),
-        **_pair("drawbar_pull_predicted", pull),
-        **_pair("rolling_resistance", resistance),
-        **_pair("load_predicted", load),
-    }
+    return *torque, *load, *pull, *resistance
 
 
-def _largest(pull: Pull) -> Record:
-    return dict(zip(("drawbar_pull_max", "drawbar_pull_max_sigma", "drawbar_pull_max_slip"), pull, strict=True))
+def health(tracker: Tracker, state: TrackState) -> Row:
+    """In the order of HEALTH."""
+    return tracker.separability(state.estimate), state.consistency, state.updates, state.resets
 
 
-def _aids(aids: tuple[Aid, ...]) -> Record:
-    padded = (*aids, *(NO_AID,) * (len(COMPONENTS) - len(aids)))
-    return {
-        f"{component}_{name}": value
-        for component, aid in zip(COMPONENTS, padded, strict=True)
-        for name, value in aid._asdict().items()
-    }
+def aided(aids: tuple[Aid, ...]) -> Row:
+    """In the order of AIDED: the account of each component, zeros where it was not offered."""
+    return tuple([value for aid in (*aids, *(NO_AID,) * (len(COMPONENTS) - len(aids))) for value in aid])
 
 
 def _angle(now: WheelState) -> Measured:
     return Measured(now.theta_1.value, now.theta_1.d_sinkage * now.sinkage.sigma)
-
-
-def _pair(name: str, quantity: Measured) -> Record:
-    return {name: quantity.value, f"{name}_sigma": quantity.sigma}

@@ -82,7 +82,8 @@ class WheelModel:
         if depth <= 0.0:
             return Measured(0.0, 0.0)
         sigma_m = self._modulus * depth**soil.exponent.value
-        load = float(linear.forces(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m).load)
+        shift = self._at(k, theta_1.value, slip)
+        load = float(linear.forces(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift=shift).load)
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
         relative = hypot(soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma)
         return Measured(load, abs(load) * relative)

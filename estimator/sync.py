@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left, insort
 from collections import deque
 from dataclasses import dataclass, field
-from math import inf, isfinite, sqrt
+from math import inf, isnan, sqrt
 from typing import NamedTuple
 
 from estimator.geometry import slope_sigma
@@ -267,16 +267,14 @@ class Sync:
     def _push_wrench(self, reading: Reading) -> None:
         wrench, value = self.settings.wrench, reading.value
         assert wrench is not None and isinstance(value, tuple)
-        forces, torques = value[:3], value[3:]
-        if not (
-            all(isfinite(f) and abs(f) <= wrench.max_force for f in forces)
-            and all(isfinite(t) and abs(t) <= wrench.max_torque for t in torques)
-        ):
+        limits = (wrench.max_force,) * 3 + (wrench.max_torque,) * 3
+        if not all(isnan(v) or abs(v) <= limit for v, limit in zip(value, limits, strict=True)) or isnan(value[2]):
             self.counters.invalid += 1
             return
         repeated = Counters()  # the three axes share one stamp: count a late or repeated reading once
         for axis, component in (("fx", value[0]), ("ty", value[4])):
-            self._wrench[axis].insert(reading.stamp, component, repeated)
+            if not isnan(component):  # an axis that is not measured
+                self._wrench[axis].insert(reading.stamp, component, repeated)
         self._wrench["fz"].insert(reading.stamp, value[2], self.counters)
 
     def snapshot(self, t: int) -> Snapshot:

@@ -162,9 +162,11 @@ def forces(
     slip: Value,
     sigma_m: Value,
     maths: Maths = NUMBERS,
+    shift: Shift | None = None,
 ) -> Forces:
     """DP, W, T and resistance for a given peak stress σₘ [Pa]. Eqs. (20)-(22)."""
     x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], shear_exponent(wheel, k, theta_1, slip, maths).f, maths)
+    x = _added(x, shift.value) if shift else x
     return _forces(wheel, x, c * theta_1, tan_phi, sigma_m * theta_1)
 
 

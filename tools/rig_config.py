@@ -11,20 +11,25 @@ import yaml
 
 from estimator.config import Configuration
 from estimator.settings import Device
+from tools.plant import PlantKind
 
+LINEARISATION = "stress_linearisation"  # what the linear plant does not have and the original one does
 NAME = "testbed.yaml"
 
 
-def write(configuration: Configuration, devices: Mapping[str, Device], folder: Path) -> Path:
+def write(configuration: Configuration, devices: Mapping[str, Device], plant: PlantKind, folder: Path) -> Path:
     """Write the configuration into the folder, with all it refers to; its path.
 
     devices: by name, where the wires are; everything else about a device stays as configured.
+    plant:   the linear one obeys the closed forms, so the daemon must not correct them.
     """
     document: dict[str, Any] = yaml.safe_load(configuration.text)
     for name, device in devices.items():
         document["devices"][name].update(_address(device))
         if device.dbc:
             document["devices"][name]["dbc"] = _copied(Path(device.dbc), folder)
+    if plant == "linear":
+        document["effects"].pop(LINEARISATION, None)
     document["logging"]["directory"] = str(folder)
     path = folder / NAME
     path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120), encoding="utf-8")

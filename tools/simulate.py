@@ -6,6 +6,7 @@ import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from estimator import config, effects, units
 from estimator.effects.base import Effect
 from estimator.forward import Response, simulate_arrays
 from estimator.measured import measured_run
-from estimator.readings import WRENCH_FIELDS, Reading
+from estimator.readings import ENCODERS, WRENCH_FIELDS, Reading
 from estimator.recording import RunInfo, RunWriter
 from estimator.salvage import read
 from estimator.settings import Calibration, Channel, Settings, Wrench
@@ -29,6 +30,7 @@ NS = 1_000_000_000
 TRANSPORT = 1_000_000  # [ns] from a stamp to its receipt
 ADC_STEPS = 1 << 16  # over the channel's valid range
 AMBIENT = 21.0  # [°C]
+ROUNDING = 1.0 / 12.0  # [count²] variance of rounding to whole counts; the stated noise of an encoder includes it
 SPARSE = 250  # samples from one temperature to the next
 SOIL_UNITS = {"cohesion": "Pa", "tan_phi": "", "shear_modulus": "m", "exponent": "", "modulus_factor": ""}
 
@@ -85,9 +87,11 @@ def readings(settings: Settings, motion: Motion, response: Response, rng: np.ran
 
 
 def _channel(channel: Channel, time: Array, physical: Array, rng: np.random.Generator) -> Iterable[Reading]:
-    raw = _raw(channel.calibration, physical) + channel.noise * rng.standard_normal(time.size)
+    counted = channel.name in ENCODERS
+    noise = sqrt(max(channel.noise**2 - ROUNDING, 0.0)) if counted else channel.noise
+    raw = _raw(channel.calibration, physical) + noise * rng.standard_normal(time.size)
     stamps = _stamps(time, channel.latency)
-    if channel.name in ("wheel_encoder", "carriage_encoder"):
+    if counted:
         counts = np.rint(raw).astype(np.int64).tolist()
         return [Reading(s, channel.name, count, s + TRANSPORT) for s, count in zip(stamps, counts, strict=True)]
     step = (channel.high - channel.low) / ADC_STEPS

@@ -115,7 +115,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     prepared = experiment(configuration, arguments.seconds, arguments.plant, arguments.seed)
     write_truth(folder, prepared)
     with Rig(configuration.settings, arguments.can) as rig:
-        print(f"configuration {rig_config.write(configuration, rig.devices, folder)}", flush=True)
+        print(f"configuration {rig_config.write(configuration, rig.devices, arguments.plant, folder)}", flush=True)
         if not arguments.wait or sys.stdin.readline():
             stop = _stop_on_signals()
             real_time()  # a real rig is not held up by the computer's other work; where refused, it may be

@@ -219,7 +219,15 @@ def _row(effect: type[Effect], name: str) -> str:
 
 
 def _menu() -> str:
-    return "\n".join(["## Experiments that tell effects apart\n", *(f"- `{k}`: {v}" for k, v in EXPERIMENTS.items())])
+    return "\n".join([MENU, *(f"- `{k}`: {v}" for k, v in EXPERIMENTS.items())])
+
+
+MENU = """## Experiments that tell effects apart
+
+`python -m tools.separation` prints what each of them gains, in standard deviations, for every pair named above: the
+soil within its prior and the other effect are fitted to what the effect changes, on a campaign without the experiment
+and on the same with it.
+"""
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ class Bulldozing(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull", "sinkage", "drawbar pull falls with sinkage while torque and sinkage stay"
     )
-    confusable_with = told_apart(side_wall_rubbing="load_step", bed_slope="reversal", force_crosstalk="load_step")
+    confusable_with = told_apart(side_wall_rubbing="load_step", bed_slope="reversal", force_crosstalk="reversal")
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         z, phi = np.maximum(situation.sinkage, 0.0), np.arctan(situation.tan_phi)

@@ -28,7 +28,7 @@ class DryingCohesion(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull", "time", "drawbar pull and torque drift with time, the same at every speed"
     )
-    confusable_with = told_apart(motor_heating="wrench", multipass="shifted_start", soil_patch="shifted_start")
+    confusable_with = told_apart(motor_heating="long_run", multipass="shifted_start", soil_patch="shifted_start")
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         return replace(soil, cohesion=soil.cohesion * (1.0 - self.change * np.expm1(-situation.time / self.duration)))

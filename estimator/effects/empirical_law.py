@@ -59,7 +59,7 @@ class EmpiricalLaw(Effect):
     fingerprint = Fingerprint(
         "torque", "speed", "whatever the fit found, in the channel and over the covariate it found"
     )
-    confusable_with = told_apart(coulomb_friction="lifted_spin", bulldozing="load_step", sinkage_datum="tape")
+    confusable_with = told_apart(coulomb_friction="speed_step", bulldozing="slip_step", sinkage_datum="tape")
 
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
         terms = self._terms(situation)

@@ -23,7 +23,7 @@ class ForceCrosstalk(Effect):
 
     stage = "sensor"
     fingerprint = Fingerprint("drawbar_pull", "load", "drawbar pull off in proportion to torque or load")
-    confusable_with = told_apart(bed_slope="level", side_wall_rubbing="reversal", bulldozing="load_step")
+    confusable_with = told_apart(bed_slope="level", side_wall_rubbing="reversal", bulldozing="reversal")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
         return replace(sensed, drawbar_pull=sensed.drawbar_pull + self._leak(sensed))

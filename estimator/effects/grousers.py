@@ -32,7 +32,7 @@ class Grousers(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull", "wheel_angle", "N ripples a turn in drawbar pull, torque and sinkage; more pull"
     )
-    confusable_with = told_apart(gear_ripple="wrench", wheel_eccentricity="lifted_spin", wheel_radius_error="tape")
+    confusable_with = told_apart(gear_ripple="load_step", wheel_eccentricity="lifted_spin", wheel_radius_error="tape")
 
     def geometry(self, wheel: Wheel) -> Wheel:
         return replace(wheel, radius=wheel.radius + self.share * self.height)

@@ -28,7 +28,7 @@ class MotorHeating(Effect):
     stage = "drivetrain"
     fingerprint = Fingerprint("torque", "heat", "current creeps up over a run while measured axle torque stays")
     confusable_with = told_apart(
-        torque_constant_error="long_run", drying_cohesion="wrench", viscous_friction="long_run"
+        torque_constant_error="long_run", drying_cohesion="long_run", viscous_friction="long_run"
     )
 
     def torque_factor(self, situation: Situation) -> Scalar:

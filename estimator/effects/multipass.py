@@ -28,7 +28,7 @@ class Multipass(Effect):
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "run", "sinkage falls from pass to pass, fast at first")
-    confusable_with = told_apart(drying_cohesion="shifted_start", soil_patch="shifted_start", sinkage_datum="tape")
+    confusable_with = told_apart(drying_cohesion="second_pass", soil_patch="second_pass", sinkage_datum="tape")
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         grown = 1.0 - np.exp((1.0 - situation.pass_number) / self.passes)

@@ -26,7 +26,7 @@ class RateDependentShear(Effect):
         "drawbar_pull", "speed", "drawbar pull and torque rise with the logarithm of speed at fixed slip"
     )
     confusable_with = told_apart(
-        viscous_friction="lifted_spin", stribeck_friction="lifted_spin", rate_dependent_sinkage="speed_step"
+        viscous_friction="speed_step", stribeck_friction="speed_step", rate_dependent_sinkage="speed_step"
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:

@@ -26,7 +26,7 @@ class SensorLatency(Effect):
 
     stage = "sensor"
     fingerprint = Fingerprint("load", "rate", "pulses in proportion to how fast the channel itself changes")
-    confusable_with = told_apart(wheel_inertia="speed_step", load_axis_friction="load_step")
+    confusable_with = told_apart(wheel_inertia="load_step", load_axis_friction="load_step")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
         return self._shifted(sensed, situation.time, 1.0)

@@ -31,7 +31,7 @@ class ShearPeak(Effect):
         "more pull and torque where j is about k, less gain where j is far beyond; φ seems larger than it is",
     )
     confusable_with = told_apart(
-        rear_contact="slip_step", stress_peak_shift="slip_step", rate_dependent_shear="speed_step"
+        rear_contact="slip_step", stress_peak_shift="slip_step", rate_dependent_shear="slip_step"
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:

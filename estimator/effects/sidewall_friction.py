@@ -36,7 +36,9 @@ class SidewallFriction(Effect):
         "slip",
         "torque grows with sinkage faster than the rim explains; pull gains at high slip, loses at low",
     )
-    confusable_with = told_apart(bulldozing="wrench", coulomb_friction="lifted_spin", torque_constant_error="wrench")
+    confusable_with = told_apart(
+        bulldozing="slip_step", coulomb_friction="slip_step", torque_constant_error="slip_step"
+    )
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         r, sine = situation.radius, np.sin(situation.theta_1)

@@ -27,7 +27,7 @@ class StribeckFriction(Effect):
     stage = "drivetrain"
     fingerprint = Fingerprint("torque", "speed", "motor torque falls as a slow wheel speeds up")
     confusable_with = told_apart(
-        coulomb_friction="speed_step", viscous_friction="speed_step", rate_dependent_shear="lifted_spin"
+        coulomb_friction="speed_step", viscous_friction="speed_step", rate_dependent_shear="speed_step"
     )
 
     def torque_loss(self, situation: Situation) -> Scalar:

@@ -23,7 +23,7 @@ class TorqueConstantError(Effect):
     stage = "sensor"
     fingerprint = Fingerprint("torque", "load", "motor torque off in proportion to itself")
     confusable_with = told_apart(
-        coulomb_friction="load_step", motor_heating="long_run", sidewall_friction="wrench", shear_peak="wrench"
+        coulomb_friction="load_step", motor_heating="long_run", sidewall_friction="slip_step", shear_peak="load_step"
     )
 
     def torque_factor(self, situation: Situation) -> Scalar:

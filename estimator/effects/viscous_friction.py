@@ -25,7 +25,7 @@ class ViscousFriction(Effect):
         "torque", "speed", "motor torque rises in proportion to speed, also with the wheel lifted"
     )
     confusable_with = told_apart(
-        coulomb_friction="speed_step", rate_dependent_shear="lifted_spin", stribeck_friction="speed_step"
+        coulomb_friction="speed_step", rate_dependent_shear="speed_step", stribeck_friction="speed_step"
     )
 
     def torque_loss(self, situation: Situation) -> Scalar:

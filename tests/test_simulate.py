@@ -76,6 +76,12 @@ def test_truth_names_soil_effects_and_seed(schedule: Path, tmp_path: Path) -> No
     assert truth["soil"]["cohesion"] == 1200.0 and truth["seed"] == 4
 
 
+def test_what_is_on_line_alone_is_not_part_of_the_truth(schedule: Path, tmp_path: Path) -> None:
+    assert "stress_linearisation" in packaged().read_text(encoding="utf-8")
+    main(["--schedule", str(schedule), "-o", str(tmp_path / "run.mcap")])
+    assert json.loads((tmp_path / "run.truth.json").read_text())["effects"] == {}
+
+
 def test_the_recording_does_not_tell_the_effect(schedule: Path, tmp_path: Path) -> None:
     out = tmp_path / "run.mcap"
     main(["--schedule", str(schedule), "--effect", "rear_contact.ratio=0.3", "-o", str(out)])
@@ -167,3 +173,18 @@ def test_a_recording_drives_it_again(schedule: Path, tmp_path: Path) -> None:
     driving = (again["time"] > 1.5) & (again["time"] < 4.8)
     expected = np.interp(again["time"], first["time"], first["torque"])
     assert np.sqrt(np.mean((again["torque"] - expected)[driving] ** 2)) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--motion", "nowhere.mcap"], "nowhere.mcap: cannot read: No such file or directory"),
+        ([], "taken.mcap: cannot create: File exists"),
+    ],
+)
+def test_a_file_in_the_way_is_one_line(options: list[str], said: str, schedule: Path, tmp_path: Path) -> None:
+    (tmp_path / "taken.mcap").write_bytes(b"mine")
+    with pytest.raises(CommandError) as error:
+        main(["--schedule", str(schedule), *options, "-o", str(tmp_path / "taken.mcap")])
+    assert str(error.value).endswith(said) and (tmp_path / "taken.mcap").read_bytes() == b"mine"
+    assert not (tmp_path / "taken.truth.json").exists()

@@ -17,13 +17,13 @@ from estimator.effects.base import Effect
 from estimator.forward import Response, simulate_arrays
 from estimator.measured import measured_run
 from estimator.readings import ENCODERS, WRENCH_FIELDS, Reading
-from estimator.recording import RunInfo, RunWriter
+from estimator.recording import RecordingError, RunInfo, RunWriter
 from estimator.salvage import read
 from estimator.settings import Calibration, Channel, Settings, Wrench
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
 from tools import schedule as schedules
-from tools.command import DONE, USAGE, CommandError, Parser
+from tools.command import DONE, FAILED, USAGE, CommandError, Parser
 
 START = 1_767_225_600_000_000_000  # [ns] 2026-01-01: a recording made twice is the same to the byte
 NS = 1_000_000_000
@@ -157,28 +157,33 @@ def write_truth(path: Path, settings: Settings, soil: Soil, acting: Sequence[Eff
 
 
 def main(argv: Sequence[str]) -> int:
-    """Simulate, write the recording and its truth. Raises ConfigError, CommandError or RecordingError."""
+    """Simulate, write the recording and its truth. Raises ConfigError or CommandError."""
     arguments = _parser().parse_args(argv)
     configuration = config.load(arguments.config, effects.units)
     settings, soil = configuration.settings, soil_of(configuration.settings, _soil_changes(arguments.soil))
     acting = _acting(settings, arguments.effect)
-    info = replace(configuration.run, pass_number=arguments.pass_number or configuration.run.pass_number)
-    info = replace(info, name=info.name or arguments.output.stem)
-    motion = _motion(arguments, settings, info)
-    run = simulate_run(settings, soil, motion, acting, arguments.seed)
-    write(arguments.output, configuration, info, run)
+    try:
+        motion, info = _motion(arguments, configuration)
+        run = simulate_run(settings, soil, motion, acting, arguments.seed)
+        write(arguments.output, configuration, info, run)
+    except RecordingError as error:
+        raise CommandError(error, FAILED) from None
     write_truth(arguments.output, settings, soil, acting, run, arguments.seed)
     print(_summary(arguments.output, acting, run))
     return DONE
 
 
-def _motion(arguments: argparse.Namespace, settings: Settings, info: RunInfo) -> Motion:
-    """The motion of a recording if one is given, else that of the schedule."""
-    rate = settings.rates.tick
-    if arguments.motion:
-        return measured_run(read(arguments.motion), settings, rate).motion
+def _motion(arguments: argparse.Namespace, configuration: config.Configuration) -> tuple[Motion, RunInfo]:
+    """The motion of a recording if one is given, else that of the schedule; and what the run is called."""
+    settings, recording = configuration.settings, read(arguments.motion) if arguments.motion else None
+    info = recording.run if recording else configuration.run
+    info = replace(info, pass_number=arguments.pass_number or info.pass_number, name=arguments.output.stem)
+    if recording:
+        motion = measured_run(recording, settings, settings.rates.tick).motion
+        return replace(motion, pass_number=float(info.pass_number)), info
     schedule = schedules.read(arguments.schedule)
-    return schedules.motion_of(schedule, settings.wheel.radius, rate, float(info.pass_number), info.start_position)
+    place = float(info.pass_number), info.start_position
+    return schedules.motion_of(schedule, settings.wheel.radius, settings.rates.tick, *place), info
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -209,7 +214,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
-    """Configured effects, with the values of the command line in their place."""
+    """Configured effects that act on the testbed, with the values of the command line in their place."""
     values = {e.name: {name: value.value for name, value in e.parameters.items()} for e in settings.effects}
     for text in given:
         key, _, value = text.partition("=")
@@ -222,9 +227,10 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
             )
         values.setdefault(name, {})[parameter] = _quantity(f"--effect {text}", value, known[parameter])
     try:
-        return tuple(effects.make(name, parameters) for name, parameters in values.items())
+        made = [effects.make(name, parameters) for name, parameters in values.items()]
     except ValueError as error:
         raise CommandError(error, USAGE) from None
+    return tuple(effect for effect in made if not effect.filter_only)
 
 
 def _soil_changes(given: Sequence[str]) -> dict[str, float]:

@@ -46,11 +46,7 @@ class WheelModel:
 
     def predict(self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
-        shift = self._at(k, theta_1, slip)
-        if shift is None:
-            p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load)
-        else:
-            p = linear.predict(self._wheel, c, tan_phi, k, theta_1, slip, load, shift=shift)
+        p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load, self._at(k, theta_1, slip))
         return Prediction(
             Quantity(p.torque, *p.torque_gradient),
             Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),

@@ -10,6 +10,7 @@ the filter stays exact in c, tan φ and W, and is first-order in ln k and n.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from math import log
 
 import numpy as np
@@ -28,6 +29,7 @@ SLIP = (-0.1, 1.0)
 NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
+REMEMBERED = 256  # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 ORDER = 24  # quadrature nodes in each zone
 INTEGRALS = len(Integrals._fields)
 PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
@@ -51,7 +53,9 @@ class IntegralShift:
         k, n = self._ln_k, float(soil.exponent)
         by_ln_k = (shift(k + STEP, n) - shift(k - STEP, n)) / (2.0 * STEP)
         by_n = (shift(k, n + STEP) - shift(k, n - STEP)) / (2.0 * STEP)
-        self._coefficients = _fitted(np.concatenate((shift(k, n), by_ln_k, by_n)))
+        coefficients = _fitted(np.concatenate((shift(k, n), by_ln_k, by_n)))
+        self._coefficients = coefficients.transpose(1, 0, 2).reshape(DEGREE[0] + 1, -1).copy()
+        self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
     def at(self, k: float, theta_1: float, slip: float, exponent_error: float = 0.0) -> Shift:
         """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's exponent n."""
@@ -63,13 +67,14 @@ class IntegralShift:
             Integrals(*value), Integrals(*by_theta_1), Integrals(*by_slip), Integrals(*table[0, BY_LN_K].tolist())
         )
 
-    def _table(self, theta_1: float, slip: float) -> Array:
+    def _tabulated(self, theta_1: float, slip: float) -> Array:
         """Values and derivatives with respect to θ₁ and i of all quantities, (3, quantities)."""
         u, du = _unit(theta_1, THETA_1)
         v, dv = _unit(slip, SLIP)
         rows, columns = _polynomials(u, DEGREE[0], du), _polynomials(v, DEGREE[1], dv)
-        found = rows @ (self._coefficients @ columns.T)  # (quantities, 2 for θ₁, 2 for i)
-        return np.stack((found[:, 0, 0], found[:, 1, 0], found[:, 0, 1]))
+        along_slip = (rows @ self._coefficients).reshape(-1, DEGREE[1] + 1)  # (2 for θ₁ · quantities, powers of i)
+        by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
+        return np.array((by_value[0], by_value[1], by_slip[0]))
 
 
 def true_integrals(wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array) -> Integrals:

@@ -29,9 +29,12 @@ def changes(prediction):
 
 
 @pytest.mark.parametrize("wheel", [Wheel(0.072, 0.071), Wheel(0.125, 0.16, 0.43, 0.32)])
-@given(conditions)
-def test_values_and_gradients_are_those_of_the_linear_model(wheel, condition):
-    have, want = scalar.predict(wheel, *condition), linear.predict(wheel, *condition)
+@pytest.mark.parametrize("shifted", [False, True])
+@given(condition=conditions, seed=st.integers(0, 1000))
+def test_values_and_gradients_are_those_of_the_linear_model(wheel, shifted, condition, seed):
+    drawn = np.random.default_rng(seed).uniform(-0.02, 0.02, (4, 8)).tolist()
+    shift = linear.Shift(*[linear.Integrals(*row) for row in drawn]) if shifted else None
+    have, want = scalar.predict(wheel, *condition, shift), linear.predict(wheel, *condition, shift=shift)
     size = np.abs(changes(want)).max(axis=1, keepdims=True)
     assert np.all(np.abs(changes(have) - changes(want)) <= 1e-10 * size)
     assert have.sigma_m == pytest.approx(want.sigma_m, rel=1e-10)

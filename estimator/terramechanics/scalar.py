@@ -16,7 +16,7 @@ from math import exp, sin
 from typing import Any
 
 from estimator.terramechanics import linear
-from estimator.terramechanics.linear import Prediction
+from estimator.terramechanics.linear import Prediction, Shift
 from estimator.terramechanics.soil import Wheel
 
 SMALLEST = 0.1  # of |s|: below it a derivative of H has lost four digits
@@ -26,16 +26,28 @@ Number = Any  # real or complex: the transforms are the same
 Integrals = tuple[float, float, complex, complex, complex]  # see _integrals
 Forces = tuple[float, float, float, float]  # T, DP, resistance, W, or their changes
 NONE: Forces = (0.0, 0.0, 0.0, 0.0)
+NOTHING: Integrals = (0.0, 0.0, 0j, 0j, 0j)
 
 
-def predict(wheel: Wheel, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
+def predict(
+    wheel: Wheel,
+    c: float,
+    tan_phi: float,
+    k: float,
+    theta_1: float,
+    slip: float,
+    load: float,
+    shift: Shift | None = None,
+) -> Prediction:
     """T, DP, resistance and σₘ under a load W, with gradients: arguments and result are those of `linear.predict`."""
     lam = wheel.c1 + wheel.c2 * slip
     rise, scale = sin(0.5 * theta_1) ** 2, wheel.radius / k
     f = scale * (slip + (1.0 - slip) * rise)  # Eq. (19)
     if slip < 0.0 or min(theta_1, f * theta_1) < SMALLEST or not NEAREST < lam < 1.0 - NEAREST:
-        return linear.predict(wheel, c, tan_phi, k, theta_1, slip, load)
+        return linear.predict(wheel, c, tan_phi, k, theta_1, slip, load, shift=shift)
     x, by_theta_1, by_f = _integrals(theta_1, f * theta_1, lam)
+    if shift is not None:
+        x, by_theta_1 = _added(x, shift.value, 1.0), _added(by_theta_1, shift.theta_1, theta_1)
     a1, a2, bare, one, hat = x
     area, arm = wheel.radius * wheel.width, wheel.radius * wheel.radius * wheel.width
     cohesion, carry = c * theta_1, bare.real + tan_phi * hat.imag
@@ -58,23 +70,43 @@ def predict(wheel: Wheel, c: float, tan_phi: float, k: float, theta_1: float, sl
         forces(*by_f),
         forces(a1 + by_theta_1[0], by_theta_1[1], by_theta_1[2], one + by_theta_1[3], by_theta_1[4]),
         forces(*_by_ratio(theta_1, f * theta_1, lam)) if wheel.c2 else NONE,
+        forces(*_added(NOTHING, shift.ln_k, 1.0)) if shift is not None else NONE,
+        forces(*_added(NOTHING, shift.slip, 1.0)) if shift is not None else NONE,
     ]
     # s gives way to each of them so that W stays the same
     ds = -1.0 / (area * carry)
     torque_s, drag_s = arm * tan_phi * a2 * ds, area * bare.imag * ds
     pull_s = area * tan_phi * hat.real * ds - drag_s
-    by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam = [
+    by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam, by_ln_k, by_slip = [
         (torque + torque_s * load, pull + pull_s * load, drag + drag_s * load) for torque, pull, drag, load in columns
     ]
     # of ln f by θ₁ and by i
     f_theta_1, f_slip = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f, scale * (1.0 - rise) / f
     torque, pull, drag, _ = forces(*x)
     gradients = [
-        (by_c[q], by_tan_phi[q], -by_ln_f[q], by_ln_theta_1[q] / theta_1 + f_theta_1 * by_ln_f[q],
-         f_slip * by_ln_f[q] + wheel.c2 * by_lam[q], -by_w)
+        (
+            by_c[q],
+            by_tan_phi[q],
+            by_ln_k[q] - by_ln_f[q],
+            by_ln_theta_1[q] / theta_1 + f_theta_1 * by_ln_f[q],
+            by_slip[q] + f_slip * by_ln_f[q] + wheel.c2 * by_lam[q],
+            -by_w,
+        )
         for q, by_w in enumerate((torque_s, pull_s, drag_s))
-    ]  # fmt: skip
+    ]
     return Prediction(torque, pull, drag, s / theta_1, *gradients)
+
+
+def _added(x: Integrals, change: linear.Integrals, factor: float) -> Integrals:
+    """The integrals with a multiple of eight real ones added."""
+    a1, a2, b1, b2, b3, c1, c2, c3 = change
+    return (
+        x[0] + factor * a1,
+        x[1] + factor * a2,
+        x[2] + factor * complex(b1, c3),
+        x[3] + factor * complex(c1, b2),
+        x[4] + factor * complex(c2, b3),
+    )
 
 
 def _integrals(theta_1: float, eta: float, lam: float) -> tuple[Integrals, Integrals, Integrals]:

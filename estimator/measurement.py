@@ -9,13 +9,14 @@ from estimator.effects import configured
 from estimator.filter import KPA, Estimate, Matrix, Update, Vector, dot, variance
 from estimator.model import Prediction, Quantity, WheelModel
 from estimator.nuisance import Sensitivity, nuisances
-from estimator.online import Chain, Context, Here, variants
+from estimator.online import Added, Chain, Context, Here, variants
 from estimator.settings import Settings
 from estimator.sync import Snapshot
 from estimator.wheel_state import WheelState, wheel_state
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
+ADDED_STEP = 1e-3  # relative, for the slope of what effects add
 Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
 
 
@@ -31,38 +32,26 @@ class Measurement:
         self._unmoved = ((0.0, 0.0),) * len(self._variants)
         self.variances = (*(nuisance.sigma**2 for nuisance in self.nuisances), *(1.0,) * len(self._variants))
 
-    def state(self, snapshot: Snapshot, context: Context, columns: Columns = ()) -> WheelState:
+    def state(self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns) -> WheelState:
         """The window in the wheel's own terms, effects accounted for; columns: those of the last update."""
-        now = wheel_state(self.settings, snapshot, self.chain, context)
+        now = _sensed(self.settings, self.model, self.chain, snapshot, context, estimate)
         return now._replace(columns=columns or self._unmoved)
 
     def with_columns(self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate) -> WheelState:
         """The window with the change of its innovation for one σ of each uncertain effect parameter, and of n."""
         if not self._variants:
             return now
-        here = _innovation(now, self._predicted(self.model, estimate, now))
+        here = _innovation(now, _predicted(self.model, estimate, now))
         columns = []
         for model, chain in self._variants:
-            moved = now if chain is self.chain else wheel_state(self.settings, snapshot, chain, context)
-            there = _innovation(moved, self._predicted(model, estimate, moved))
+            moved = now if chain is self.chain else _sensed(self.settings, model, chain, snapshot, context, estimate)
+            there = _innovation(moved, _predicted(model, estimate, moved))
             columns.append((here[0] - there[0], here[1] - there[1]))
         return now._replace(columns=tuple(columns))
 
     def predict(self, estimate: Estimate, now: WheelState) -> Prediction:
         """T, DP and resistance at the estimate, in this window's geometry."""
-        return self._predicted(self.model, estimate, now)
-
-    @staticmethod
-    def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
-        if now.here is None:
-            return model.predict(*soil(estimate), now.theta_1.value, now.slip.value, now.load.value)
-        prediction = model.predict(*soil_here(estimate, now.here), now.theta_1.value, now.slip.value, now.load.value)
-        torque, pull, resistance = (_by_estimate(quantity, estimate, now.here) for quantity in prediction)
-        return Prediction(
-            torque._replace(value=torque.value + now.added[0]),
-            pull._replace(value=pull.value + now.added[1]),
-            resistance,
-        )
+        return _predicted(self.model, estimate, now)
 
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
         """Innovation, H, G and R of the components that are measured: T always, DP where there is a sensor."""
@@ -130,6 +119,67 @@ def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
         here.c_slope * c + here.c_offset,
         here.tan_phi_slope * tan_phi + here.tan_phi_offset,
         here.k_slope * k + here.k_offset,
+    )
+
+
+def _sensed(
+    settings: Settings, model: WheelModel, chain: Chain, snapshot: Snapshot, context: Context, estimate: Estimate
+) -> WheelState:
+    """The window with one chain of effects; what wheel and testbed effects add is linear about the estimate."""
+    now = wheel_state(settings, snapshot, chain, context)
+    if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
+        return now
+    return now._replace(added=_added(model, chain, now, estimate))
+
+
+def _added(model: WheelModel, chain: Chain, now: WheelState, estimate: Estimate) -> Added:
+    """What the effects add to the rim's torque and pull, with its slope along c, tan φ and k."""
+    rim = _predicted(model, estimate, now)
+    x = soil(estimate)
+
+    def added(x: tuple[float, float, float], torque: float, pull: float) -> tuple[float, float]:
+        assert now.situation is not None
+        felt = chain.felt(now.situation, torque, pull, x)
+        return felt[0] - torque, felt[1] - pull
+
+    torque, pull = rim.torque, rim.drawbar_pull
+    here = added(x, torque.value, pull.value)
+    slopes = []
+    for place, name in enumerate(("by_c", "by_tan_phi", "by_ln_k")):
+        step = ADDED_STEP * x[place] or ADDED_STEP
+        scale = step / x[place] if name == "by_ln_k" else step
+        c, tan_phi, k = (value + step if at == place else value for at, value in enumerate(x))
+        there = added(
+            (c, tan_phi, k), torque.value + scale * getattr(torque, name), pull.value + scale * getattr(pull, name)
+        )
+        slopes.append(((there[0] - here[0]) / step, (there[1] - here[1]) / step))
+    by_torque, by_pull = zip(*slopes, strict=True)
+    return Added._make((here[0] - dot(by_torque, x), *by_torque, here[1] - dot(by_pull, x), *by_pull))
+
+
+def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
+    """T, DP and resistance of the rim in the soil under this window, and what effects add, along the estimate."""
+    ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
+    prediction = model.predict(*ground, now.theta_1.value, now.slip.value, now.load.value)
+    if now.here is not None:
+        here = now.here
+        prediction = Prediction(*(_by_estimate(quantity, estimate, here) for quantity in prediction))
+    if now.added is None:
+        return prediction
+    x = soil(estimate)
+    return prediction._replace(
+        torque=_plus(prediction.torque, now.added[:4], x), drawbar_pull=_plus(prediction.drawbar_pull, now.added[4:], x)
+    )
+
+
+def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
+    """A quantity of the rim with what effects add, linear in x = (c, tan φ, k)."""
+    offset, *slopes = added
+    return quantity._replace(
+        value=quantity.value + offset + dot(tuple(slopes), x),
+        by_c=quantity.by_c + slopes[0],
+        by_tan_phi=quantity.by_tan_phi + slopes[1],
+        by_ln_k=quantity.by_ln_k + slopes[2] * x[2],
     )
 
 

@@ -47,6 +47,19 @@ class Here(NamedTuple):
     k_offset: float = 0.0
 
 
+class Added(NamedTuple):
+    """What wheel and testbed effects add to rim torque [N·m] and pull [N], linear in c [Pa], tan φ and k [m]."""
+
+    torque: float = 0.0
+    torque_by_c: float = 0.0
+    torque_by_tan_phi: float = 0.0
+    torque_by_k: float = 0.0
+    pull: float = 0.0
+    pull_by_c: float = 0.0
+    pull_by_tan_phi: float = 0.0
+    pull_by_k: float = 0.0
+
+
 class Undone(NamedTuple):
     """What a window measures once the effects are accounted for, SI."""
 
@@ -56,7 +69,6 @@ class Undone(NamedTuple):
     torque: float  # at the axle, drivetrain undone [N·m]
     load: float  # carried by the rim [N]
     drawbar_pull: float  # [N]
-    added: tuple[float, float]  # torque [N·m] and pull [N] to add to the closed forms
     here: Here
     situation: Situation
 
@@ -68,6 +80,7 @@ class Chain:
         self.effects = in_order(effects)
         self.acting = tuple(e for e in self.effects if not e.filter_only)
         self.wheel: Wheel = reduce(lambda wheel, e: e.geometry(wheel), self.effects, settings.wheel)
+        self.reacts = any(e.stage in ("wheel", "testbed", "any") for e in self.acting)
         self._settings = settings
         soil = settings.soil
         self._exponent = soil.exponent.value
@@ -97,10 +110,18 @@ class Chain:
             torque=float(torque),
             load=float(carried - (felt.load - carried)),
             drawbar_pull=float(true.drawbar_pull),
-            added=(float(felt.torque - torque), float(felt.drawbar_pull - true.drawbar_pull)),
             here=self._here(situation, context),
             situation=situation,
         )
+
+    def felt(
+        self, situation: Situation, torque: float, pull: float, soil: tuple[float, float, float]
+    ) -> tuple[float, float]:
+        """Axle torque [N·m] and drawbar pull [N] where the rim gives `torque` and `pull` in a soil (c, tan φ, k)."""
+        c, tan_phi, k = soil
+        situation = replace(situation, torque=torque, drawbar_pull=pull, cohesion=c, tan_phi=tan_phi, shear_modulus=k)
+        reaction = react(situation, self.effects)
+        return float(reaction.torque), float(reaction.drawbar_pull)
 
     def _carried(self, load: float, situation: Situation) -> float:
         """W on the soil: as measured, or what the effects leave of the weights."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from estimator.filter import Estimate
 from estimator.geometry import EntryAngle, entry_angle
-from estimator.online import Here
+from estimator.online import Added, Here
 from estimator.sync import Measured
 from estimator.wheel_state import WheelState
 
@@ -63,7 +63,7 @@ class Stretch(NamedTuple):
             torque=mean(old.torque, now.torque),
             load=mean(old.load, now.load),
             drawbar_pull=mean(old.drawbar_pull, now.drawbar_pull),
-            added=_blend(old.added, now.added, weight),
+            added=old.added and now.added and Added(*_blend(old.added, now.added, weight)),
             here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
             columns=tuple(_blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)),
         )

@@ -130,7 +130,7 @@ class Tracker:
         """Classify the window; when a whole new one has passed, and it is fit for it, update the filter."""
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
         context = _context(state, snapshot, elapsed)
-        now = self.measurement.state(snapshot, context, state.columns)
+        now = self.measurement.state(snapshot, context, state.estimate, state.columns)
         status = classify(self.settings, snapshot, now, state.before, self._required)
         aids: tuple[Aid, ...] = ()
         if state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window:
@@ -191,7 +191,7 @@ class Tracker:
 
     def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:
         """Add the window to the memory; when a new stretch begins, linearise all of them anew."""
-        memory, begun = state.memory.extended(now, taken, self.settings.wheel.radius, elapsed)
+        memory, begun = state.memory.extended(now, taken, self.measurement.chain.wheel.radius, elapsed)
         if not begun or len(memory.stretches) == 1:
             return state._replace(memory=memory)
         if len(memory.stretches) > CAPACITY:

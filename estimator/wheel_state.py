@@ -7,7 +7,7 @@ from math import hypot, isnan
 from typing import NamedTuple
 
 from estimator.geometry import EntryAngle, entry_angle, max_stress_angle, slip, slip_sigma
-from estimator.online import Chain, Context, Here
+from estimator.online import Added, Chain, Context, Here
 from estimator.readings import REQUIRED
 from estimator.record import CHANNEL_BITS, Flag, Status
 from estimator.settings import Settings
@@ -36,7 +36,7 @@ class WheelState(NamedTuple):
     load: Measured  # W [N]
     drawbar_pull: Measured  # [N], NaN ± 0 without the sensor
     flags: Flag
-    added: tuple[float, float] = (0.0, 0.0)  # torque [N·m] and pull [N] that effects add to the closed forms
+    added: Added | None = None  # what wheel and testbed effects add to the closed forms
     here: Here | None = None  # the soil under this window from the estimated one; None where it is the same
     columns: tuple[tuple[float, float], ...] = ()  # change of predicted (T, DP) with each uncertain effect parameter
     situation: Situation | None = None
@@ -60,7 +60,6 @@ def wheel_state(
     return now._replace(
         torque=now.torque._replace(value=undone.torque),
         load=now.load._replace(value=undone.load),
-        added=undone.added,
         here=undone.here,
         situation=undone.situation,
         read=(snapshot.wheel_speed.value, snapshot.sinkage.value),

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 
 from estimator import balance
 from estimator.effects import make
@@ -15,6 +14,7 @@ from estimator.situation import ContactLaw
 from estimator.terramechanics import linear, original
 from estimator.terramechanics.soil import Soil, Wheel
 from estimator.terramechanics.soils import DRY_SAND, LOOSE_SAND, MARS_LIKE, SANDY_LOAM
+from tools.reproduce import fit
 
 WHEEL = Wheel(radius=0.072, width=0.071)
 SAND = DRY_SAND.under(WHEEL.width)
@@ -78,34 +78,11 @@ def test_gradients():
 @pytest.mark.parametrize("prior", [{}, {"cohesion": 1.25, "tan_phi": 0.95}, {"shear_modulus": 1.15}], ids=str)
 def test_c_and_tan_phi_are_found(named, prior):
     """Issue: bias of c within 5 % or 40 Pa, of tan φ within 1.5 %, loads 30-105 N, slips 5-60 %, no noise."""
-    c, tan_phi = fitted(named.under(WHEEL.width), prior, corrected=True)
     soil = named.under(WHEEL.width)
+    wrong = replace(soil, **{name: factor * getattr(soil, name) for name, factor in prior.items()})
+    c, tan_phi = fit(soil, IntegralShift(WHEEL, wrong))
     assert abs(c - soil.cohesion) < max(0.01 * soil.cohesion, 10.0)
     assert tan_phi == pytest.approx(soil.tan_phi, rel=0.003)
-
-
-def fitted(soil, prior, corrected):
-    """c and tan φ that the closed forms find in T and DP of the original model; k is known to the fit."""
-    wrong = replace(soil, **{name: factor * getattr(soil, name) for name, factor in prior.items()})
-    shift = IntegralShift(WHEEL, wrong)
-    load, slip = (grid.ravel() for grid in np.meshgrid((30.0, 55.0, 80.0, 105.0), np.linspace(0.05, 0.6, 6)))
-    true = balance.solve(WHEEL, balance.Contact(soil, ContactLaw(0.5), slip, load))
-    conditions = list(zip(true.theta_1.tolist(), slip.tolist(), load.tolist(), strict=True))
-    k = float(soil.shear_modulus)
-
-    def misfit(x):
-        found = [
-            linear.predict(
-                WHEEL, 1e3 * x[0], x[1], k, theta_1, i, w, shift=shift.at(k, theta_1, i) if corrected else None
-            )
-            for theta_1, i, w in conditions
-        ]
-        torque = np.array([p.torque for p in found]) - true.forces.torque
-        pull = np.array([p.drawbar_pull for p in found]) - true.forces.drawbar_pull
-        return np.concatenate((torque / 0.05, pull / 0.5))
-
-    x = least_squares(misfit, [1.0, 0.5], bounds=([0.0, 0.0], [10.0, 2.0]), xtol=1e-12).x
-    return 1e3 * float(x[0]), float(x[1])
 
 
 def test_an_effect_of_the_contact_is_carried_along():

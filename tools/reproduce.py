@@ -273,7 +273,7 @@ def fitted_soil() -> Lines:
         c = "".join(f"{x:>{width}.0f}" for (x, _), width in zip(found, (8, 9, 11), strict=True))
         tan_phi = "".join(f"{x:>{width}.4f}" for (_, x), width in zip(found, (8, 9, 11), strict=True))
         yield f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    {float(soil.tan_phi):>6.4f}{tan_phi}"
-    yield "  The linearisation alone moves c by a quarter and more. The effect stress_linearisation removes it, also where"
+    yield "  The linearisation alone moves c by a quarter or more. The effect stress_linearisation removes it, also if"
     yield "  it was computed from a prior with c 25 % and tan φ 5 % wrong (estimator/shift.py)."
 
 

@@ -9,13 +9,13 @@ from math import sqrt
 
 from estimator.filter import KPA, LN_K, TAN_PHI, C, Estimate
 from estimator.measurement import COMPONENTS, Measurement, soil
+from estimator.pull import Pull
 from estimator.record import NOT_A_NUMBER
 from estimator.sync import Measured, Snapshot
 from estimator.tracker import Account, Aid, Tracker, TrackState
 from estimator.wheel_state import WheelState
 
 Row = tuple[float, ...]
-Pull = tuple[float, float, float]  # largest drawbar pull [N], its σ [N], its slip
 
 NO_AID = Aid(0.0, 0.0, 0.0, 0.0, 0.0, False)
 NOTHING = Measured(NOT_A_NUMBER, NOT_A_NUMBER)

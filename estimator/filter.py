@@ -129,8 +129,11 @@ def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tupl
 
 def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
     """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never negative."""
-    state, nuisance = crossed(estimate, variances, h, g)
-    return max(dot(h, state) + dot(g, nuisance), 0.0)
+    (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
+    (h0, h1, h2), (c0, c1, c2) = h, estimate.cross
+    own = p00 * h0 * h0 + p11 * h1 * h1 + p22 * h2 * h2 + 2.0 * (p01 * h0 * h1 + p02 * h0 * h2 + p12 * h1 * h2)
+    shared = h0 * dot(c0, g) + h1 * dot(c1, g) + h2 * dot(c2, g)
+    return max(own + 2.0 * shared + dot(variances, tuple(map(mul, g, g))), 0.0)
 
 
 def dot(a: Vector, b: Vector) -> float:

@@ -98,13 +98,6 @@ class Measurement:
         )
         return sqrt(variance(estimate, self.variances, _state_gradient(quantity), nuisance) + dot(noise, noise))
 
-    def largest_pull(self, estimate: Estimate, now: WheelState) -> tuple[float, float, float]:
-        """Largest DP over slip at this load and sinkage [N], its σ, and its slip."""
-        ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
-        best = self.model.best_slip(*ground, now.theta_1.value, now.load.value)
-        prediction = self.predict(estimate, now._replace(slip=now.slip._replace(value=best)))
-        return prediction.drawbar_pull.value, self.sigmas(estimate, now, prediction)[1], best
-
 
 def soil(estimate: Estimate) -> tuple[float, float, float]:
     """c [Pa], tan φ [-], k [m] of a state."""

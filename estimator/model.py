@@ -13,8 +13,6 @@ from estimator.sync import Measured
 from estimator.terramechanics import linear, scalar
 from estimator.terramechanics.soil import Soil
 
-SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)  # where the largest drawbar pull is looked for
-
 
 class Quantity(NamedTuple):
     """A predicted force or torque and its gradient, SI."""
@@ -56,21 +54,6 @@ class WheelModel:
     def _at(self, k: float, theta_1: float, slip: float) -> linear.Shift | None:
         return None if self._shift is None else self._shift.at(k, theta_1, slip, self._exponent_error)
 
-    def best_slip(self, c: float, tan_phi: float, k: float, theta_1: float, load: float) -> float:
-        """Slip of the largest drawbar pull at this load and sinkage: the best of SLIPS, refined by a parabola."""
-        pulls = [
-            linear.forces_under_load(
-                self._wheel, c, tan_phi, k, theta_1, slip, load, shift=self._at(k, theta_1, slip)
-            ).drawbar_pull
-            for slip in SLIPS
-        ]
-        best = max(range(len(SLIPS)), key=pulls.__getitem__)
-        if best in (0, len(SLIPS) - 1):
-            return SLIPS[best]
-        before, peak, after = pulls[best - 1 : best + 2]
-        step = 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (before - 2.0 * peak + after)
-        return SLIPS[best] + float(step)
-
     def load(self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float) -> Measured:
         """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli and of θ₁."""
         radius, soil = self._wheel.radius, self._soil
@@ -79,7 +62,7 @@ class WheelModel:
             return Measured(0.0, 0.0)
         sigma_m = self._modulus * depth**soil.exponent.value
         shift = self._at(k, theta_1.value, slip)
-        load = float(linear.forces(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift=shift).load)
+        load = scalar.load(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift)
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
         relative = hypot(soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma)
         return Measured(load, abs(load) * relative)

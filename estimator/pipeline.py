@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.account import Pull, record
+from estimator.account import record
 from estimator.online import with_latencies
+from estimator.pull import UNKNOWN, Pull, Search, searched
 from estimator.readings import Reading
-from estimator.record import NOT_A_NUMBER, Flag
+from estimator.record import Flag
 from estimator.settings import Settings
 from estimator.sync import NS, Sync
 from estimator.tracker import Tracker, TrackState
@@ -22,7 +23,8 @@ class State:
 
     sync: Sync
     track: TrackState
-    pull: Pull = (NOT_A_NUMBER,) * 3  # as of the last update
+    search: Search | None = None  # for the largest drawbar pull
+    pull: Pull = UNKNOWN  # as of the last search
     first: int = -1  # time of the first tick [ns]
     late: int = 0
     jumps: int = 0
@@ -45,7 +47,11 @@ class Pipeline:
         for reading in readings:
             sync.push(reading)
         track, account = self.tracker.step(state.track, sync.snapshot(t))
-        pull = self.tracker.measurement.largest_pull(track.estimate, account.now) if account.aids else state.pull
+        search, pull = state.search, state.pull
+        if search is not None:
+            search, pull = searched(self.tracker.measurement, search, pull)
+        elif account.aids:
+            search = Search(track.estimate, account.now)
         first = t if state.first < 0 else state.first
         counters = sync.counters
         flags = account.flags
@@ -66,4 +72,4 @@ class Pipeline:
             counters.invalid,
             *record(self.tracker, track, account, pull),
         )
-        return State(sync, track, pull, first, counters.late, counters.jumps), fields
+        return State(sync, track, search, pull, first, counters.late, counters.jumps), fields

@@ -24,8 +24,8 @@ NEAREST = 0.02  # likewise of λ and of 1 − λ
 
 Number = Any  # real or complex: the transforms are the same
 Integrals = tuple[float, float, complex, complex, complex]  # see _integrals
-Forces = tuple[float, float, float, float]  # T, DP, resistance, W, or their changes
-NONE: Forces = (0.0, 0.0, 0.0, 0.0)
+Change = tuple[float, float, float, float]  # of T, DP, resistance, W
+NONE: Change = (0.0, 0.0, 0.0, 0.0)
 NOTHING: Integrals = (0.0, 0.0, 0j, 0j, 0j)
 
 
@@ -43,7 +43,7 @@ def predict(
     lam = wheel.c1 + wheel.c2 * slip
     rise, scale = sin(0.5 * theta_1) ** 2, wheel.radius / k
     f = scale * (slip + (1.0 - slip) * rise)  # Eq. (19)
-    if slip < 0.0 or min(theta_1, f * theta_1) < SMALLEST or not NEAREST < lam < 1.0 - NEAREST:
+    if _delicate(theta_1, f, slip, lam):
         return linear.predict(wheel, c, tan_phi, k, theta_1, slip, load, shift=shift)
     x, by_theta_1, by_f = _integrals(theta_1, f * theta_1, lam)
     if shift is not None:
@@ -54,7 +54,7 @@ def predict(
     s = (load / area - cohesion * one.imag) / carry  # σₘθ₁ by Eq. (21)
     friction = s * tan_phi
 
-    def forces(a1: float, a2: float, bare: complex, one: complex, hat: complex) -> Forces:
+    def forces(a1: float, a2: float, bare: complex, one: complex, hat: complex) -> Change:
         """Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same formulas."""
         drag = area * s * bare.imag
         return (
@@ -95,6 +95,32 @@ def predict(
         for q, by_w in enumerate((torque_s, pull_s, drag_s))
     ]
     return Prediction(torque, pull, drag, s / theta_1, *gradients)
+
+
+def load(
+    wheel: Wheel,
+    c: float,
+    tan_phi: float,
+    k: float,
+    theta_1: float,
+    slip: float,
+    sigma_m: float,
+    shift: Shift | None = None,
+) -> float:
+    """W [N] by Eq. (21) for a given peak stress σₘ [Pa]: that of `linear.forces`."""
+    lam = wheel.c1 + wheel.c2 * slip
+    f = wheel.radius / k * (slip + (1.0 - slip) * sin(0.5 * theta_1) ** 2)  # Eq. (19)
+    if _delicate(theta_1, f, slip, lam):
+        return float(linear.forces(wheel, c, tan_phi, k, theta_1, slip, sigma_m, shift=shift).load)
+    x, _, _ = _integrals(theta_1, f * theta_1, lam)
+    _, _, bare, one, hat = x if shift is None else _added(x, shift.value, 1.0)
+    supported = sigma_m * (bare.real + tan_phi * hat.imag) + c * one.imag
+    return wheel.radius * wheel.width * theta_1 * supported
+
+
+def _delicate(theta_1: float, f: float, slip: float, lam: float) -> bool:
+    """Whether the transforms would lose digits here."""
+    return slip < 0.0 or theta_1 < SMALLEST or f * theta_1 < SMALLEST or not NEAREST < lam < 1.0 - NEAREST
 
 
 def _added(x: Integrals, change: linear.Integrals, factor: float) -> Integrals:

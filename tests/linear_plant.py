@@ -33,7 +33,8 @@ def entry_angle(settings, truth, load, slip):
 def readings(settings, truth, schedule, *, seed, rate=50):
     """Yield, every tick of 0.1 s, its time [ns] and its readings. truth = (c, tan φ, k); `rate` readings a second."""
     rng = np.random.default_rng(seed)
-    wheel, clock, turned, travelled, batch = settings.wheel, 0.0, 0.0, 0.0, []
+    wheel, clock, turned, travelled = settings.wheel, 0.0, 0.0, 0.0
+    tick, batch = START + NS // 10, []
     pot, shunt = (settings.channels[name].calibration for name in ("sinkage_pot", "motor_shunt"))
     wheel_count, pulley_count = (settings.channels[name].calibration.scale.value for name in ENCODERS)
     for duration, load, slip in schedule:
@@ -42,9 +43,10 @@ def readings(settings, truth, schedule, *, seed, rate=50):
         current = forces.torque / settings.drive.torque_constant.value
         amplifier = (current - shunt.offset.value) / shunt.scale.value
         for _ in range(round(duration * rate)):
-            clock += 1.0 / rate
-            turned += OMEGA / rate
-            travelled += OMEGA * wheel.radius * (1.0 - slip) / rate
+            step = rng.uniform(0.8, 1.2) / rate  # no testbed samples exactly evenly; the stamps are right
+            clock += step
+            turned += OMEGA * step
+            travelled += OMEGA * wheel.radius * (1.0 - slip) * step
             stamp = START + round(clock * NS)
             noise = rng.normal(size=4) * (2e-3, 2e-3, 0.3, 0.3)
             values = {
@@ -56,7 +58,7 @@ def readings(settings, truth, schedule, *, seed, rate=50):
             if settings.wrench is not None:
                 pull, weight = float(forces.drawbar_pull + noise[2]), float(load + noise[3])
                 values["wrench"] = (pull, 0.0, weight, 0.0, float(forces.torque), 0.0)
+            if stamp > tick:
+                yield tick, batch
+                tick, batch = tick + NS // 10, []
             batch += [Reading(stamp, channel, value, stamp) for channel, value in values.items()]
-            if len(batch) >= len(values) * rate // 10:
-                yield stamp, batch
-                batch = []

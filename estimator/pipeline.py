@@ -55,15 +55,14 @@ class Pipeline:
         first = t if state.first < 0 else state.first
         counters = sync.counters
         flags = account.flags
-        flags |= Flag.LATE_READINGS if counters.late > state.late else Flag.NONE
-        flags |= Flag.COUNTER_JUMP if counters.jumps > state.jumps else Flag.NONE
+        flags += Flag.LATE_READINGS * (counters.late > state.late) + Flag.COUNTER_JUMP * (counters.jumps > state.jumps)
         fields = (
             t,
             account.snapshot.evaluated,
             round((t - first) / self._period),
             len(readings),
             int(account.status),
-            int(flags),
+            flags,
             account.snapshot.stale,
             account.snapshot.stuck,
             counters.late,

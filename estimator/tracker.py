@@ -249,14 +249,13 @@ class Tracker:
         return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
 
     def _flags(self, state: TrackState, aids: tuple[Aid, ...]) -> int:
-        raised = {
-            Flag.NOT_SEPARABLE: self.separability(state.estimate) > SEPARABLE,
-            Flag.K_ESTIMATED: self.estimates_k(state),
-            Flag.GATED: not all(aid.accepted for aid in aids),
-            Flag.RESET: bool(aids) and state.last_reset == state.window_end,
-            Flag.MISMATCH: self._experienced(state) and state.consistency > MISMATCH,
-        }
-        return sum([flag for flag, holds in raised.items() if holds])
+        return (
+            Flag.NOT_SEPARABLE * (self.separability(state.estimate) > SEPARABLE)
+            + Flag.K_ESTIMATED * self.estimates_k(state)
+            + Flag.GATED * (not all([aid.accepted for aid in aids]))
+            + Flag.RESET * (bool(aids) and state.last_reset == state.window_end)
+            + Flag.MISMATCH * (self._experienced(state) and state.consistency > MISMATCH)
+        )
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:

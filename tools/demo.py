@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from queue import Empty, Queue
-from threading import Thread
+from threading import Event, Thread
 from typing import IO, get_args
 
 from estimator.daemon import TOPICS
@@ -37,8 +37,8 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError(f"--seconds {arguments.seconds:g}: expected {SHORTEST:g} or more", USAGE)
     folder = Path(arguments.output or Path("runs") / time.strftime("demo-%Y%m%d-%H%M%S"))
     folder.mkdir(parents=True, exist_ok=True)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # children are stopped as on Ctrl-C
-    last_words = run(folder, arguments)
+    with interruptible() as stop:
+        last_words = run(folder, arguments, stop)
     return conclude(folder, arguments.plant, last_words)
 
 
@@ -59,13 +59,27 @@ def _parser() -> Parser:
 # --- the run --------------------------------------------------------------------------------------------------------
 
 
-def run(folder: Path, arguments: Namespace) -> list[str]:
+@contextmanager
+def interruptible() -> Iterator[Event]:
+    """An event that SIGINT and SIGTERM set; they interrupt nothing themselves, or a child just started could be lost."""
+    stop = Event()
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def run(folder: Path, arguments: Namespace, stop: Event) -> list[str]:
     """Testbed and daemon side by side for the given time; the daemon's closing lines."""
     told = ["--seconds", str(arguments.seconds), "--seed", str(arguments.seed), "--plant", arguments.plant]
-    with Child("testbed", "tools.testbed", "--folder", str(folder), "--wait", "--can", arguments.can, *told) as testbed:
+    told += ["--folder", str(folder), "--can", arguments.can, "--wait"]
+    with Child(stop, "testbed", "tools.testbed", *told) as testbed:
         config = _after(testbed.wait_for("configuration ", READY))
         print(f"{arguments.plant} plant, seed {arguments.seed}, {arguments.seconds:g} s; everything in {folder}")
-        with Child("daemon", "tools.cli", "run", "--config", config, "--name", "demo", "--status", "1") as daemon:
+        with Child(stop, "daemon", "tools.cli", "run", "--config", config, "--name", "demo") as daemon:
             _wait_for_devices(daemon)
             testbed.tell("play")
             _follow(daemon, testbed, arguments.seconds)
@@ -89,13 +103,14 @@ def _follow(daemon: Child, testbed: Child, seconds: float) -> None:
             testbed.check()
             line = daemon.line(min(0.2, seconds - elapsed))
             if line and " slip " in line:
-                show(f"{elapsed:5.1f} s  {_short(line)}")
+                show(f"{elapsed:4.0f} s {_short(line)}")
 
 
 def _short(line: str) -> str:
-    """Of the daemon's status line: status, slip, load, c and tan φ."""
+    """Of the daemon's status line what fits into 80 columns: status, slip, load, c and tan φ."""
     parts = [re.search(p, line) for p in (r"^\S+", r"slip +\S+", r"W +\S+ N", r"c +\d+ ± +\d+ Pa", r"tan φ \S+ ± \S+")]
-    return "  ".join(f"{part.group():10}" if part else "" for part in parts)
+    status, *rest = (part.group() if part else "" for part in parts)
+    return " ".join((f"{status:10}", *rest))
 
 
 @contextmanager
@@ -109,10 +124,13 @@ def live_line() -> Iterator[Callable[[str], None]]:
 
 
 class Child:
-    """A Python module run as a process of its own, and what it says. Leaving the block ends it, whatever happened."""
+    """A Python module run as a process of its own, and what it says. Leaving the block ends it, whatever happened.
 
-    def __init__(self, name: str, module: str, *arguments: str) -> None:
-        self._name = name
+    While `stop` is set, waiting for it raises KeyboardInterrupt.
+    """
+
+    def __init__(self, stop: Event, name: str, module: str, *arguments: str) -> None:
+        self._stop, self._name = stop, name
         self._lines: Queue[str] = Queue()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
@@ -139,22 +157,27 @@ class Child:
             self.stop()
 
     def tell(self, line: str) -> None:
-        """Write a line to its standard input."""
+        """Write a line to its standard input. Raises CommandError if it has ended."""
         assert self._process.stdin is not None
-        self._process.stdin.write(line + "\n")
-        self._process.stdin.flush()
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise CommandError(f"the {self._name} ended early") from None
 
     def line(self, timeout: float) -> str | None:
-        """Its next line, or None. Raises CommandError if it has ended and has nothing left to say."""
+        """Its next line, or None. Raises as `check` does."""
+        self.check()
         try:
             self._said.append(self._lines.get(timeout=max(timeout, 0.0)))
         except Empty:
-            self.check()
             return None
         return self._said[-1]
 
     def check(self) -> None:
-        """Raises CommandError, with its last line, if it has ended."""
+        """Raises CommandError, with its last line, if it has ended; KeyboardInterrupt if we are to stop."""
+        if self._stop.is_set():
+            raise KeyboardInterrupt
         if self._process.poll() is not None and self._lines.empty():
             last = self._said[-1] if self._said else "said nothing"
             raise CommandError(f"the {self._name} ended early (exit {self._process.returncode}): {last}")

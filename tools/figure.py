@@ -16,8 +16,9 @@ from estimator.terramechanics.soil import Array
 
 NS = 1_000_000_000
 SIZE, DPI = (16.0, 10.5), 100  # [in], [1/in]
-MEASURED, PREDICTED, ESTIMATE, TRUTH, IDLE = "#5b6c7d", "#d1495b", "#00798c", "#111111", "#eceff1"
+MEASURED, PREDICTED, ESTIMATE, TRUTH, IDLE = "#8fa3b5", "#c1121f", "#00798c", "#111111", "#eceff1"
 UPDATES = {"torque": "#c77800", "drawbar_pull": "#6a4c93"}  # what the filter is updated with
+WIDTH = (1.8, 4.0)  # [pt] of measured curves; the wide ones have a prediction drawn into them
 DRAWN = 3000  # points a curve: more than the page has pixels
 
 SIGNALS = (  # field, label, factor to the unit shown
@@ -52,10 +53,12 @@ def _signals(axes: Array, ticks: Rows, seconds: Array) -> None:
     some = slice(None, None, max(1, len(ticks) // DRAWN))
     for ax, (field, label, factor) in zip(axes, SIGNALS, strict=True):
         _shade_idle(ax, ticks, seconds)
-        ax.plot(seconds[some], ticks[field][some] * factor, color=MEASURED, lw=1.6, label="measured")
+        ax.plot(
+            seconds[some], ticks[field][some] * factor, color=MEASURED, lw=WIDTH[field in UPDATES], label="measured"
+        )
         if field in UPDATES:
             tracking = np.where(ticks["status"] == Status.TRACKING, ticks[f"{field}_predicted"], np.nan)
-            ax.plot(seconds[some], tracking[some] * factor, color=PREDICTED, lw=1.1, label="predicted at the estimate")
+            ax.plot(seconds[some], tracking[some] * factor, color=PREDICTED, lw=1.2, label="predicted at the estimate")
         _dress(ax, label, seconds, ticks[field][_steady(ticks)] * factor)
     axes[0].set_title("Measured and predicted   (shaded: not used by the filter)", fontsize=11, loc="left")
     axes[3].legend(loc="upper left", ncols=2, fontsize=9, frameon=False)
@@ -84,7 +87,7 @@ def _closing(field: str, ticks: Rows, truth: Mapping[str, float]) -> str:
     factor = dict((name, factor) for name, _, factor in SOUGHT)[field]
     digits = {"cohesion": 0, "tan_phi": 4, "shear_modulus": 2}[field]
     text = f"{value * factor:.{digits}f} ± {sigma * factor:.{digits}f}"
-    return f"{text}   truth {truth[field] * factor:.{digits}f}" if field in truth else text
+    return f"at the end {text}, truth {truth[field] * factor:.{digits}f}" if field in truth else f"at the end {text}"
 
 
 def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:

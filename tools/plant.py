@@ -7,6 +7,7 @@ the filter takes for true.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -34,7 +35,7 @@ DEEPEST = 1.5  # [rad] end of the bracket for θ₁
 
 
 def schedule(seconds: float) -> Schedule:
-    """Standstill, then three loads with as many slips each as there is time for; standstill after `seconds`."""
+    """Standstill, then three loads with as many slips each as there is time for; to rest after `seconds`."""
     each = (seconds - REST) / len(LOADS)
     count = max(1, min(len(SLIPS), max(round(each / USUAL), min(2, int(each / SHORTEST)))))
     driven = [
@@ -42,6 +43,7 @@ def schedule(seconds: float) -> Schedule:
         for load, speed in zip(LOADS, SPEEDS, strict=True)
         for slip in SLIPS[:count]
     ]
+    driven[-1] = replace(driven[-1], duration=each / count + RAMP)
     first, last = Segment(REST, LOADS[0], SLIPS[0], 0.0), Segment(TAIL, LOADS[-1], SLIPS[0], 0.0)
     return Schedule((first, *driven, last), RAMP)
 

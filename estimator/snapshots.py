@@ -179,11 +179,12 @@ class View:
         if wrench is None or stream is None:
             return self.nothing, self.nothing, self.nothing
         limits = np.repeat([wrench.max_force, wrench.max_torque], 3)
-        valid = np.all(np.abs(stream.values) <= limits, axis=1)  # no NaN passes either
+        absent = np.isnan(stream.values)  # an axis that is not measured
+        valid = np.all(absent | (np.abs(stream.values) <= limits), axis=1) & ~absent[:, WRENCH_FIELDS.index("fz")]
 
         def axis(name: str, noise: float, calibration: Calibration) -> Series:
             values = stream.values[:, WRENCH_FIELDS.index(name)]
-            return self._mean(stream, values, valid, wrench.latency, noise, calibration)
+            return self._mean(stream, values, valid & ~np.isnan(values), wrench.latency, noise, calibration)
 
         return (
             axis("fz", wrench.force_noise, wrench.load),

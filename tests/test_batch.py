@@ -55,6 +55,7 @@ def rough(rng, seconds=1.2):
     gaps = {channel: int(rng.integers(0, seconds * NS)) for channel in CHANNELS if rng.random() < 0.4}
     jumps = {int(rng.integers(0, seconds * NS)): int(rng.integers(-(2**40), 2**40)) for _ in range(3)}
     freeze = int(rng.integers(0, seconds * NS))
+    absent = rng.random(6) < 0.1  # axes that the sensor does not have
     found = []
     for reading in steady:
         since = reading.stamp - START
@@ -65,6 +66,9 @@ def rough(rng, seconds=1.2):
         elif rng.random() < 0.01:
             bad = float(rng.choice([np.nan, np.inf, -1e9]))
             reading = reading._replace(value=(bad,) * 6 if reading.channel == "wrench" else bad)
+        elif reading.channel == "wrench":
+            axes = zip(reading.value, absent, strict=True)
+            reading = reading._replace(value=tuple(float("nan") if none else value for value, none in axes))
         elif reading.channel == "sinkage_pot" and since > freeze:
             reading = reading._replace(value=1.25)
         stamp = reading.stamp + int(rng.integers(-MS, MS))

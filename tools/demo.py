@@ -61,7 +61,7 @@ def _parser() -> Parser:
 
 @contextmanager
 def interruptible() -> Iterator[Event]:
-    """An event that SIGINT and SIGTERM set; they interrupt nothing themselves, or a child just started could be lost."""
+    """An event that SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is lost."""
     stop = Event()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
@@ -216,7 +216,8 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
     ticks, loop = recording.arrays("/tick"), recording.arrays("/loop")
     soil = json.loads((folder / f"{NAME}.truth.json").read_text(encoding="utf-8"))["soil"]
     found = verdict.judge(ticks, soil, plant)
-    print("\n".join([*verdict.table(found), "", *verdict.punctuality(loop), *_counters(folder, last_words)]))
+    table = [*verdict.table(found), *verdict.without_correction(recording, soil)]
+    print("\n".join([*table, "", *verdict.punctuality(loop), *_counters(folder, last_words)]))
     picture = folder / "demo.png"
     figure.draw(picture, ticks, verdict.headline(found, plant, ticks), soil)
     print(f"log {recording.path}\nfigure {picture}", flush=True)

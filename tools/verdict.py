@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.cdr import Rows
+from estimator.config import loads
+from estimator.pipeline import Pipeline
+from estimator.playback import played
+from estimator.record import TICK_NAMES
+from estimator.salvage import Recording
 from tools.plant import PlantKind
+from tools.progress import Progress
+from tools.rig_config import LINEARISATION
 
 TARGETS: dict[PlantKind, dict[str, float]] = {  # largest relative error
     "linear": {"cohesion": 0.05, "tan_phi": 0.02},
@@ -54,12 +61,31 @@ class Finding:
 
 def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[Finding]:
     """The last tick against the truth. ticks: /tick (n,)."""
-    last = ticks[-1]
-    full = (last["stamp"] - ticks["stamp"][0]) / NS >= FULL_RUN
-    targets = TARGETS[plant] if full else {}
-    return [
-        Finding(name, float(last[name]), float(last[f"{name}_sigma"]), truth[name], targets.get(name)) for name in SHOWN
-    ]
+    full = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS >= FULL_RUN
+    last = dict(zip(ticks.dtype.names or (), ticks[-1].tolist(), strict=True))
+    return _findings(last, truth, TARGETS[plant] if full else {})
+
+
+def _findings(last: Mapping[str, float], truth: Mapping[str, float], targets: Mapping[str, float]) -> list[Finding]:
+    return [Finding(name, last[name], last[f"{name}_sigma"], truth[name], targets.get(name)) for name in SHOWN]
+
+
+def without_correction(recording: Recording, truth: Mapping[str, float]) -> list[str]:
+    """What the paper's closed forms alone would have learned from the same readings; empty where they were used."""
+    settings = loads(recording.config_yaml or "", str(recording.path)).settings
+    others = tuple(effect for effect in settings.effects if effect.name != LINEARISATION)
+    if len(others) == len(settings.effects):
+        return []
+    pipeline = Pipeline(replace(settings, effects=others), "plain")
+    state, tick = pipeline.start(), None
+    with Progress("once more without the correction", recording.counts["/tick"]) as progress:
+        for recorded in played(recording, settings.rates.tick):
+            state, tick = pipeline.step(state, recorded.readings, recorded.stamp)
+            progress.advance()
+    if tick is None:
+        return []
+    found = _findings(dict(zip(TICK_NAMES, tick, strict=True)), truth, {})
+    return [f"the same readings without {LINEARISATION}:", *table(found)[1:]]
 
 
 def reasons(found: Sequence[Finding]) -> list[str]:

@@ -73,17 +73,20 @@ class FilterpyEngine:
     """filterpy behind the Engine interface: one augmented vector [state, nuisances]."""
 
     def __init__(self, nuisance_variances: Vector) -> None:
-        self._variances = np.diag(nuisance_variances)
+        self._size = size = STATES + len(nuisance_variances)
+        self._prior = np.diag((*(0.0,) * STATES, *nuisance_variances))
+        # made once: a filter's construction costs more than its update; every update sets all that it reads
+        self._filters = {m: _SchmidtFilter(dim_x=size, dim_z=m) for m in (1, 2)}
 
     def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
-        nuisances = len(self._variances)
-        ekf = _SchmidtFilter(dim_x=STATES + nuisances, dim_z=len(update.innovation))
-        cross = np.array(estimate.cross).reshape(STATES, nuisances)
-        ekf.x = np.array((*estimate.x, *(0.0,) * nuisances))
-        ekf.P = np.block([[np.array(estimate.P), cross], [cross.T, self._variances]])
-        H = np.hstack([np.array(update.H), np.array(update.G).reshape(len(update.H), nuisances)])
+        ekf = self._filters[len(update.innovation)]
+        ekf.x, ekf.P = np.zeros(self._size), self._prior.copy()
+        ekf.x[:STATES], ekf.P[:STATES, :STATES] = estimate.x, estimate.P
+        ekf.P[:STATES, STATES:] = estimate.cross
+        ekf.P[STATES:, :STATES] = ekf.P[:STATES, STATES:].T
+        H = np.array([h + g for h, g in zip(update.H, update.G, strict=True)])
         y, R = np.array(update.innovation), np.array(update.R)
-        if consider_k or nuisances:
+        if consider_k or self._size > STATES:
             ekf.consider(y, H, R, slice(LN_K if consider_k else STATES, None))
         else:
             ekf.update(y, lambda _: H, lambda _: np.zeros_like(y), R=R)
@@ -100,17 +103,6 @@ def predict(estimate: Estimate, walk: Vector) -> Estimate:
     (a, b, c), (_, d, e), (_, _, f) = estimate.P
     a, d, f = a + walk[0], d + walk[1], f + walk[2]
     return Estimate(estimate.x, ((a, b, c), (b, d, e), (c, e, f)), estimate.cross)
-
-
-def innovation_covariance(estimate: Estimate, update: Update, variances: Vector) -> Matrix:
-    """S = H P Hᵀ + H C Gᵀ + G Cᵀ Hᵀ + G V Gᵀ + R (m, m), with C the cross covariance and V the nuisances' variances."""
-    seen = [crossed(estimate, variances, h, g) for h, g in zip(update.H, update.G, strict=True)]
-    return tuple(
-        [
-            tuple([dot(h, state) + dot(g, nuisance) + r for (state, nuisance), r in zip(seen, row, strict=True)])
-            for h, g, row in zip(update.H, update.G, update.R, strict=True)
-        ]
-    )
 
 
 def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tuple[Vector, Vector]:

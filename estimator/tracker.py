@@ -21,9 +21,9 @@ from estimator.filter import (
     Update,
     Vector,
     dot,
-    innovation_covariance,
     predict,
     project,
+    variance,
 )
 from estimator.measurement import Columns, Measurement, selected, soil
 from estimator.online import Context
@@ -179,14 +179,14 @@ class Tracker:
         return choice == "always" or (choice == "auto" and state.slip_variance > SLIP_VARIES**2)
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
-        covariance = innovation_covariance(estimate, update, self.measurement.variances)
-        gate = self.settings.filter.gate
+        gate, variances = self.settings.filter.gate, self.measurement.variances
         measured = (now.torque.value, now.drawbar_pull.value)
         aids = []
         for index, innovation in enumerate(update.innovation):
-            s = covariance[index][index]
+            r = update.R[index][index]
+            s = variance(estimate, variances, update.H[index], update.G[index]) + r
             ratio = innovation * innovation / (gate * gate * s)
-            aids.append(Aid(measured[index], update.R[index][index], innovation, s, ratio, ratio <= 1.0))
+            aids.append(Aid(measured[index], r, innovation, s, ratio, ratio <= 1.0))
         return tuple(aids)
 
     def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:

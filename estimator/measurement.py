@@ -87,7 +87,7 @@ class Measurement:
         return (
             self._sigma(estimate, now, prediction.torque, torque),
             self._sigma(estimate, now, prediction.drawbar_pull, pull),
-            self._sigma(estimate, now, prediction.resistance, (0.0,) * len(torque)),
+            self._sigma(estimate, now, prediction.resistance, ()),  # no sensor reads it
         )
 
     def _sigma(self, estimate: Estimate, now: WheelState, quantity: Quantity, nuisance: Vector) -> float:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -33,6 +34,15 @@ REMEMBERED = 256  # evaluated points: all stretches of the filter's memory, and 
 ORDER = 24  # quadrature nodes in each zone
 INTEGRALS = len(Integrals._fields)
 PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
+
+
+class Point(NamedTuple):
+    """The tables at one θ₁ and i: each (3, 8), the integrals' values and derivatives with respect to θ₁ and i."""
+
+    plain: Array  # the shift at the soil's k and n
+    by_ln_k: Array
+    by_n: Array
+    ln_k: Integrals  # first row of by_ln_k
 
 
 class IntegralShift:
@@ -59,22 +69,23 @@ class IntegralShift:
 
     def at(self, k: float, theta_1: float, slip: float, exponent_error: float = 0.0) -> Shift:
         """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's exponent n."""
-        table = self._table(theta_1, slip)  # value, by θ₁, by i
-        away = log(k) - self._ln_k
-        at = table[:, PLAIN] + away * table[:, BY_LN_K] + exponent_error * table[:, BY_N]
-        value, by_theta_1, by_slip = at.tolist()
-        return Shift(
-            Integrals(*value), Integrals(*by_theta_1), Integrals(*by_slip), Integrals(*table[0, BY_LN_K].tolist())
-        )
+        plain, by_ln_k, by_n, ln_k = self._table(theta_1, slip)
+        found = plain + (log(k) - self._ln_k) * by_ln_k
+        if exponent_error:
+            found = found + exponent_error * by_n
+        value, by_theta_1, by_slip = map(Integrals._make, found.tolist())
+        return Shift(value, by_theta_1, by_slip, ln_k)
 
-    def _tabulated(self, theta_1: float, slip: float) -> Array:
-        """Values and derivatives with respect to θ₁ and i of all quantities, (3, quantities)."""
+    def _tabulated(self, theta_1: float, slip: float) -> Point:
+        """The tables at one point."""
         u, du = _unit(theta_1, THETA_1)
         v, dv = _unit(slip, SLIP)
         rows, columns = _polynomials(u, DEGREE[0], du), _polynomials(v, DEGREE[1], dv)
         along_slip = (rows @ self._coefficients).reshape(-1, DEGREE[1] + 1)  # (2 for θ₁ · quantities, powers of i)
         by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
-        return np.array((by_value[0], by_value[1], by_slip[0]))
+        found = np.array((by_value[0], by_value[1], by_slip[0]))
+        by_ln_k = found[:, BY_LN_K]
+        return Point(found[:, PLAIN], by_ln_k, found[:, BY_N], Integrals(*by_ln_k[0].tolist()))
 
 
 def true_integrals(wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array) -> Integrals:

@@ -142,7 +142,7 @@ def replay(subject: Subject) -> Figures:
 
 
 def forces(subject: Subject) -> Figures:
-    """Closed forms (20)-(22), gradients included, against quadrature of (8)-(10): one sample, and one of a batch."""
+    """Closed forms (20)-(22) against quadrature of (8)-(10): one sample, gradients included, and one of a batch."""
     settings, samples = subject.configuration.settings, subject.sizes.samples
     wheel, ground = settings.wheel, soil_of(settings)
     rng = np.random.default_rng(SEED)
@@ -158,7 +158,7 @@ def forces(subject: Subject) -> Figures:
 
     closed = per_call(lambda t, i: scalar.predict(wheel, *known, t, i, 70.0))
     quadrature = per_call(lambda t, i: original.forces(wheel, ground, t, i))
-    closed_batch = per_sample(lambda: linear.predict_batch(wheel, *known, theta_1, slip, 70.0))
+    closed_batch = per_sample(lambda: linear.forces_under_load(wheel, *known, theta_1, slip, 70.0, maths=linear.ARRAYS))
     quadrature_batch = per_sample(lambda: original.forces(wheel, ground, theta_1, slip))
     return {
         "closed_form": closed,
@@ -283,7 +283,7 @@ def report(figures: dict[str, Figures]) -> str:
             ),
             f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
             f"ratio {f['ratio']:.1f}",
-            f"           in a batch, one sample: {_µs(f['closed_form_in_batch'])} and {_µs(f['quadrature_in_batch'])}: "
+            f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])} and {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
             f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: ratio {u['ratio']:.1f} "
             f"({u['nuisances']:.0f} nuisances)",

@@ -283,7 +283,8 @@ def report(figures: dict[str, Figures]) -> str:
             ),
             f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
             f"ratio {f['ratio']:.1f}",
-            f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])} and {_µs(f['quadrature_in_batch'])}: "
+            f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])}, "
+            f"quadrature {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
             f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: ratio {u['ratio']:.1f} "
             f"({u['nuisances']:.0f} nuisances)",

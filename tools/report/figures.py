@@ -1,0 +1,206 @@
+"""The pictures of a report: time traces with their residual, residual against a covariate, estimates side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose.result import Quantity, Scatter, SoilFit, Trace
+from tools.report import plot
+from tools.report.html import Child, Markup, tag
+from tools.report.words import counted, covariate_shown, name_of, number, quantity, shown
+
+BINS = 12  # of a scatter's running mean
+FEWEST = 4  # values in a bin
+SCATTERED = 1500  # dots a panel
+TURN = 2.0 * np.pi
+
+
+class Rows(NamedTuple):
+    """Heights [px] of a trace panel: the signal, the residual under it, the whole."""
+
+    signal: tuple[float, float] = (20.0, 128.0)
+    residual: tuple[float, float] = (154.0, 210.0)
+    height: float = 244.0
+
+
+ROWS = Rows()
+
+
+def figure(caption: Child, *content: Child, legend: Child = None, small: bool = False) -> Markup:
+    """`small` figures are never parted by a page break."""
+    return tag("figure", legend, *content, tag("figcaption", caption), class_="small" if small else None)
+
+
+def panels(items: Iterable[Child]) -> Markup:
+    return tag("div", *items, class_="panels")
+
+
+def panel(title: str, drawing: Markup, beside: str = "") -> Markup:
+    """`beside` is never cut, a long title is."""
+    head = tag("p", tag("b", title, title=title), tag("span", beside), class_="panel-title")
+    return tag("div", head, drawing, class_="panel")
+
+
+def legend(entries: Mapping[str, str]) -> Markup:
+    """Class of a mark -> what it is."""
+    return tag("ul", (tag("li", tag("i", class_=f"swatch {c}"), said) for c, said in entries.items()), class_="legend")
+
+
+# ---- traces --------------------------------------------------------------------------------------------------------
+
+
+def differs(trace: Trace | Scatter) -> bool:
+    """Whether the explanation changes the prediction at all."""
+    return not np.array_equal(np.asarray(trace.before, float), np.asarray(trace.after, float), equal_nan=True)
+
+
+def rms(trace: Trace, which: str) -> float:
+    """Root mean square residual [the trace's unit] over the samples compared; NaN where there are none."""
+    used = np.asarray(trace.used, dtype=bool)
+    residual = (np.asarray(trace.measured, float) - np.asarray(getattr(trace, which), float))[used]
+    residual = residual[np.isfinite(residual)]
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")
+
+
+def traces(of: Sequence[Trace], most: int) -> Markup:
+    """A panel a run: the `most` with the largest error in view and in their order, the others folded."""
+    ranked = sorted(range(len(of)), key=lambda i: -np.nan_to_num(rms(of[i], "before")))
+    first, rest = sorted(ranked[:most]), sorted(ranked[most:])
+    seen = panels(trace_panel(of[i]) for i in first)
+    if not rest:
+        return seen
+    summary = tag("summary", f"{counted(len(rest), 'more run')}, with smaller errors")
+    return tag("div", seen, tag("details", summary, panels(trace_panel(of[i]) for i in rest)))
+
+
+def trace_panel(trace: Trace) -> Markup:
+    unit, factor = shown(trace.unit)
+    error = number(rms(trace, "before") * factor, 2)
+    if differs(trace):
+        error += f" → {number(rms(trace, 'after') * factor, 2)}"
+    return panel(trace.run, trace_picture(trace), f"rms {error} {unit}".rstrip())
+
+
+def trace_picture(trace: Trace) -> Markup:
+    """Recording and simulation; under them recorded − simulated on a scale of its own."""
+    unit, factor = shown(trace.unit)
+    time, used = np.asarray(trace.time, float), np.asarray(trace.used, bool)
+    measured, before, after = (np.asarray(v, float) * factor for v in (trace.measured, trace.before, trace.after))
+    both = differs(trace)
+    seen = used if used.any() else np.ones(time.shape, bool)
+    span = (float(time[0]), float(time[-1]) or 1.0)
+    simulated = [(np.where(seen, before, np.nan), "before")] + (
+        [(np.where(seen, after, np.nan), "after")] if both else []
+    )
+    top = plot.axes(span, plot.limits(measured[seen], before[seen], after[seen]), *ROWS.signal)
+    noise = 2.0 * _known(trace.sigma) * factor
+    low = plot.axes(span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual)
+    label = f"{name_of(trace.channel)} of run {trace.run}: recording and simulation over time, with the residual below"
+    return plot.picture(
+        ROWS.height,
+        label,
+        plot.stretches(top, time, ~used, "idle"),
+        plot.stretches(low, time, ~used, "idle"),
+        plot.frame(top, f"{name_of(trace.channel)} [{unit or '–'}]", most=4),
+        plot.band(low, -noise, noise),
+        plot.frame(low, "residual", below="time [s]", most=3),
+        plot.line(top, time, measured, "line measured"),
+        (plot.line(top, time, values, f"line {kind}") for values, kind in simulated),
+        (plot.line(low, time, measured - values, f"line thin {kind}") for values, kind in simulated),
+    )
+
+
+def _known(sigma: float) -> float:
+    return sigma if np.isfinite(sigma) else 0.0
+
+
+# ---- residual against a covariate ----------------------------------------------------------------------------------
+
+
+def scatter(of: Scatter, explanation: str) -> Markup:
+    """Residuals without and with the explanation, on one scale; a running mean through them."""
+    unit, factor = shown(of.unit)
+    x, name = _along(of)
+    sides = [(f"without {explanation}", "before")] + ([(f"with {explanation}", "after")] if differs(of) else [])
+    values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
+    sigma = _known(of.sigma) * factor
+    y_limits = plot.limits(*values.values(), [-2 * sigma, 2 * sigma], keep=0.0)
+    at = plot.axes(plot.limits(x), y_limits, 20.0, 190.0)
+    drawn = []
+    for title, kind in sides:
+        label = f"Residual of {name_of(of.channel)} against {name}, {title}"
+        marks = (
+            plot.band(at, -2 * sigma, 2 * sigma),
+            plot.frame(at, f"residual [{unit or '–'}]", below=name),
+            plot.dots(at, *_some(x, values[kind]), f"dots {kind}"),
+            plot.line(at, *running_mean(x, values[kind]), "line mean"),
+        )
+        drawn.append(panel(title if len(sides) > 1 else "", plot.picture(224.0, label, *marks)))
+    return panels(drawn)
+
+
+def _along(of: Scatter) -> tuple[Array, str]:
+    """The covariate as drawn, and its label; angles of the wheel are folded into one turn."""
+    x = np.asarray(of.x, float)
+    unit, factor = covariate_shown(of.covariate, of.covariate_unit)
+    x = np.mod(x, TURN) if of.covariate == "wheel_angle" else x
+    return x * factor, f"{name_of(of.covariate)}" + (f" [{unit}]" if unit else "")
+
+
+def _some(x: Array, y: Array) -> tuple[Array, Array]:
+    step = max(1, -(-len(x) // SCATTERED))
+    return x[::step], y[::step]
+
+
+def running_mean(x: Array, y: Array) -> tuple[Array, Array]:
+    """Means of x and y in bins of equal width; bins with too few values are left out."""
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if x.size == 0 or np.ptp(x) == 0.0:
+        return np.zeros(0), np.zeros(0)
+    which = np.minimum(((x - x.min()) / np.ptp(x) * BINS).astype(int), BINS - 1)
+    count = np.bincount(which, minlength=BINS)
+    kept = count >= FEWEST
+    sums = [np.bincount(which, weights=v, minlength=BINS)[kept] / count[kept] for v in (x, y)]
+    return sums[0], sums[1]
+
+
+# ---- estimates -----------------------------------------------------------------------------------------------------
+
+
+def soil(of: SoilFit) -> Markup:
+    """Each soil parameter: known before, fitted without, fitted with the explanation; ±1σ thick, ±2σ thin."""
+    known = ("known before", of.prior, "prior")
+    rows = [known, ("fitted without", of.before, "before"), ("fitted with", of.after, "after")]
+    if of.before == of.after:
+        rows = [known, ("fitted", of.after, "after")]
+    return panels(
+        panel(name_of(key), intervals(name_of(key), [(label, side.get(key), kind) for label, side, kind in rows]))
+        for key in of.prior
+    )
+
+
+def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Markup:
+    """Values with their uncertainty under each other, on one scale."""
+    there = [(label, q, kind) for label, q, kind in rows if q is not None and np.isfinite(q.value)]
+    ends = [q.value + s * _known(q.sigma) for _, q, _ in there for s in (-2.0, 2.0)]
+    across = plot.Scale(*plot.limits(ends), 92.0, 236.0)
+    marks = [_interval(across, 14.0 + 24.0 * i, label, q, kind) for i, (label, q, kind) in enumerate(there)]
+    said = "; ".join(f"{label} {quantity(q)}" for label, q, _ in there)
+    return plot.picture(8.0 + 24.0 * len(there), f"{name}: {said}", *marks)
+
+
+def _interval(across: plot.Scale, y: float, label: str, q: Quantity, kind: str) -> Markup:
+    at = {s: float(across(q.value + s * _known(q.sigma))) for s in (-2, -1, 0, 1, 2)}
+    return tag(
+        "g",
+        plot.text(0.0, y + 4.0, label),
+        tag("line", class_=f"line thin {kind}", x1=at[-2], x2=at[2], y1=y, y2=y),
+        tag("line", class_=f"line thick {kind}", x1=at[-1], x2=at[1], y1=y, y2=y),
+        tag("circle", class_=f"mark {kind}", cx=at[0], cy=y, r=4.0),
+        plot.text(248.0, y + 4.0, quantity(q)),
+    )

@@ -1,0 +1,166 @@
+"""Small pictures in SVG: scales, axes and marks. Coordinates are pixels of a picture W wide; colours are CSS classes.
+
+A picture is as wide as a phone, and a page puts several in a row where there is room; so its text is never scaled down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array
+from tools.report.html import Child, Markup, tag
+from tools.report.words import fixed
+
+W = 360.0  # [px] of every picture
+LEFT, RIGHT = 44.0, 8.0  # margins of the axes: room for tick labels
+MOST = 440  # points a line: more than a panel has pixels
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Data low … high onto pixels start … end."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, values: Array | float) -> Array:
+        share = (np.asarray(values, dtype=float) - self.low) / (self.high - self.low)
+        return self.start + share * (self.end - self.start)
+
+
+@dataclass(frozen=True)
+class Axes:
+    """A rectangle with a horizontal and a vertical scale."""
+
+    x: Scale
+    y: Scale
+
+    def clipped(self, *marks: Child) -> Markup:
+        """Marks in the coordinates of the picture, cut at the edge of the axes."""
+        left, top = min(self.x.start, self.x.end), min(self.y.start, self.y.end)
+        width, height = abs(self.x.end - self.x.start), abs(self.y.end - self.y.start)
+        box = f"{left:g} {top:g} {width:g} {height:g}"
+        return tag("svg", *marks, x=left, y=top, width=width, height=height, viewBox=box)
+
+
+def picture(height: float, label: str, *marks: Child) -> Markup:
+    """The whole picture; `label` says in words what is to be seen."""
+    return tag("svg", tag("title", label), *marks, class_="plot", viewBox=f"0 0 {W:g} {height:g}", role="img")
+
+
+def axes(x: tuple[float, float], y: tuple[float, float], top: float, bottom: float) -> Axes:
+    """Axes between two heights [px], for limits of the data."""
+    return Axes(Scale(*x, LEFT, W - RIGHT), Scale(*y, bottom, top))
+
+
+def limits(*values: Array | Sequence[float], margin: float = 0.06, keep: float | None = None) -> tuple[float, float]:
+    """Least and greatest finite value with a margin; `keep` is inside too. Never empty."""
+    every = np.concatenate([np.ravel(np.asarray(v, dtype=float)) for v in values] or [np.zeros(0)])
+    every = every[np.isfinite(every)]
+    if keep is not None:
+        every = np.append(every, keep)
+    low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
+    room = margin * (high - low) or 0.05 * abs(high) or 0.5
+    return low - room, high + room
+
+
+def ticks(low: float, high: float, most: int = 5) -> list[float]:
+    """At most `most` round values inside low … high, in steps of 1, 2 or 5 times a power of ten."""
+    raw = (high - low) / most
+    power = 10.0 ** np.floor(np.log10(raw))
+    step = float(next(s * power for s in (1.0, 2.0, 5.0, 10.0) if s * power >= raw * (1.0 - 1e-9)))
+    first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
+    return [i * step for i in range(first, last + 1)][:most]
+
+
+def tick_labels(values: Sequence[float]) -> list[str]:
+    """As many decimals as the step between them needs."""
+    step = min((b - a for a, b in pairwise(values)), default=1.0)
+    places = max(0, -int(np.floor(np.log10(step) + 1e-9)))
+    return [fixed(v + 0.0, places) if abs(v) > 1e-9 * step else "0" for v in values]
+
+
+def frame(at: Axes, label: str, *, below: str | None = None, most: int = 5) -> Markup:
+    """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None leaves it bare."""
+    heights, widths = ticks(at.y.low, at.y.high, most), ticks(at.x.low, at.x.high, 6)
+    parts = []
+    for value, said in zip(heights, tick_labels(heights), strict=True):
+        height = float(at.y(value))
+        parts.append(tag("line", class_="grid", x1=at.x.start, x2=at.x.end, y1=height, y2=height))
+        parts.append(text(at.x.start - 6, height + 3.5, said, "end"))
+    parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
+    if below is not None:
+        for value, said in zip(widths, tick_labels(widths), strict=True):
+            parts.append(text(float(at.x(value)), at.y.start + 14, said, "middle"))
+        parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
+    return tag("g", parts)
+
+
+def text(x: float, y: float, said: str, anchor: str = "start", class_: str | None = None) -> Markup:
+    return tag("text", said, x=x, y=y, text_anchor=anchor, class_=class_)
+
+
+def line(at: Axes, x: Array | Sequence[float], y: Array | Sequence[float], class_: str) -> Markup:
+    """Broken where a value is not finite; thinned without losing an extreme."""
+    xs, ys = thinned(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    pieces, pen = [], "M"
+    for px, py in zip(at.x(xs).tolist(), at.y(ys).tolist(), strict=True):
+        if not np.isfinite(px + py):
+            pen = "M"
+            continue
+        pieces.append(f"{pen}{px:.1f} {np.clip(py, -1e4, 1e4):.1f}")
+        pen = "L"
+    return at.clipped(tag("path", class_=class_, d="".join(pieces)))
+
+
+def thinned(x: Array, y: Array, most: int = MOST) -> tuple[Array, Array]:
+    """Of each stretch its least and greatest value, in order; all of it where there are few points."""
+    if len(x) <= most:
+        return x, y
+    kept = [
+        part[0] + np.unique([0, *_extremes(y[part]), len(part) - 1])
+        for part in np.array_split(np.arange(len(x)), most // 4)
+    ]
+    some = np.concatenate(kept)
+    return x[some], y[some]
+
+
+def _extremes(y: Array) -> tuple[int, int]:
+    finite = np.isfinite(y)
+    if not finite.any():
+        return 0, 0
+    return int(np.argmin(np.where(finite, y, np.inf))), int(np.argmax(np.where(finite, y, -np.inf)))
+
+
+def dots(at: Axes, x: Array, y: Array, class_: str) -> Markup:
+    """One path of round dots: a tenth of the size of as many circles."""
+    good = np.isfinite(x) & np.isfinite(y)
+    places = zip(at.x(x[good]).tolist(), at.y(y[good]).tolist(), strict=True)
+    return at.clipped(tag("path", class_=class_, d="".join(f"M{px:.1f} {py:.1f}h0" for px, py in places)))
+
+
+def band(at: Axes, low: float, high: float, class_: str = "band") -> Markup:
+    """The height between two values, over the whole width."""
+    top, bottom = float(at.y(high)), float(at.y(low))
+    return at.clipped(tag("rect", class_=class_, x=at.x.start, y=top, width=at.x.end - at.x.start, height=bottom - top))
+
+
+def stretches(at: Axes, x: Array, marked: Array, class_: str) -> Markup | None:
+    """Shade where `marked` is true, (n,) along x."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], marked.astype(int), [0]))))
+    if not edges.size:
+        return None
+    place, last = at.x(x), len(x) - 1
+    parts = []
+    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        left, right = float(place[start]), float(place[min(end, last)])
+        if np.isfinite(left + right) and right > left:
+            height = at.y.start - at.y.end
+            parts.append(tag("rect", class_=class_, x=left, y=at.y.end, width=right - left, height=height))
+    return at.clipped(*parts)

@@ -1,0 +1,197 @@
+"""Constants and effects fitted together to all channels of all runs: Gauss-Newton with priors, started warm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.effects.base import Effect, Parameter
+from estimator.terramechanics.soil import Array
+from tools.diagnose.evidence import Base
+from tools.diagnose.noise import Noise, whiten
+from tools.diagnose.rig import Stack
+
+STEP = 0.02  # of a prior σ or an expected size, for differences
+ROUNDS = 8
+ENOUGH = 0.02  # [nats] an improvement less than this ends the descent
+WIDE = 3.0  # a strength's prior standard deviation, in units of the expected size
+
+
+@dataclass(frozen=True)
+class Free:
+    """One parameter of an effect in the fit: its value is off + x · size, inside its bounds."""
+
+    effect: type[Effect]
+    parameter: Parameter
+
+    def value(self, x: float) -> float:
+        p = self.parameter
+        return float(np.clip(p.centre + x * p.sigma, p.low, p.high))
+
+    @property
+    def weight(self) -> float:
+        """Square root of the prior precision of x."""
+        return 1.0 / WIDE if self.parameter.role == "strength" else 1.0
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A maximum of the posterior. x: constants in prior σ, then effect parameters in expected sizes, then tolerance."""
+
+    effects: tuple[type[Effect], ...]
+    free: tuple[Free, ...]
+    u: Array  # (q,)
+    x: Array  # (p,)
+    predicted: Array  # (N,), tolerance not included
+    residual: Array  # (N,) whitened, tolerance not included
+    jacobian: Array  # (N, q + p + tolerance) whitened
+    raw: Array  # (N, q + p) the same in the channels' units
+    penalty: Array  # (q + p + tolerance,) square root of the prior precision
+    slack: Array  # fitted tolerance (t,)
+    objective: float  # whitened squares and prior strain at the optimum
+
+    @property
+    def acting(self) -> tuple[Effect, ...]:
+        return build(self.effects, self.free, self.x)
+
+    @property
+    def all_u(self) -> Array:
+        return np.concatenate((self.u, self.x, self.slack))
+
+    def covariance(self) -> Array:
+        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
+        return np.linalg.inv(gram)
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace's approximation (MacKay 2003, ch. 27), up to a constant that all models of one problem share."""
+        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
+        sided = sum(f.parameter.role == "strength" and f.parameter.low >= f.parameter.off for f in self.free)
+        spread = np.linalg.slogdet(gram)[1] - 2.0 * np.log(self.penalty).sum()
+        return float(-0.5 * (self.objective + spread) + sided * np.log(2.0))
+
+    def base(self) -> Base:
+        """The neighbourhood of this fit, for signatures of further effects."""
+        scaled = self.jacobian / self.penalty
+        pulled = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
+        return Base(scaled, self.residual, pulled * self.penalty)
+
+
+def build(effects: Sequence[type[Effect]], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
+    values: list[dict[str, float]] = [{} for _ in effects]
+    for f, value in zip(free, x.tolist(), strict=True):
+        values[effects.index(f.effect)][f.parameter.name] = f.value(value)
+    return tuple(effect(**v) for effect, v in zip(effects, values, strict=True))
+
+
+class Problem:
+    """The recordings, their noise and the tolerance, for any set of effects."""
+
+    def __init__(self, stack: Stack, noise: Noise, tolerance: Array) -> None:
+        """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be off by."""
+        self.stack, self.noise = stack, noise
+        self.tolerance = whiten(stack, tolerance, noise) if tolerance.size else np.zeros((stack.size, 0))
+        self.measured = whiten(stack, stack.measured, noise)
+
+    def descend(
+        self, effects: Sequence[type[Effect]], free: Sequence[Free], u: Array, x: Array, rounds: int = ROUNDS
+    ) -> Fitted:
+        """The nearest optimum from constants u and effect parameters x."""
+        q = len(u)
+        penalty = np.concatenate((np.ones(q), [f.weight for f in free], np.ones(self.tolerance.shape[1])))
+        centre = np.concatenate((u, x))
+        state = self._at(effects, free, centre, q)
+        best = self._state(effects, free, centre, q, state, penalty)
+        for _ in range(rounds):
+            step = self._step(best)
+            found = self._search(effects, free, best, step, q, penalty)
+            if found is None:
+                break
+            gained = best.objective - found.objective
+            best = found
+            if gained < ENOUGH:
+                break
+        return best
+
+    def _search(
+        self, effects: Sequence[type[Effect]], free: Sequence[Free], best: Fitted, step: Array, q: int, penalty: Array
+    ) -> Fitted | None:
+        """The first shortened step that improves, with its Jacobian."""
+        centre = np.concatenate((best.u, best.x))
+        for share in (1.0, 0.4, 0.1):
+            tried = self._bounded(free, centre + share * step, q)
+            predicted, residual = self._at(effects, free, tried, q)
+            slack, objective = self._slack(residual, tried, penalty)
+            if objective < best.objective:
+                return self._state(effects, free, tried, q, (predicted, residual), penalty)
+        return None
+
+    def _bounded(self, free: Sequence[Free], centre: Array, q: int) -> Array:
+        out = centre.copy()
+        for i, f in enumerate(free):
+            p = f.parameter
+            out[q + i] = np.clip(out[q + i], (p.low - p.centre) / p.sigma, (p.high - p.centre) / p.sigma)
+        out[:q] = np.clip(out[:q], -8.0, 8.0)
+        return out
+
+    def _at(self, effects: Sequence[type[Effect]], free: Sequence[Free], centre: Array, q: int) -> tuple[Array, Array]:
+        predicted = self.stack.predict(centre[:q], build(effects, free, centre[q:]))
+        return predicted, self.measured - whiten(self.stack, predicted, self.noise)
+
+    def _slack(self, residual: Array, centre: Array, penalty: Array) -> tuple[Array, float]:
+        """Best tolerance for a residual, and the objective with it."""
+        t = self.tolerance
+        gram = t.T @ t + np.eye(t.shape[1])
+        slack = np.linalg.solve(gram, t.T @ residual) if t.shape[1] else np.zeros(0)
+        left = residual - t @ slack
+        return slack, float(left @ left + slack @ slack + np.sum((penalty[: len(centre)] * centre) ** 2))
+
+    def _state(
+        self,
+        effects: Sequence[type[Effect]],
+        free: Sequence[Free],
+        centre: Array,
+        q: int,
+        at: tuple[Array, Array],
+        penalty: Array,
+    ) -> Fitted:
+        predicted, residual = at
+        slack, objective = self._slack(residual, centre, penalty)
+        columns = [self._difference(effects, free, centre, q, i, predicted) for i in range(len(centre))]
+        raw = np.column_stack(columns)
+        jacobian = whiten(self.stack, raw, self.noise)
+        return Fitted(
+            tuple(effects), tuple(free), centre[:q], centre[q:], predicted, residual,
+            np.column_stack((jacobian, self.tolerance)), raw, penalty, slack, objective,
+        )  # fmt: skip
+
+    def _difference(
+        self, effects: Sequence[type[Effect]], free: Sequence[Free], centre: Array, q: int, i: int, predicted: Array
+    ) -> Array:
+        """Derivative of the prediction by one unknown; away from a bound."""
+        step = STEP
+        if i >= q:
+            p = free[i - q].parameter
+            step = -STEP if centre[i] * p.sigma + p.centre + STEP * p.sigma > p.high else STEP
+        moved = centre.copy()
+        moved[i] += step
+        change: Array = (self.stack.predict(moved[:q], build(effects, free, moved[q:])) - predicted) / step
+        return change
+
+    def _step(self, fitted: Fitted) -> Array:
+        count = len(fitted.u) + len(fitted.x)
+        j, penalty = fitted.jacobian, fitted.penalty
+        pulled = np.concatenate((fitted.u, fitted.x, np.zeros_like(fitted.slack)))
+        step = np.linalg.solve(j.T @ j + np.diag(penalty**2), j.T @ fitted.residual - penalty**2 * pulled)
+        return np.asarray(step[:count])
+
+
+def free_of(effects: Sequence[type[Effect]]) -> tuple[Free, ...]:
+    return tuple(Free(e, p) for e in effects for p in e.parameters())
+
+
+def start(free: Sequence[Free], values: Mapping[tuple[str, str], float]) -> Array:
+    """Effect parameters in expected sizes from values by (effect, parameter)."""
+    return np.array([(values[f.effect.name, f.parameter.name] - f.parameter.centre) / f.parameter.sigma for f in free])

@@ -1,0 +1,178 @@
+"""Recordings to signals on one time grid: block means of analogue channels, fitted slopes of encoders.
+
+Every value is a mean over one grid interval of readings placed by their stamps less the channel's latency, so jitter
+and dropped samples only change how many readings stand behind it; an interval with too few of them is NaN.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from estimator.recording import RunInfo
+from estimator.salvage import Recording, read
+from estimator.settings import Calibration, Channel, Settings
+from estimator.terramechanics.soil import Array
+from tools.command import DAMAGED, USAGE, CommandError
+
+NS = 1e-9
+LEAST = 0.3  # share of the usual number of readings below which an interval is not used
+OUTLIER = 6.0  # [σ] from the interval's mean: one such reading is left out
+REACH = 1  # intervals to either side over which an encoder's slope is fitted
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One recording on its grid; arrays (n,), NaN where there is nothing. SI, calibrated."""
+
+    name: str
+    path: Path
+    info: RunInfo
+    start: float  # [s since the epoch] of time 0
+    time: Array  # [s] middle of each interval
+    wheel_angle: Array  # [rad]
+    wheel_speed: Array  # [rad/s]
+    carriage_angle: Array
+    carriage_rate: Array  # [rad/s] of the pulley
+    analogue: dict[str, Array]  # sinkage, current, temperature, drawbar_pull, load, axle_torque; those there are
+    damage: tuple[str, ...]
+
+
+def load(paths: Sequence[Path], settings: Settings, rate: float) -> list[Signals]:
+    """Each recording on a grid of `rate` [Hz]. Raises CommandError."""
+    return [signals(_read(path), settings, rate) for path in paths]
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _read(path: Path) -> Recording:
+    try:
+        return read(path)
+    except Exception as error:
+        raise CommandError(f"{path}: {error}" if str(path) not in str(error) else error, _code(path)) from None
+
+
+def _code(path: Path) -> int:
+    return DAMAGED if path.exists() else USAGE
+
+
+def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
+    """One recording on its grid. Raises CommandError where it has no encoders."""
+    series = {name: _series(recording, channel) for name, channel in settings.channels.items()}
+    missing = [name for name in ("wheel_encoder", "carriage_encoder") if series.get(name, _NONE)[0].size < 10]
+    if missing:
+        raise CommandError(f"{recording.path}: found no readings of {missing[0]}; expected both encoders", DAMAGED)
+    encoders = [series["wheel_encoder"], series["carriage_encoder"]]
+    start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
+    count = int((end - start) * rate)
+    if count < 5:
+        raise CommandError(f"{recording.path}: found {end - start:.2f} s of encoders; expected some seconds", DAMAGED)
+    edges = start + np.arange(count + 1) / rate
+    wheel_angle, wheel_speed = slope(*encoders[0], edges)
+    carriage_angle, carriage_rate = slope(*encoders[1], edges)
+    analogue = {name: block_mean(*values, edges) for name, values in _analogue(recording, settings, series).items()}
+    return Signals(
+        recording.run.name or recording.path.stem,
+        recording.path,
+        recording.run,
+        start,
+        0.5 * (edges[1:] + edges[:-1]) - start,
+        wheel_angle,
+        wheel_speed,
+        carriage_angle,
+        carriage_rate,
+        {name: values for name, values in analogue.items() if np.isfinite(values).any()},
+        tuple(recording.damage),
+    )
+
+
+_NONE = (np.zeros(0), np.zeros(0))
+
+
+def _analogue(
+    recording: Recording, settings: Settings, series: dict[str, tuple[Array, Array]]
+) -> dict[str, tuple[Array, Array]]:
+    names = {"sinkage_pot": "sinkage", "motor_shunt": "current", "motor_temperature": "temperature"}
+    found = {names[name]: series[name] for name in names if name in series and series[name][0].size}
+    wrench = settings.wrench
+    if wrench is None:
+        return found
+    rows = recording.arrays("/raw/wrench")
+    if not rows.size:
+        return found
+    time = rows["stamp"] * NS - wrench.latency
+    axes = {"drawbar_pull": ("fx", wrench.drawbar_pull), "load": ("fz", wrench.load), "axle_torque": ("ty", wrench.torque)}
+    return found | {name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()}
+
+
+def _series(recording: Recording, channel: Channel) -> tuple[Array, Array]:
+    """Times [s] and physical values of a channel in order of time, readings out of range left out."""
+    rows = recording.arrays(f"/raw/{channel.name}")
+    if not rows.size:
+        return _NONE
+    raw = rows[next(name for name in ("count", "volts", "celsius") if name in (rows.dtype.names or ()))].astype(float)
+    good = np.isfinite(raw)
+    if channel.name not in ("wheel_encoder", "carriage_encoder"):
+        good &= (raw >= channel.low) & (raw <= channel.high)
+    return _ordered(rows["stamp"][good] * NS - channel.latency, physical(raw[good], channel.calibration))
+
+
+def physical(raw: Array, calibration: Calibration) -> Array:
+    return np.asarray(raw * calibration.scale.value + calibration.offset.value, dtype=float)
+
+
+def _ordered(time: Array, values: Array) -> tuple[Array, Array]:
+    order = np.argsort(time, kind="stable")
+    return time[order], values[order]
+
+
+def block_mean(time: Array, values: Array, edges: Array) -> Array:
+    """Mean of the readings in each interval (n,), moved to its middle; single readings far off the rest are left out."""
+    block = np.searchsorted(edges, time, side="right") - 1
+    inside = (block >= 0) & (block < edges.size - 1)
+    block, time, values = block[inside], time[inside], values[inside]
+    mean, count = _mean(block, values, edges.size - 1)
+    deviation = values - mean[block]
+    scale = 1.4826 * np.median(np.abs(deviation)) if deviation.size else 0.0
+    kept = np.abs(deviation) <= OUTLIER * scale if scale > 0.0 else np.ones(block.size, bool)
+    mean, count = _mean(block[kept], values[kept], edges.size - 1)
+    usual = np.median(count[count > 0]) if (count > 0).any() else 1.0
+    early = 0.5 * (edges[1:] + edges[:-1]) - _mean(block[kept], time[kept], edges.size - 1)[0]
+    mean = np.where(count >= LEAST * usual, mean, np.nan)
+    drift = np.gradient(mean, edges[1] - edges[0]) if mean.size > 1 else 0.0 * mean
+    return mean + np.where(np.isfinite(drift), drift * early, 0.0)
+
+
+def _mean(block: Array, values: Array, n: int) -> tuple[Array, Array]:
+    count = np.bincount(block, minlength=n).astype(float)
+    return np.bincount(block, weights=values, minlength=n) / np.maximum(count, 1.0), count
+
+
+def slope(time: Array, values: Array, edges: Array) -> tuple[Array, Array]:
+    """Value and slope of an encoder at the middle of each interval, by a line fitted over it and its neighbours."""
+    n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1])
+    block = np.searchsorted(edges, time, side="right") - 1
+    inside = (block >= 0) & (block < n)
+    block, t, y = block[inside], time[inside] - edges[0], values[inside]
+    sums = [_spread(np.bincount(block, weights=w, minlength=n)) for w in (np.ones(t.size), t, t * t, y, t * y)]
+    s0, s1, s2, y0, y1 = sums
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rate = (s0 * y1 - s1 * y0) / (s0 * s2 - s1 * s1)
+        at = y0 / s0 + rate * (middle - edges[0] - s1 / s0)
+    enough = s0 >= LEAST * np.median(s0)
+    return np.where(enough, at, np.nan), np.where(enough, rate, np.nan)
+
+
+def _spread(sums: Array) -> Array:
+    """Sums over an interval and REACH neighbours on either side; fewer at the ends."""
+    total = np.concatenate(([0.0], np.cumsum(sums)))
+    at = np.arange(sums.size)
+    reach = np.minimum(np.minimum(at, at[::-1]), REACH)
+    joined: Array = total[at + reach + 1] - total[at - reach]
+    return joined

@@ -1,0 +1,222 @@
+"""The noise of each channel, size and colour, from the recordings themselves; whitening and surrogates with it.
+
+Model: a value's noise is white noise plus two Ornstein-Uhlenbeck processes, a fast one (what neighbouring slopes share)
+and a slow one of correlation time τ. It is fitted by restricted maximum likelihood (Patterson and Thompson 1971,
+Biometrika 58, 545-554) with a *saturated* mean: soil, calibration, the effects' signatures and smooth functions of the
+covariates. What any of these could explain therefore does not count as noise, and what they take away by chance is
+counted as lost freedom. The residual of the base model alone is never used: it holds the misfit, and prewhitening with
+the misfit's own colour makes wrong effects win. The configured noise is not used at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose.rig import Bools, Stack
+
+SLOW_TIMES = (0.5, 1.0, 2.0, 4.0, 10.0)  # [s] correlation times of the slow part tried
+SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)  # its shares of the variance tried
+FAST = (0.0, 0.4, 0.9)  # shares of the rest that the fast part takes
+FAST_TIME = 1.5  # correlation time of the fast part, in grid intervals
+SURROGATE_COLOURS = 20  # drawn from the posterior of the colour
+RIDGE = 1e-9
+STEADY = 1.3  # values noisier than this share of their channel's, for blur, say nothing of the noise
+CAREFUL = 0.8
+COLUMNS = 40  # of the saturated mean, at most
+
+
+@dataclass(frozen=True)
+class Colour:
+    """Noise of one channel: σ of a grid value; correlation time [s] and variance share of the slow part; share of the fast."""
+
+    sigma: float
+    time: float
+    slow: float
+    fast: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The most probable colour of each channel, and draws from its posterior."""
+
+    colours: tuple[Colour, ...]
+    draws: tuple[tuple[Colour, ...], ...]  # per channel
+    blur: Array  # (N,) what the grid itself blurs where the prediction bends, same unit as the value
+
+    def loose(self, stack: Stack) -> Array:
+        """(N,) by how much a value's noise exceeds its channel's."""
+        sigma = np.array([c.sigma for c in self.colours])[stack.channel]
+        return np.sqrt(1.0 + (self.blur / sigma) ** 2)
+
+
+BLUR = 0.5  # of the bend between neighbours: speeds are slopes over three intervals, corners are cut
+
+
+def blur(stack: Stack, predicted: Array) -> Array:
+    """Error (N,) made by averaging: a share of the second difference of the prediction, its neighbours' included."""
+    bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
+    edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))
+    bend = np.where(edge, 0.0, bend)
+    near = np.maximum(bend, np.maximum(np.roll(bend, 1), np.roll(bend, -1)))
+    return BLUR * near
+
+
+def first_guess(stack: Stack, predicted: Array) -> Noise:
+    """White noise from the differences between neighbours, which a slow misfit hardly touches."""
+    residual, colours = stack.measured - predicted, []
+    for channel in stack.rig.channels:
+        inside = stack.of(channel) & np.isfinite(stack.gaps)
+        step = np.diff(residual, prepend=0.0)[inside]
+        sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
+        colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
+    return Noise(tuple(colours), tuple((c,) for c in colours), blur(stack, predicted))
+
+
+def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np.random.Generator) -> Noise:
+    """Size and colour of each channel, from the prediction (N,) and the columns of the saturated mean (N, p)."""
+    steady = before.loose(stack) < STEADY
+    found = [
+        _fit_channel(stack, channel, stack.measured - predicted, saturated, steady & stack.of(channel), rng)
+        for channel in stack.rig.channels
+    ]
+    return Noise(tuple(f[0] for f in found), tuple(f[1:] for f in found), blur(stack, predicted))
+
+
+def _fit_channel(
+    stack: Stack, channel: str, residual: Array, saturated: Array, own: Bools, rng: np.random.Generator
+) -> tuple[Colour, ...]:
+    columns = np.column_stack((_basis(saturated[own]), residual[own]))
+    colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
+    colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
+    likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
+    weight = np.exp(likelihood - likelihood.max())
+    least = _least(stack, channel)
+    sized = [replace(c, sigma=max(float(np.sqrt(v)), least)) for c, v in zip(colours, variance, strict=True)]
+    chosen = rng.choice(len(sized), SURROGATE_COLOURS, p=weight / weight.sum())
+    return _careful(sized, weight / weight.sum(), _step(stack.gaps)), *(sized[i] for i in chosen)
+
+
+def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
+    """The colour whose slow power stands at quantile CAREFUL of the posterior: how slow noise is, little data can tell."""
+    power = np.array([c.sigma**2 * (1.0 - c.slow + 2.0 * c.slow * c.time / step) for c in colours])
+    order = np.argsort(power)
+    return colours[order[int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))]]
+
+
+def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
+    """Restricted log-likelihood of each colour with the size maximised out, and the variance."""
+    whitened, log_det = whiten_unit(columns, gaps, colours)
+    mean, y = whitened[:, :, :-1], whitened[:, :, -1]
+    gram = mean.transpose(0, 2, 1) @ mean
+    size = gram.shape[1]
+    gram += RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] / max(size, 1) * np.eye(size)
+    root = np.linalg.cholesky(gram)
+    taken = np.linalg.solve(root, np.einsum("gni,gn->gi", mean, y)[:, :, None])[:, :, 0]
+    free = max(y.shape[1] - size, 3)
+    variance = np.maximum(np.sum(y**2, axis=1) - np.sum(taken**2, axis=1), 1e-300) / free
+    spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return -0.5 * (free * np.log(variance) + log_det + spread), variance
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
+    scale = np.linalg.norm(columns, axis=0)
+    columns = columns[:, scale > 0.0] / scale[scale > 0.0]
+    if not columns.size:
+        return np.zeros((columns.shape[0], 0))
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    kept = np.flatnonzero(values > 1e-7 * values[-1])[-min(max(columns.shape[0] // 4, 1), COLUMNS) :]
+    basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
+    return basis
+
+
+def _least(stack: Stack, channel: str) -> float:
+    """A noise no channel is below: 1e-5 of its size. Noise-free simulations still need a scale."""
+    values = stack.measured[stack.of(channel)]
+    return 1e-5 * float(np.sqrt(np.mean(values**2))) + 1e-12 if values.size else 1.0
+
+
+def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
+    """Innovations (g, n, m) of columns (n, m) under noise of g colours and unit variance; log det of each correlation.
+
+    The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear in n.
+    """
+    kept, gain, scale = _recursion(gaps, colours)
+    out = np.empty((len(colours), *columns.shape))
+    slow, fast = np.zeros((len(colours), columns.shape[1])), np.zeros((len(colours), columns.shape[1]))
+    for i in range(len(columns)):
+        slow *= kept[0, i]
+        fast *= kept[1, i]
+        innovation = columns[i] - slow - fast
+        out[:, i] = innovation
+        slow += gain[0, i] * innovation
+        fast += gain[1, i] * innovation
+    out /= scale.T[:, :, None]
+    return out, 2.0 * np.log(scale).sum(axis=0)
+
+
+def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Array]:
+    """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the innovation (n, g)."""
+    times = np.array([[c.time for c in colours], [FAST_TIME * _step(gaps)] * len(colours)])
+    share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
+    white = 1.0 - share.sum(axis=0)
+    kept = np.exp(-gaps[None, :, None] / times[:, None, :])
+    gain, scale = np.empty_like(kept), np.empty(kept.shape[1:])
+    ss, ff, sf = share[0], share[1], np.zeros(len(colours))
+    for i in range(len(gaps)):
+        a, b = kept[0, i], kept[1, i]
+        ss, ff, sf = a * a * ss + share[0] * (1 - a * a), b * b * ff + share[1] * (1 - b * b), a * b * sf
+        to_slow, to_fast = ss + sf, ff + sf
+        total = to_slow + to_fast + white
+        gain[0, i], gain[1, i], scale[i] = to_slow / total, to_fast / total, np.sqrt(total)
+        ss, ff, sf = ss - to_slow * gain[0, i], ff - to_fast * gain[1, i], sf - to_slow * gain[1, i]
+    return kept[..., None], gain[..., None], np.maximum(scale, 1e-6)
+
+
+def _step(gaps: Array) -> float:
+    inside = gaps[np.isfinite(gaps)]
+    return float(np.median(inside)) if inside.size else 1.0
+
+
+def whiten(stack: Stack, columns: Array, noise: Noise) -> Array:
+    """Columns (N, m) or (N,) in units of independent unit noise."""
+    matrix = columns[:, None] if columns.ndim == 1 else columns
+    matrix = matrix / noise.loose(stack)[:, None]
+    out = np.empty_like(matrix)
+    for channel, colour in zip(stack.rig.channels, noise.colours, strict=True):
+        own = stack.of(channel)
+        out[own] = whiten_unit(matrix[own], stack.gaps[own], [colour])[0][0] / colour.sigma
+    return out[:, 0] if columns.ndim == 1 else out
+
+
+def surrogates(stack: Stack, noise: Noise, count: int, rng: np.random.Generator) -> Array:
+    """Noise (N, count) with sizes and colours drawn from their posterior: what the recordings hold when nothing is amiss."""
+    out = np.empty((stack.size, count))
+    for channel, draws in zip(stack.rig.channels, noise.draws, strict=True):
+        own = stack.of(channel)
+        for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
+            out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
+    return out * noise.loose(stack)[:, None]
+
+
+def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:
+    """Noise of a colour (n, count)."""
+    white = 1.0 - colour.slow - colour.fast
+    out = np.sqrt(white) * rng.standard_normal((len(gaps), count))
+    for share, time in ((colour.slow, colour.time), (colour.fast, FAST_TIME * _step(gaps))):
+        if share > 0.0:
+            out += np.sqrt(share) * _relaxing(gaps, count, time, rng)
+    return colour.sigma * out
+
+
+def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
+    """An Ornstein-Uhlenbeck process of unit variance (n, count)."""
+    kept = np.exp(-gaps / time)
+    out = rng.standard_normal((len(gaps), count)) * np.sqrt(1.0 - kept**2)[:, None]
+    for i in range(1, len(gaps)):
+        out[i] += kept[i] * out[i - 1]
+    return out

@@ -1,0 +1,173 @@
+"""From the screen to models: nonlinear fits of the likely effects, one more effect at a time, earlier ones re-tested."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimator.effects.base import Effect
+from estimator.terramechanics.soil import Array
+from tools.diagnose.evidence import Base, Signature
+from tools.diagnose.fit import Fitted, Free, Problem, free_of
+from tools.diagnose.screen import Screen, Whitened, screen, whitened
+from tools.diagnose.signatures import raw_signatures, shape_grid, signature, strengths
+
+REACH = 0.35  # of the best effect's evidence: less cannot catch up in the nonlinear fit
+MOST = 9  # effects fitted at the first step
+PAIRS = 2  # first effects from which a second step starts
+SECOND = 5  # effects fitted at each further step
+STEPS = 3  # effects at most
+PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
+
+
+@dataclass
+class Model:
+    """A set of effects and its fit."""
+
+    fitted: Fitted
+    names: tuple[str, ...]
+    log_prior: float
+
+    @property
+    def evidence(self) -> float:
+        return self.fitted.log_evidence + self.log_prior
+
+
+@dataclass
+class Search:
+    """All models that were fitted, the screens on the way."""
+
+    problem: Problem
+    generics: list[Signature]
+    draws: tuple[Array, Array]
+    models: list[Model] = field(default_factory=list)
+    screens: dict[tuple[str, ...], Screen] = field(default_factory=dict)
+
+    def best(self, size: int | None = None) -> Model:
+        return max((m for m in self.models if size is None or len(m.names) == size), key=lambda m: m.evidence)
+
+    def has(self, names: Sequence[str]) -> bool:
+        return any(set(m.names) == set(names) for m in self.models)
+
+
+def rescreen(search: Search, model: Model, names: list[str] | None = None) -> Screen:
+    """Evidence for one more effect, and for a smooth misfit, on top of a model."""
+    stack, fitted = search.problem.stack, model.fitted
+    signatures = list(_beside(search, model, names))
+    base = fitted.base()
+    ready = whitened(stack, search.problem.noise, [*signatures, *search.generics])
+    noise, strain = search.draws
+    found = screen(base, ready, (noise, _resized(strain, base)))
+    search.screens[model.names] = found
+    return found
+
+
+def _beside(search: Search, model: Model, names: list[str] | None) -> list[Signature]:
+    stack, fitted = search.problem.stack, model.fitted
+    acting = fitted.acting
+    found = []
+    for name, effect in stack.rig.effects.items():
+        if name in model.names or (names is not None and name not in names):
+            continue
+        for shape in shape_grid(stack.rig, effect):
+            made = signature(stack, fitted.u, fitted.predicted, effect, shape, acting)
+            if made is not None:
+                found.append(made)
+    return found
+
+
+def _resized(strain: Array, base: Base) -> Array:
+    """Strains of the surrogates for a base of another number of unknowns."""
+    size = base.jacobian.shape[1]
+    if size <= strain.shape[0]:
+        return strain[:size]
+    more = np.random.default_rng(size).standard_normal((size - strain.shape[0], strain.shape[1]))
+    return np.vstack((strain, more))
+
+
+def likely(found: Screen, names: Sequence[str], most: int) -> list[str]:
+    """Listed effects within reach of the best, most likely first."""
+    listed = sorted((n for n in found.evidence if n in names), key=lambda n: -found.evidence[n])
+    if not listed:
+        return []
+    top = max(found.evidence[listed[0]], 0.0)
+    return [n for n in listed if found.evidence[n] >= min(REACH * top, top - 6.0)][:most]
+
+
+def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model]:
+    """Fits of the model with one more effect each."""
+    made = []
+    effects = search.problem.stack.rig.effects
+    for name in likely(found, list(effects), most):
+        names = (*model.names, name)
+        if not search.has(names):
+            made.append(_fitted(search, model, effects[name], found.best[name]))
+    search.models += made
+    return made
+
+
+def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) -> Model:
+    """One more effect, started at its linear estimate."""
+    base = model.fitted.base()
+    a, b = base.projected(best.columns)
+    amplitude = np.linalg.solve(a + 0.1 * np.eye(len(b)), b)
+    amplitude = np.where(np.array(best.signature.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
+    free = (*model.fitted.free, *free_of((effect,)))
+    x = np.concatenate((model.fitted.x, _start(free[len(model.fitted.free) :], effect, amplitude, best.signature.shape)))
+    fitted = search.problem.descend((*model.fitted.effects, effect), free, model.fitted.u, x)
+    names = (*model.names, effect.name)
+    return Model(fitted, names, model.log_prior + (PAIR_PRIOR if model.names else 0.0))
+
+
+def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: dict[str, float]) -> Array:
+    size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
+    values = []
+    for f in free:
+        p = f.parameter
+        values.append(size[p.name] if p.name in size else (shape[p.name] - p.centre) / p.sigma)
+    return np.clip(np.array(values), -20.0, 20.0)
+
+
+def run(search: Search, first: Model, advance: object = None) -> None:
+    """Forward steps from the base model while the screen alarms; each from the best few models of the step before."""
+    search.models.append(first)
+    found = rescreen(search, first)
+    if not found.alarmed:
+        return
+    extend(search, first, found, MOST)
+    for size in range(1, STEPS):
+        here = sorted((m for m in search.models if len(m.names) == size), key=lambda m: -m.evidence)
+        here = [m for m in here[:PAIRS] if m.evidence > search.best().evidence - 20.0]
+        if not here:
+            return
+        for model in here:
+            found = rescreen(search, model)
+            if found.alarmed:
+                extend(search, model, found, SECOND)
+        if not any(len(m.names) == size + 1 for m in search.models):
+            return
+        _retest(search)
+        if len(search.best().names) <= size:
+            return
+
+
+def _retest(search: Search) -> None:
+    """The best model with each of its effects left out, if that was not fitted yet."""
+    best = search.best()
+    for leave in best.names[:-1]:
+        kept = tuple(n for n in best.names if n != leave)
+        if kept and not search.has(kept):
+            free = free_of([search.problem.stack.rig.effects[n] for n in kept])
+            x = np.array([_at(best.fitted, f) for f in free])
+            effects = tuple(search.problem.stack.rig.effects[n] for n in kept)
+            fitted = search.problem.descend(effects, free, best.fitted.u, x)
+            search.models.append(Model(fitted, kept, PAIR_PRIOR * (len(kept) - 1)))
+
+
+def _at(fitted: Fitted, wanted: Free) -> float:
+    return float(next(x for f, x in zip(fitted.free, fitted.x, strict=True) if f == wanted))
+
+
+__all__ = ["Model", "Search", "raw_signatures", "rescreen", "run"]

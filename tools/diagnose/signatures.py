@@ -1,0 +1,88 @@
+"""What each effect would change: finite differences of all channels over its strengths, on a grid of its shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+
+import numpy as np
+
+from estimator.effects.base import Effect, Parameter
+from estimator.terramechanics.soil import Array
+from tools.diagnose.evidence import Signature
+from tools.diagnose.rig import Rig, Stack
+
+HIGHEST_ORDER = 200.0  # ripples a turn
+NYQUIST = 0.35  # of the grid's rate: faster ripples are damped too much by the averaging
+ORDERS = 120  # at most
+RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
+
+
+def strengths(effect: type[Effect]) -> list[Parameter]:
+    return [p for p in effect.parameters() if p.role == "strength"]
+
+
+def raw_signatures(stack: Stack, u: Array, base: Array, names: list[str] | None = None) -> Iterator[Signature]:
+    """Unwhitened signatures of all candidate effects about the base prediction (N,) at constants u."""
+    for name, effect in stack.rig.effects.items():
+        if names is None or name in names:
+            shapes = list(shape_grid(stack.rig, effect))
+            for shape in shapes:
+                found = signature(stack, u, base, effect, shape)
+                if found is not None:
+                    yield found
+
+
+def signature(
+    stack: Stack, u: Array, base: Array, effect: type[Effect], shape: Mapping[str, float], others: tuple[Effect, ...] = ()
+) -> Signature | None:
+    """None where the effect changes nothing that is measured."""
+    columns = np.column_stack(
+        [stack.predict(u, (*others, effect(**{**shape, p.name: p.off + p.sigma}))) - base for p in strengths(effect)]
+    )
+    if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
+        return None
+    sign = tuple(int(p.low >= p.off) for p in strengths(effect))
+    return Signature(effect.name, columns, sign, dict(shape))
+
+
+def shape_grid(rig: Rig, effect: type[Effect]) -> Iterator[dict[str, float]]:
+    """Values of the effect's shapes worth trying on these recordings, all combinations."""
+    shapes = [p for p in effect.parameters() if p.role == "shape"]
+    for values in product(*(_values(rig, p) for p in shapes)):
+        yield {p.name: float(np.clip(v, p.low, p.high)) for p, v in zip(shapes, values, strict=True)}
+
+
+def _values(rig: Rig, parameter: Parameter) -> list[float]:
+    if parameter.scan and parameter.unit == "s":
+        length = max(float(np.ptp(run.time)) for run in rig.runs)
+        campaign = max(float(run.time[-1]) for run in rig.runs)
+        return sorted({float(np.clip(f * t, parameter.low, parameter.high)) for f in RELATIVE_TIMES for t in (length, campaign)})
+    if parameter.scan and parameter.unit == "m":
+        return _places(rig, parameter)
+    if parameter.scan:
+        return orders(rig, parameter)
+    if parameter.sigma >= 0.4 * abs(parameter.centre):
+        return [0.4 * parameter.centre, parameter.centre, 2.0 * parameter.centre]
+    return [parameter.centre]
+
+
+def _places(rig: Rig, parameter: Parameter) -> list[float]:
+    """Lengths as shares of the bed that was driven; centres along it."""
+    along = np.concatenate([run.covariates["position"] for run in rig.runs])
+    low, high = float(along.min()), float(along.max())
+    span = max(high - low, 1e-3)
+    if "length" in parameter.name:
+        return [0.12 * span, 0.25 * span, 0.5 * span]
+    return np.linspace(low, high, 13).tolist()
+
+
+def orders(rig: Rig, parameter: Parameter) -> list[float]:
+    """Ripples a turn that the grid can show: whole numbers, or as dense as the number of turns asks for."""
+    speed = np.concatenate([np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs])
+    turning = speed[speed > 0.05 * speed.max()] if speed.max() > 0.0 else speed
+    rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
+    highest = NYQUIST * rate * 2.0 * np.pi / max(float(np.quantile(turning, 0.8)), 1e-6)
+    top = min(parameter.high, HIGHEST_ORDER, highest)
+    whole = np.arange(np.ceil(parameter.low), np.floor(top) + 1.0)
+    return whole[:: max(1, -(-len(whole) // ORDERS))].tolist() or [parameter.low]

@@ -1,0 +1,290 @@
+"""The adapter for a wheel in soil: recordings and configuration in, channels predicted by the forward model out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.effects import EFFECTS, configured, make
+from estimator.effects.base import Effect
+from estimator.forward import Response, simulate_arrays
+from estimator.history import rate_of
+from estimator.settings import Calibration, Settings, Uncertain
+from estimator.situation import Motion, situation_of
+from estimator.terramechanics.soil import Array, Soil
+from tools.diagnose.load import Signals
+from tools.diagnose.rig import Bools, Known, Run
+from tools.diagnose.weights import weights_of
+
+ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
+UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
+CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
+SETTLING = 0.5  # [s] after the wheel starts, before the comparison counts
+RESTING = 0.4  # [s] the wheel must have stood before its current counts as the reading at rest
+TIMING = 5e-3  # [s] by which a channel's stamps may be off
+BLUR = 0.3  # second differences by which speeds, slopes over three intervals, cut corners that a channel does not
+FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}  # least relative sigma of what is "known exactly"
+SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
+UNITS = {
+    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-", "speed": "m/s",
+    "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s", "run": "-",
+    "direction": "-", "constant": "-",
+}  # fmt: skip
+LEFT_OUT = ("empirical_law",)  # stands for what has no name
+
+
+class WheelRig:
+    """See rig.Rig."""
+
+    units: Mapping[str, str] = UNITS
+    smooth = (
+        ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"), ("slip", "sinkage"),
+        ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),
+    )  # fmt: skip
+
+    def __init__(self, signals: Sequence[Signals], settings: Settings) -> None:
+        self.settings = settings
+        self.caveats: list[str] = []
+        self._weights = [weights_of(s, settings, self.caveats) for s in signals]
+        self.channels = _channels(signals, settings, [w.known for w in self._weights])
+        began = min(s.start for s in signals)
+        self._motions = [_motion(s, w.values, settings, s.start - began) for s, w in zip(signals, self._weights, strict=True)]
+        self.baseline = configured(settings.effects)
+        self.constants = (*_soil(settings, self.caveats), *self._calibrations(), *_configured(settings))
+        self.effects = {
+            n: e for n, e in EFFECTS.items()
+            if not e.filter_only and n not in LEFT_OUT and n not in {b.name for b in self.baseline}
+        }  # fmt: skip
+        self._starts: list[Array | None] = [None] * len(signals)
+        self.runs = [self._run(s, n) for n, s in enumerate(signals)]
+
+    # ---- prediction --------------------------------------------------------------------------------------------------
+
+    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+        value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
+        acting = (*self._baseline(value), *effects)
+        return [self._predict(number, value, acting) for number in range(len(self._motions))]
+
+    def _predict(self, number: int, value: Mapping[str, float], effects: Sequence[Effect]) -> dict[str, Array]:
+        motion = self._motions[number]
+        travelled = 1.0 + value["carriage_scale"]
+        motion = replace(
+            motion,
+            load=motion.load * (1.0 + value["weights"]),
+            carriage_speed=motion.carriage_speed * travelled,
+            carriage_position=motion.carriage_position * travelled,
+        )
+        soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
+        response = simulate_arrays(
+            self.settings.wheel, soil, motion, effects,
+            torque_constant=self._constant, theta_1=self._starts[number], order=ORDER,
+        )  # fmt: skip
+        self._starts[number] = response.theta_1
+        return {c: self._read(c, response, value, np.asarray(motion.time)) for c in self.channels}
+
+    def _read(self, channel: str, response: Response, value: Mapping[str, float], time: Array) -> Array:
+        sensed = response.sensed
+        true = self._constant * sensed.current if channel == "torque" else _sensed(sensed, channel)
+        read = np.asarray(true) * (1.0 + value[f"{channel}_scale"]) + value[f"{channel}_offset"]
+        bend = np.pad(np.diff(read, n=2), 1)
+        return read - value[f"{channel}_delay"] * np.gradient(read, time) + value[f"{channel}_blur"] * bend
+
+    def _baseline(self, value: Mapping[str, float]) -> tuple[Effect, ...]:
+        return tuple(
+            make(e.name, {p: value.get(f"{e.name}.{p}", q.value) for p, q in e.parameters.items()})
+            for e in self.settings.effects
+        )
+
+    @property
+    def _constant(self) -> float:
+        return self.settings.drive.torque_constant.value
+
+    # ---- what is known -----------------------------------------------------------------------------------------------
+
+    def _calibrations(self) -> list[Known]:
+        known = []
+        for channel in self.channels:
+            scale, offset = _calibration(self.settings, channel)
+            unit = UNITS[channel]
+            known += [
+                Known(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
+                Known(f"{channel}_offset", 0.0, max(offset, 1e-9), unit),
+                Known(f"{channel}_delay", 0.0, TIMING, "s"),
+                Known(f"{channel}_blur", 0.0, BLUR),
+            ]
+        nominal = self.settings.load.nominal
+        known.append(Known("weights", 0.0, max(nominal.sigma / max(nominal.value, 1e-9), 2e-3)))
+        carriage = self.settings.channels["carriage_encoder"].calibration.scale
+        known.append(Known("carriage_scale", 0.0, max(carriage.sigma / abs(carriage.value), SCALE_FLOOR)))
+        return known
+
+    def _run(self, signals: Signals, number: int) -> Run:
+        motion = self._motions[number]
+        measured = {c: _measured(signals, c, self._constant) for c in self.channels}
+        covariates = self._covariates(signals, motion) | {"sinkage": self._depth(number)}
+        driving, resting, lifted = _states(motion, self.settings)
+        still = {"torque": driving | resting | lifted}
+        known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
+        used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
+        return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
+
+    def _depth(self, number: int) -> Array:
+        """Sinkage predicted from the prior: the measured one carries the noise of a channel it would be held against."""
+        motion, prior = self._motions[number], {known.name: known.value for known in self.constants}
+        soil = Soil(prior["c"], prior["tan_phi"], prior["k"], prior["n"], prior["K"])
+        return simulate_arrays(self.settings.wheel, soil, motion, self.baseline, order=ORDER).sinkage
+
+    def _covariates(self, signals: Signals, motion: Motion) -> dict[str, Array]:
+        situation = situation_of(motion, self.settings.wheel)
+        current = _filled(signals.analogue.get("current", np.zeros(signals.time.size)))
+        speed = self.settings.wheel.radius * np.abs(motion.wheel_speed)
+        step = float(np.median(np.diff(signals.time)))
+        ones = np.ones(signals.time.size)
+        return {
+            "slip": np.asarray(situation.slip),
+            "speed": np.asarray(speed),
+            "load": np.asarray(motion.load) * ones,
+            "wheel_angle": np.asarray(motion.wheel_angle),
+            "position": np.asarray(situation.position),
+            "time": np.asarray(motion.time),
+            "acceleration": rate_of(motion.time, motion.wheel_speed),
+            "heat": np.cumsum(current**2) * step,
+            "direction": np.asarray(situation.direction),
+            "pass": motion.pass_number * ones,
+            "constant": ones,
+        }
+
+
+def _sensed(sensed: object, channel: str) -> Array:
+    return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))
+
+
+def _channels(signals: Sequence[Signals], settings: Settings, weights_known: Sequence[bool]) -> tuple[str, ...]:
+    """Those that some recording has and that carry information."""
+    source = {"torque": "current"}
+    found = []
+    for channel in ("torque", "axle_torque", "drawbar_pull", "sinkage", "load"):
+        there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
+        if there and _calibration(settings, channel)[1] < UNKNOWN and (channel != "load" or all(weights_known)):
+            found.append(channel)
+    return tuple(found)
+
+
+def _varies(values: Array | None) -> bool:
+    return values is not None and bool(np.nanmax(values) > np.nanmin(values))
+
+
+def _measured(signals: Signals, channel: str, constant: float) -> Array:
+    nothing = np.full(signals.time.size, np.nan)
+    if channel == "torque":
+        return constant * signals.analogue.get("current", nothing)
+    return signals.analogue.get(channel, nothing)
+
+
+def _calibration(settings: Settings, channel: str) -> tuple[float, float]:
+    """Relative sigma of the scale, sigma of the offset in the channel's unit."""
+    if channel == "torque":
+        shunt, constant = settings.channels["motor_shunt"].calibration, settings.drive.torque_constant
+        return float(np.hypot(_relative(shunt.scale), _relative(constant))), constant.value * shunt.offset.sigma
+    if channel == "sinkage":
+        return _sigmas(settings.channels["sinkage_pot"].calibration)
+    assert settings.wrench is not None
+    return _sigmas(settings.wrench.torque if channel == "axle_torque" else getattr(settings.wrench, channel))
+
+
+def _sigmas(calibration: Calibration) -> tuple[float, float]:
+    return _relative(calibration.scale), calibration.offset.sigma
+
+
+def _relative(known: Uncertain) -> float:
+    return known.sigma / abs(known.value) if known.value else 0.0
+
+
+def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
+    prior = settings.soil
+    modulus = prior.pressure_sinkage.modulus(settings.wheel.width)
+    stated = {
+        "c": (prior.cohesion.value, prior.cohesion.sigma, "Pa"),
+        "tan_phi": (prior.tan_phi.value, prior.tan_phi.sigma, "-"),
+        "k": (prior.shear_modulus.value, prior.shear_modulus.sigma, "m"),
+        "n": (prior.exponent.value, prior.exponent.sigma, "-"),
+        "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
+    }
+    raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
+    if raised:
+        least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
+        caveats.append(f"The configuration states {', '.join(raised)} as almost exact; they float within {least} instead.")
+    low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
+    return tuple(
+        Known(name, value, max(sigma, FLOORS[name] * value, 1e-12), unit, True, name in ("k", "K"), low.get(name, 0.0))
+        for name, (value, sigma, unit) in stated.items()
+    )
+
+
+def _configured(settings: Settings) -> tuple[Known, ...]:
+    """Parameters of configured effects float within their own uncertainty, kept inside their bounds."""
+    known = []
+    for effect in settings.effects:
+        for p in EFFECTS[effect.name].parameters():
+            stated = effect.parameters.get(p.name)
+            if stated is not None and stated.sigma > 0.0:
+                known.append(Known(f"{effect.name}.{p.name}", stated.value, stated.sigma, p.unit, low=p.low, high=p.high))
+    return tuple(known)
+
+
+def _motion(signals: Signals, weights: Array, settings: Settings, began: float) -> Motion:
+    angle, travel = _filled(signals.wheel_angle), _filled(signals.carriage_angle) * settings.pulley_radius
+    wheel_speed, carriage_speed = _filled(signals.wheel_speed), _filled(signals.carriage_rate) * settings.pulley_radius
+    rest = _rest(settings.wheel.radius * wheel_speed, carriage_speed)
+    temperature = signals.analogue.get("temperature")
+    return Motion(
+        time=signals.time + began,
+        wheel_angle=angle,
+        wheel_speed=np.where(rest, 0.0, wheel_speed),
+        carriage_position=travel - travel[0],
+        carriage_speed=np.where(rest, 0.0, carriage_speed),
+        load=weights,
+        pass_number=float(signals.info.pass_number),
+        start_position=signals.info.start_position,
+        temperature=None if temperature is None else _filled(temperature),
+    )
+
+
+def _states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
+    """Driving on the soil and settled; at rest for a while; lifted off the soil."""
+    rim = settings.wheel.radius * np.abs(np.asarray(motion.wheel_speed))
+    turning = rim[rim > 1e-3]
+    usual = float(np.median(turning)) if turning.size else 1e-3
+    moving = rim > CREEP * usual
+    load = np.asarray(motion.load)
+    carrying = load >= settings.load.minimum
+    step = float(np.median(np.diff(np.asarray(motion.time))))
+    settled = _lasting(moving, round(SETTLING / step))
+    rest = _rest(np.asarray(motion.wheel_speed) * settings.wheel.radius, np.asarray(motion.carriage_speed))
+    resting = _lasting(rest, round(RESTING / step)) & _lasting(rest[::-1], 2)[::-1]
+    return settled & carrying, resting & carrying, settled & (load < 0.2 * settings.load.minimum)
+
+
+def _rest(rim_speed: Array, carriage_speed: Array) -> Bools:
+    """Both stand still but for the encoders' noise; a standing wheel's slip means nothing, so both speeds become 0."""
+    turning = np.abs(rim_speed)[np.abs(rim_speed) > 1e-3]
+    least = 0.01 * float(np.median(turning)) if turning.size else 1e-4
+    rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
+    return rest
+
+
+def _lasting(state: Bools, count: int) -> Bools:
+    """Where the state has lasted for `count` intervals already; from the very start of a run it counts at once."""
+    since = np.arange(state.size)
+    broken = np.maximum.accumulate(np.where(~state, since, -count - 1))
+    lasting: Bools = state & (since - broken > count)
+    return lasting
+
+
+def _filled(values: Array) -> Array:
+    """NaN bridged by straight lines."""
+    good = np.isfinite(values)
+    at = np.arange(values.size)
+    return np.interp(at, at[good], values[good]) if good.any() else np.zeros(values.size)

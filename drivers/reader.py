@@ -57,6 +57,7 @@ class Reader:
         self._last_error = ""
         self._last_received = 0
         self._bytes = self._readings = self._opened = 0
+        self.beats = 0  # moves while the thread is not held up in the hardware: the watchdog's pulse
 
     @property
     def alive(self) -> bool:
@@ -125,6 +126,7 @@ class Reader:
             self._state = "WAITING"
             if self._bytes > before:
                 backoff = BACKOFF_FIRST
+            self.beats += 1
             self._stop.wait(backoff)
             backoff = min(2 * backoff, BACKOFF_LAST)
 
@@ -136,6 +138,7 @@ class Reader:
         self._state = "OPEN"
         while not self._stop.is_set():
             chunk = self._link.read()
+            self.beats += 1
             if chunk is not None:
                 self._take(chunk)
 

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from estimator.config_devices import NAME, device
 from estimator.readings import CHANNELS, ENCODERS, REQUIRED
 from estimator.recording import RunInfo
 from estimator.schema import (
@@ -19,27 +20,22 @@ from estimator.schema import (
     NEEDED,
     UNLIMITED,
     Choice,
-    FilePath,
-    Flag,
     Impossible,
     Integer,
     Interval,
     Key,
     Kind,
     Named,
-    Options,
     Quantity,
     Section,
     Text,
     UncertainQuantity,
-    Variant,
     entries,
 )
 from estimator.settings import (
     Calibration,
     Channel,
     ConfiguredEffect,
-    Device,
     Drive,
     FilterSettings,
     Load,
@@ -61,8 +57,6 @@ EffectSchema = Callable[[str], Mapping[str, str] | None]
 def _uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
     return UncertainQuantity(Quantity(unit, **bounds))
 
-
-NAME = Text("a name", r".*\S.*")
 
 # ---- wheel, soil, drive, load --------------------------------------------------------------------------------------
 
@@ -117,59 +111,6 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
     if minimum >= nominal.value:
         raise Impossible("minimum", "less than load.nominal")
     return Load(nominal, minimum)
-
-
-# ---- devices -------------------------------------------------------------------------------------------------------
-
-SERIAL = {
-    "kind": Key(Choice(("serial",)), "a serial port"),
-    "port": Key(NAME, "path of the port, such as /dev/ttyACM0"),
-    "baud": Key(Integer(300, 12_000_000), "bits per second", "115200"),
-    "framing": Key(Choice(("cobs", "ascii")), "COBS with CRC-16 and sequence number, or lines with a checksum", "cobs"),
-}
-
-
-SIGNAL = {
-    "id": Key(Integer(0, 2**29 - 1), "frame id"),
-    "start": Key(Integer(0, 511), "start bit, as in a DBC"),
-    "length": Key(Integer(1, 64), "bits"),
-    "byte_order": Key(Choice(("little_endian", "big_endian")), "default little_endian", ABSENT),
-    "signed": Key(Flag(), "default false", ABSENT),
-    "is_float": Key(Flag(), "IEEE 754, default false", ABSENT),
-    "extended": Key(Flag(), "29-bit frame id, default false", ABSENT),
-    "scale": Key(Quantity(""), "value = bits · scale + offset; default 1", ABSENT),
-    "offset": Key(Quantity(""), "default 0", ABSENT),
-}
-
-
-def _signal(**values: Any) -> dict[str, Any]:
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def _can(folder: Path | None) -> dict[str, Key]:
-    return {
-        "kind": Key(Choice(("can",)), "a CAN bus"),
-        "interface": Key(NAME, "name of a python-can interface", "socketcan"),
-        "channel": Key(NAME, "channel of that interface", "can0"),
-        "bitrate": Key(Integer(10_000, 1_000_000), "bits per second", "500000"),
-        "dbc": Key(FilePath(folder), "CAN database; a relative path counts from the folder of this file", "''"),
-        "options": Key(Options(), "further arguments of the python-can interface", "{}"),
-        "signals": Key(
-            Named(Section(SIGNAL, _signal), lambda _, value: value),
-            "signals defined here instead of in a DBC, by names Message.Signal",
-            "{}",
-        ),
-    }
-
-
-def _device(folder: Path | None) -> Variant:
-    return Variant("kind", {"serial": Section(SERIAL, partial(Device, "")), "can": Section(_can(folder), _bus)})
-
-
-def _bus(dbc: str, signals: dict[str, Any], **values: Any) -> Device:
-    if bool(dbc) == bool(signals):
-        raise Impossible("signals" if dbc else "dbc", "either a CAN database or signals defined here")
-    return Device("", dbc=dbc, signals=signals, **values)
 
 
 # ---- channels ------------------------------------------------------------------------------------------------------
@@ -295,6 +236,13 @@ LOGGING = {
     "directory": Key(NAME, "folder of the recordings", "runs"),
     "flush_interval": Key(Quantity("s", above=0, high=60), "every chunk is closed and synced this often", "200 ms"),
     "compression": Key(Choice(("zstd", "lz4", "none")), "compression of a chunk", "zstd"),
+    "part_size": Key(Quantity("B", low=100e3, unlimited=True), "beyond it a new recording part begins", "256 MB"),
+    "part_time": Key(Quantity("s", low=1, unlimited=True), "and after this time", "1 h"),
+    "disk_cap": Key(
+        Quantity("B", low=1e6, unlimited=True),
+        "all recordings in the folder together; beyond it the oldest closed ones are deleted",
+        UNLIMITED,
+    ),
 }
 
 RUN = {
@@ -344,7 +292,7 @@ class Effects:
 
 def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:
     """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if there is one."""
-    devices = Named(_device(folder), lambda name, device: replace(device, name=name), "a mapping of devices")
+    devices = Named(device(folder), lambda name, value: replace(value, name=name), "a mapping of devices")
     keys = {
         "testbed": Key(NAME, "name of the testbed"),
         "wheel": Key(Section(WHEEL, Wheel), "the rigid wheel"),

@@ -1,7 +1,8 @@
 """The daemon: readers, loop and writer as threads of one process, started, watched and stopped in order.
 
 Readers are handed in (they come from `drivers`, which the estimator does not know). If a thread dies the daemon stops
-with a named reason and a closed log, so that the service manager starts it anew; it never runs on without a thread.
+with a named reason and a closed log, so that the service manager starts it anew; it never runs on without a thread. If
+one hangs, `health` names it and the watchdog is no longer stroked.
 """
 
 from __future__ import annotations
@@ -13,30 +14,48 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Protocol
 
-from estimator.cdr import Topic
+from estimator.cdr import STRING, TIME, Topic
 from estimator.clock import Clock
 from estimator.config import Configuration
-from estimator.loop import Loop, LoopRecord, Source
+from estimator.health import Pulse, silent
+from estimator.loop import Change, Loop, LoopRecord, Source
 from estimator.pipeline import Pipeline, TickRecord
-from estimator.playback import settings_for
+from estimator.playback import CHECKPOINT, settings_for
 from estimator.readings import Reading
 from estimator.record import LOOP_FIELDS, TICK_FIELDS
 from estimator.recording import LOG_TOPIC, RunInfo
+from estimator.reload import needs_restart
 from estimator.writer import WriterStatus, WriterThread
 
 TICK_TOPIC = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
 LOOP_TOPIC = Topic("/loop", "gritd_msgs/msg/Loop", LOOP_FIELDS)
-TOPICS = (TICK_TOPIC, LOOP_TOPIC)
+CHECKPOINT_TOPIC = Topic(
+    CHECKPOINT,
+    "gritd_msgs/msg/Checkpoint",
+    (
+        ("stamp", TIME, "time of the tick before"),
+        ("configuration", STRING, "effective YAML from here on"),
+        ("state", STRING, "what the next tick begins with: estimator/checkpoint.py"),
+    ),
+)
+TOPICS = (TICK_TOPIC, LOOP_TOPIC, CHECKPOINT_TOPIC)
 
 SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from another thread
 PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
+MIN_PART = 1.0  # [s] a part is at least this long
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
+
+# Looks (of WATCH) without a sign of life before a thread is said to hang.
+LOOP_PATIENCE = 10
+READER_PATIENCE = 80  # between two attempts to open a port it waits 5 s
+WRITER_PATIENCE = 100  # a disk may be slow: the queue holds 40 s
 
 
 class DaemonError(Exception):
@@ -47,6 +66,7 @@ class ReaderThread(Protocol):
     """What the daemon needs of a reader."""
 
     device: str
+    beats: int  # moves while the thread is not held up
 
     @property
     def alive(self) -> bool: ...
@@ -70,6 +90,13 @@ class LogSink:
         status = self._writer.status()
         return status.queued, status.dropped
 
+    def checkpoint(self, stamp: int, configuration: str, state: str, new_part: bool) -> None:
+        message = (CHECKPOINT_TOPIC.name, stamp, (stamp, configuration, state))
+        if new_part:
+            self._writer.begin_part(configuration, message)
+        else:
+            self._writer.put((), [message])
+
 
 class Daemon:
     """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last word.
@@ -86,19 +113,21 @@ class Daemon:
         source: Source,
         clock: Clock,
     ) -> None:
-        logging = configuration.settings.logging
+        self.configuration = configuration
+        self.run = run
         self.readers = readers
         self.clock = clock
-        self.writer = WriterThread(
-            path,
-            TOPICS,
-            configuration.text,
-            run,
-            compression=logging.compression,
-            flush_interval=logging.flush_interval,
-        )
-        self.loop = Loop(Pipeline(settings_for(configuration.settings, run)), source, LogSink(self.writer), clock)
-        self._stop = Event()
+        self.writer = _writer(path, configuration, run)
+        pipeline = Pipeline(settings_for(configuration.settings, run))
+        self.loop = Loop(pipeline, source, LogSink(self.writer), clock, configuration.text)
+        self._pulses = [
+            Pulse("loop", lambda: self.loop.ticks, LOOP_PATIENCE),
+            Pulse("writer", lambda: self.writer.beats, WRITER_PATIENCE),
+            *(Pulse(f"reader {reader.device}", partial(_beats, reader), READER_PATIENCE) for reader in readers),
+        ]
+        self.health = ""  # the threads that hang; stroke the watchdog only while there are none
+        self._part_began = time.monotonic()
+        self._stop, self._loop_stop = Event(), Event()
         self._failure = ""
         self._wall_offset = 0.0
 
@@ -111,6 +140,18 @@ class Daemon:
         now = self.clock.now()
         self.writer.put((), [(LOG_TOPIC.name, now, (now, level, "gritd", text, "", "", 0))])
 
+    def reload(self, configuration: Configuration) -> None:
+        """Go on with another configuration from the next tick, in a new part of the recording.
+
+        Raises DaemonError, and nothing has changed, where that needs a restart.
+        """
+        fixed = needs_restart(self.configuration.settings, configuration.settings)
+        if fixed:
+            raise DaemonError(f"{configuration.source}: {fixed}: changed, which needs a restart")
+        self.loop.ask(Change(configuration.text, Pipeline(settings_for(configuration.settings, self.run))))
+        self.configuration = configuration
+        self._part_began = time.monotonic()
+
     def serve(self, watch: Callable[[Daemon], None] = lambda daemon: None) -> WriterStatus:
         """Run until stopped. `watch` is called about ten times a second from the caller's thread."""
         self.writer.start()
@@ -121,39 +162,78 @@ class Daemon:
             loop.start()
             while not self._stop.wait(WATCH):
                 self._check(loop)
+                self._rotate()
                 watch(self)
-            loop.join(2.0)
+            for reader in self.readers:
+                reader.stop()
+            self._loop_stop.set()
+            loop.join(1.0)
         return self._close()
+
+    def fail(self, reason: str) -> None:
+        """Stop, with a reason; the first one given is the one told."""
+        self._failure = self._failure or reason
+        self._stop.set()
 
     def _run_loop(self) -> None:
         try:
-            self.loop.run(self._stop)
+            self.loop.run(self._loop_stop)
         except Exception as error:  # named, and the daemon stops: a dead loop must not look like a quiet one
-            self._failure = f"the loop failed: {type(error).__name__}: {error}"
-            self._stop.set()
+            self.fail(f"the loop failed: {type(error).__name__}: {error}")
 
     def _check(self, loop: Thread) -> None:
-        """Stop with a reason if a thread died; note a step of the wall clock."""
+        """Stop with a reason if a thread died; note one that hangs, and a step of the wall clock."""
         dead = [f"reader {reader.device}" for reader in self.readers if not reader.alive]
         dead += [] if self.writer.alive else ["writer"]
-        dead += [] if loop.is_alive() or self._stop.is_set() else ["loop"]
+        dead += [] if loop.is_alive() else ["loop"]
         if dead:
-            self._failure = self._failure or f"thread died: {', '.join(dead)}"
-            self._stop.set()
+            self.fail(f"thread died: {', '.join(dead)}")
+        self.health = silent(self._pulses)
         offset = self.clock.wall_offset()
         if abs(offset - self._wall_offset) > WALL_STEP:
             self.say(WARNING, f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the old one")
             self._wall_offset = offset
 
+    def _rotate(self) -> None:
+        """Ask for a new part when the present one is large or old."""
+        logging, age = self.configuration.settings.logging, time.monotonic() - self._part_began
+        status = self.writer.status()
+        if age < MIN_PART or status.state != "writing":
+            return
+        if age > logging.part_time or _size(status.files[-1]) > logging.part_size:
+            self.loop.ask(Change(self.configuration.text))
+            self._part_began = time.monotonic()
+
     def _close(self) -> WriterStatus:
-        for reader in self.readers:
-            reader.stop()
         if self._failure:
             self.say(ERROR, self._failure)
-        status = self.writer.stop()
+        status = self.writer.stop(1.0 if self._failure else 2.0)
         if self._failure:
             raise DaemonError(self._failure)
         return status
+
+
+def _writer(path: Path, configuration: Configuration, run: RunInfo) -> WriterThread:
+    logging = configuration.settings.logging
+    return WriterThread(
+        path,
+        TOPICS,
+        configuration.text,
+        run,
+        compression=logging.compression,
+        flush_interval=logging.flush_interval,
+    )
+
+
+def _beats(reader: ReaderThread) -> int:
+    return reader.beats
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
 
 
 @contextmanager

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Sequence
 from threading import Event
 from typing import NamedTuple, Protocol
 
+from estimator.checkpoint import encode
 from estimator.clock import Clock
-from estimator.pipeline import Pipeline, TickRecord
+from estimator.pipeline import Pipeline, State, TickRecord
 from estimator.readings import Reading
+from estimator.reload import carried
 from estimator.sync import NS
+
+RECENT = 2500  # ticks whose lateness is remembered
+_SHARES = {"late_50": 0.5, "late_99": 0.99, "late_999": 0.999, "late_max": 1.0}
+MEND = NS  # [ns] after a loss in the log the state is logged anew, at most this often
 
 
 class LoopRecord(NamedTuple):
@@ -26,6 +33,13 @@ class LoopRecord(NamedTuple):
     wall_offset: float  # [s]
 
 
+class Change(NamedTuple):
+    """Asked of the loop between two ticks: a new part of the log; with a pipeline, a new configuration too."""
+
+    configuration: str  # effective text
+    pipeline: Pipeline | None = None
+
+
 class Sink(Protocol):
     """Where ticks go: the writer."""
 
@@ -34,6 +48,9 @@ class Sink(Protocol):
 
     def counts(self) -> tuple[int, int]:
         """(waiting, dropped since the start)"""
+
+    def checkpoint(self, stamp: int, configuration: str, state: str, new_part: bool) -> None:
+        """The configuration and the state that the next tick begins with. Must not block."""
 
 
 class Source(Protocol):
@@ -47,23 +64,41 @@ class Source(Protocol):
 class Loop:
     """Ticks until told to stop. `latest` is the last tick and loop record, for whoever watches."""
 
-    def __init__(self, pipeline: Pipeline, source: Source, sink: Sink, clock: Clock) -> None:
+    def __init__(self, pipeline: Pipeline, source: Source, sink: Sink, clock: Clock, configuration: str = "") -> None:
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock
+        self._configuration = configuration
         self._period = round(NS / pipeline.settings.rates.tick)
+        self._asked: deque[Change] = deque()
+        self._log_dropped = 0  # as of the last checkpoint
+        self._checkpointed = 0  # when that was [ns]
+        self._lateness: deque[float] = deque(maxlen=RECENT)
         self.latest: tuple[TickRecord, LoopRecord] | None = None
         self.ticks = self.missed = 0
 
-    def run(self, stop: Event, beat: Callable[[], None] = lambda: None) -> None:
-        """`beat` is called after every tick: the watchdog's pulse."""
+    def ask(self, change: Change) -> None:
+        """To be done between two ticks; from any thread."""
+        self._asked.append(change)
+
+    def lateness(self) -> dict[str, float]:
+        """Percentiles of the last ticks' lateness [s]; from any thread."""
+        recent = sorted(self._lateness.copy())
+        if not recent:
+            return {}
+        return {name: recent[min(int(share * len(recent)), len(recent) - 1)] for name, share in _SHARES.items()}
+
+    def run(self, stop: Event) -> None:
+        """Tick at every deadline; one more tick after the stop takes what the readers left."""
         state = self._pipeline.start()
         deadline = self._clock.now() + self._period
-        while not stop.is_set():
+        last = False
+        while not last:
+            last = stop.is_set()
             self._clock.sleep_until(deadline)
             woken = self._clock.now()
             readings = self._source.drain()
             state, tick = self._pipeline.step(state, readings, deadline)
             self._hand_over(readings, tick, deadline, woken)
-            beat()
+            state = self._between(state, deadline)
             deadline = self._next(deadline)
 
     def _hand_over(self, readings: list[Reading], tick: TickRecord, deadline: int, woken: int) -> None:
@@ -80,8 +115,26 @@ class Loop:
             wall_offset=self._clock.wall_offset(),
         )
         self._sink.put(readings, tick, loop)
+        self._lateness.append(loop.lateness)
         self.latest = (tick, loop)
         self.ticks += 1
+
+    def _between(self, state: State, stamp: int) -> State:
+        """Take over what was asked for. After a loss in the log too, log what a replay needs to go on."""
+        dropped = self.latest[1].log_dropped if self.latest else 0
+        if self._asked:
+            change = self._asked.popleft()
+            if change.pipeline is not None:
+                state = carried(change.pipeline, state, self._pipeline.settings)
+                self._pipeline, self._configuration = change.pipeline, change.configuration
+            self._checkpoint(state, stamp, dropped, new_part=True)
+        elif dropped > self._log_dropped and stamp - self._checkpointed >= MEND:
+            self._checkpoint(state, stamp, dropped, new_part=False)
+        return state
+
+    def _checkpoint(self, state: State, stamp: int, dropped: int, new_part: bool) -> None:
+        self._sink.checkpoint(stamp, self._configuration, encode(state), new_part)
+        self._log_dropped, self._checkpointed = dropped, stamp
 
     def _next(self, deadline: int) -> int:
         """The next deadline that has not passed by a whole period; the ones between are missed."""

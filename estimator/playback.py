@@ -16,16 +16,25 @@ from estimator.salvage import Message, Recording
 from estimator.settings import Place, Settings
 from estimator.sync import NS
 
-TICK = "/tick"
+TICK, CHECKPOINT = "/tick", "/checkpoint"
 _RAW = {f"/raw/{channel}": channel for channel in CHANNELS}
 
 
+class Checkpoint(NamedTuple):
+    """What a tick began with: effective configuration and state (checkpoint.decode) as text."""
+
+    stamp: int  # of the tick before [ns]
+    configuration: str
+    state: str
+
+
 class RecordedTick(NamedTuple):
-    """Time of a tick [ns], the readings it consumed, and its logged fields where it was logged."""
+    """Time of a tick [ns], the readings it consumed, its logged fields and the checkpoint before it, if any."""
 
     stamp: int
     readings: list[Reading]
     logged: tuple[Any, ...] | None
+    checkpoint: Checkpoint | None = None
 
 
 def played(recording: Recording, rate: float) -> Iterator[RecordedTick]:
@@ -44,10 +53,13 @@ def reading_of(message: Message) -> Reading | None:
 
 def _logged(recording: Recording) -> Iterator[RecordedTick]:
     waiting: list[Reading] = []
+    checkpoint = None
     for message in recording.messages():
         if message[0] == TICK:
-            yield RecordedTick(message[2][0], waiting, message[2])
-            waiting = []
+            yield RecordedTick(message[2][0], waiting, message[2], checkpoint)
+            waiting, checkpoint = [], None
+        elif message[0] == CHECKPOINT:
+            waiting, checkpoint = [], Checkpoint(*message[2])
         elif (reading := reading_of(message)) is not None:
             waiting.append(reading)
 

@@ -135,6 +135,9 @@ class Logging:
     directory: str = "runs"
     flush_interval: float = 0.2  # [s] every chunk is closed and synced this often
     compression: Literal["zstd", "lz4", "none"] = "zstd"
+    part_size: float = 256e6  # [bytes] a new part of the recording begins beyond it …
+    part_time: float = 3600.0  # [s] … and after this time
+    disk_cap: float = float("inf")  # [bytes] of all recordings in the folder; the oldest closed ones are deleted
 
 
 @dataclass(frozen=True)

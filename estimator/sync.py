@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf, isnan, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from estimator.geometry import slope_sigma
 from estimator.readings import Reading
@@ -243,6 +244,29 @@ class Sync:
         latency = round(wrench.latency * NS)
         noises = {"fx": wrench.force_noise, "fz": wrench.force_noise, "ty": wrench.torque_noise}
         return {axis: MeanWindow(noise, latency, self._length) for axis, noise in noises.items()}
+
+    def memory(self) -> dict[str, Any]:
+        """Everything that the readings so far have left, by name; `remember` takes it in again."""
+        windows = {**self._slopes, **self._means, **self._wrench}
+        return {"counters": self.counters, "received": self.received, "windows": windows}
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        """Go on from another sync's memory. Raises ValueError where it has other channels."""
+        windows = memory["windows"]
+        for mine in (self._slopes, self._means, self._wrench):
+            if not mine.keys() <= windows.keys():
+                raise ValueError(f"no window for {', '.join(sorted(mine.keys() - windows.keys()))}")
+            mine.update({name: windows[name] for name in mine})
+        self.counters, self.received = memory["counters"], memory["received"]
+        for window in self._slopes.values():
+            window.counters = self.counters
+
+    def continued(self, before: Sync) -> None:
+        """Begin with empty windows where another sync ends: its counters and its encoders' baselines go on."""
+        self.received = before.received
+        self.counters = before.counters
+        for name, window in self._slopes.items():
+            window.counters, window.shift = self.counters, before._slopes[name].shift
 
     def push(self, reading: Reading) -> None:
         """Sort one reading in. Non-finite and out-of-range values are counted and go no further."""

@@ -17,7 +17,7 @@ from functools import lru_cache
 # base -> (fixed power, power's coefficient of n); a base with both zero is left out
 Dimension = dict[str, tuple[Fraction, int]]
 
-PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6}  # micro: U+00B5 and U+03BC
+PREFIXES = {"n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}  # micro: U+00B5 and U+03BC
 
 # symbol -> (factor to SI, dimension as powers of the bases, may take a prefix)
 SYMBOLS: dict[str, tuple[Fraction, dict[str, int], bool]] = {
@@ -33,6 +33,7 @@ SYMBOLS: dict[str, tuple[Fraction, dict[str, int], bool]] = {
     "deg": (Fraction(math.pi) / 180, {"rad": 1}, False),
     "turn": (Fraction(math.pi) * 2, {"rad": 1}, False),
     "count": (Fraction(1), {"count": 1}, False),
+    "B": (Fraction(1), {"B": 1}, True),  # byte
     "%": (Fraction(1, 100), {}, False),
     "Hz": (Fraction(1), {"s": -1}, True),
     "N": (Fraction(1), {"kg": 1, "m": 1, "s": -2}, True),

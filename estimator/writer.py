@@ -3,7 +3,7 @@
 What has been written out survives the death of the process; a second thread waits for the medium (fdatasync), so that a
 slow card delays nobody. A full or failing disk never reaches the loop: messages queue, then the oldest are dropped and
 counted, and writing resumes when it can. A file never has a gap: after a loss the next part begins (run.1.mcap, …), a
-recording of its own with the same metadata.
+recording of its own with the same metadata. A part also begins where a PartStart stands in the queue.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from estimator.cdr import Topic, Values
 from estimator.mcapfile import RecordingError, sync
@@ -32,7 +32,17 @@ BATCH = 5_000  # messages taken at once, so that a chunk stays small after an ou
 RETRY = 1.0  # [s] between attempts at a disk that failed
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
-Item = Reading | tuple[str, int, Values]  # a reading, or topic, log_time [ns] and values
+Message = tuple[str, int, Values]  # topic, log_time [ns] and values
+
+
+class PartStart(NamedTuple):
+    """The first message of a new part, and the effective configuration that holds from there on."""
+
+    config_yaml: str
+    message: Message
+
+
+Item = Reading | Message | PartStart
 State = Literal["writing", "degraded", "closed"]
 
 
@@ -75,6 +85,8 @@ class WriterThread:
         self._retry = retry
         self._batch: list[Item] = []  # taken from the queue, not yet encoded
         self._lost = 0  # messages dropped between what was encoded last and the batch
+        self._config = ""  # that of a PartStart among them
+        self.beats = 0  # times round
         self._rejected = 0  # messages encoded since the last flush that did not fit their topic
         self._suspect = False  # the current file failed for another reason than a full disk
         self._state: State = "writing"
@@ -90,13 +102,18 @@ class WriterThread:
         """Hand over the readings that one tick consumed, then its messages. Never waits for the disk, never raises."""
         self._queue.put([*readings, *messages])
 
+    def begin_part(self, config_yaml: str, message: Message) -> None:
+        """Go on in a new part from here, with this configuration; `message` is its first."""
+        self._queue.put([PartStart(config_yaml, message)])
+
     def status(self) -> WriterStatus:
         accepted, written, dropped, queued = self._queue.counters()
         return WriterStatus(self._state, self._error, accepted, written, dropped, queued, tuple(self._parts.files))
 
     @property
     def alive(self) -> bool:
-        return self._thread.is_alive()
+        """Whether both threads run."""
+        return self._thread.is_alive() and self._sync.alive
 
     def stop(self, timeout: float = 2.0) -> WriterStatus:
         """Write what is queued, close the file with its index, and return the final counters.
@@ -113,6 +130,7 @@ class WriterThread:
     def _run(self) -> None:
         due = time.monotonic()
         while not self._stopping.is_set():
+            self.beats += 1
             due = max(due + (self._interval if self._state == "writing" else self._retry), time.monotonic())
             self._stopping.wait(due - time.monotonic())
             self._attempt(self._write_out)
@@ -144,13 +162,23 @@ class WriterThread:
 
     def _next_batch(self) -> None:
         if not self._batch:
-            self._batch, lost = self._queue.take()
+            self._batch, lost, config = self._queue.take()
             self._lost += lost
-        if self._lost and self._batch:
-            self._parts.next(self._lost)
-            self._lost = 0
+            self._config = config or self._config
+        if self._batch:
+            self._begin_part()
         self._encode()
         self._flush()
+
+    def _begin_part(self) -> None:
+        """After a loss, and where a PartStart leads the batch."""
+        first = self._batch[0]
+        start = first if isinstance(first, PartStart) else None
+        if self._lost or start:
+            self._parts.next(self._lost, start.config_yaml if start else self._config)
+            self._lost, self._config = 0, ""
+        if start:
+            self._batch[0] = start.message
 
     def _encode(self) -> None:
         batch, self._batch = self._batch, []
@@ -158,7 +186,7 @@ class WriterThread:
             try:
                 if isinstance(item, Reading):
                     self._parts.writer.reading(item)
-                else:
+                elif not isinstance(item, PartStart):  # which was taken apart before
                     self._parts.writer.message(*item)
             except ValueError as error:
                 self._rejected += 1
@@ -190,28 +218,46 @@ class _Queue:
         self._accepted = self._written = self._dropped = 0
         self._taken = 0  # on their way to the disk
         self._overflow = 0  # dropped since the last take
+        self._config = ""  # of the last PartStart among them
+        self._starts = 0  # PartStarts waiting
 
     def put(self, items: list[Item]) -> None:
         with self._lock:
             self._items.extend(items)
             self._accepted += len(items)
-            excess = len(self._items) - self._capacity
+            self._starts += isinstance(items[0], PartStart) if items else 0
+            excess = max(0, len(self._items) - self._capacity)
             for _ in range(excess):
-                self._items.popleft()
-            self._dropped += max(0, excess)
-            self._overflow += max(0, excess)
+                self._drop(self._items.popleft())
+            self._dropped += excess
+            self._overflow += excess
+
+    def _drop(self, item: Item) -> None:
+        if isinstance(item, PartStart):
+            self._starts -= 1
+            self._config = item.config_yaml
 
     def batches(self) -> int:
         """How many takes empty the queue as it is, or write the batch that waits."""
-        return 1 + len(self._items) // BATCH
+        return 1 + len(self._items) // BATCH + self._starts
 
-    def take(self) -> tuple[list[Item], int]:
-        """The next messages, and how many were dropped before them since the last take."""
+    def take(self) -> tuple[list[Item], int, str]:
+        """The next messages, how many were dropped before them since the last take, and the configuration of a
+        PartStart among those. A PartStart comes first in its batch."""
         with self._lock:
-            batch = [self._items.popleft() for _ in range(min(BATCH, len(self._items)))]
+            batch = list(self._leading())
             self._taken += len(batch)
             lost, self._overflow = self._overflow, 0
-        return batch, lost
+            config, self._config = self._config, ""
+        return batch, lost, config
+
+    def _leading(self) -> Iterator[Item]:
+        for number in range(min(BATCH, len(self._items))):
+            if isinstance(self._items[0], PartStart):
+                if number:
+                    return
+                self._starts -= 1
+            yield self._items.popleft()
 
     def settle(self, dropped: int) -> None:
         """What was taken is written, but for those that could not be encoded."""
@@ -224,7 +270,7 @@ class _Queue:
         """Give up what is still here."""
         with self._lock:
             self._dropped += len(self._items) + self._taken
-            self._taken = 0
+            self._taken = self._starts = 0
             self._items.clear()
 
     def counters(self) -> tuple[int, int, int, int]:
@@ -238,15 +284,21 @@ class _Parts:
 
     def __init__(self, path: Path, topics: tuple[Topic, ...], config_yaml: str, run: RunInfo, compression: str) -> None:
         self._run = run
-        self._make = partial(RunWriter, topics=topics, config_yaml=config_yaml, compression=compression)
-        self.writer = self._make(path, run=run, chunk_size=sys.maxsize)  # chunks are closed by the clock
+        self._config = config_yaml
+        self._make = partial(RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize)  # see _flush
+        self.writer = self._make(path, config_yaml=config_yaml, run=run)
         self.files = [path]
 
-    def next(self, lost: int) -> None:
-        """Go on in a new file, with what the old one could not take. Raises RecordingError, and nothing has changed."""
+    def next(self, lost: int, config_yaml: str = "") -> None:
+        """Go on in a new file, with what the old one could not take, and with another configuration if one is given.
+
+        Raises RecordingError, and nothing has changed.
+        """
         number = next(n for n in count(len(self.files)) if not part_path(self.files[0], n).exists())
         path = part_path(self.files[0], number)
-        new = self._make(path, run=replace(self._run, part=number, lost_before=lost), chunk_size=sys.maxsize)
+        run = replace(self._run, part=number, lost_before=lost)
+        new = self._make(path, config_yaml=config_yaml or self._config, run=run)
+        self._config = config_yaml or self._config
         new.adopt(self.writer)
         with suppress(RecordingError):  # without an index it is readable still
             self.writer.close()
@@ -264,6 +316,10 @@ class _Syncer:
         self._error: OSError | None = None
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name="writer-sync", daemon=True)
+
+    @property
+    def alive(self) -> bool:
+        return self._thread.is_alive()
 
     def start(self) -> None:
         self._thread.start()

@@ -17,7 +17,10 @@ from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 COMMANDS = {
     "demo": ("tools.demo", "the daemon against the simulated testbed on real wires, with verdict and figure"),
     "run": ("tools.run", "the daemon: sensors in, c and tan φ out, everything logged"),
+    "status": ("tools.status", "one report of the running daemon, for people or scripts"),
+    "monitor": ("tools.monitor", "the running daemon in a terminal"),
     "simulate": ("tools.simulate", "the forward model alone: a schedule in, a recording out"),
+    "compare": ("tools.compare", "the forward simulation drawn over recordings, with the residual"),
     "replay": ("tools.replay", "the on-line filter over recordings"),
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),
     "recover": ("tools.recover", "salvage an unclosed or damaged recording"),

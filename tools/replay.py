@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from estimator.config import Configuration, load, loads
+from estimator.course import Course
 from estimator.daemon import TICK_TOPIC, TOPICS
-from estimator.pipeline import Pipeline, TickRecord
+from estimator.pipeline import TickRecord
 from estimator.playback import RecordedTick, played, settings_for, without_absent
 from estimator.record import TICK_NAMES, Status
 from estimator.recording import RecordingError, RunWriter, parts
 from estimator.salvage import Recording, read
+from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from tools.progress import Progress
 
@@ -74,12 +76,24 @@ def _verify(recordings: list[Recording], configuration: Configuration) -> int:
     if first.topics["/tick"].names != TICK_TOPIC.names:
         version = first.versions.get("gritd", "another version")
         raise CommandError(f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE)
-    compared, differing = 0, Differences()
-    for tick, record in _run(recordings, configuration, None, "verifying"):
-        if tick.logged is not None:
-            compared += 1
-            differing.compare(compared, tick.logged, record)
-    print(f"{first.path}: {compared} ticks, {len(TICK_NAMES)} fields each: {differing}")
+    course = _course(recordings, configuration, None)
+    if first.run.part:
+        course.lose()
+    differing = Differences()
+    for recording, tick in _ticks(recordings, configuration, "verifying"):
+        if recording.run.lost_before and recording is not differing.recording:
+            course.lose()
+        differing.recording = recording
+        if tick.checkpoint is not None:
+            differing.resumed(tick.stamp, course.resume(tick.checkpoint))
+        record = course.step(tick)
+        if tick.logged is not None and course.known:
+            differing.compare(tick.logged, record)
+        elif tick.logged is not None:
+            differing.unknown += 1
+    print(f"{first.path}: {differing.compared} ticks, {len(TICK_NAMES)} fields each: {differing}")
+    if not differing.compared:
+        raise CommandError(f"{first.path}: its first state is not known; verify from the run's first part", USAGE)
     return FAILED if differing.ticks else DONE
 
 
@@ -88,20 +102,31 @@ class Differences:
     """Fields of /tick that a replay did not reproduce."""
 
     ticks: int = 0
+    compared: int = 0
+    unknown: int = 0  # after a loss, before the next checkpoint
+    recording: Recording | None = None  # the last part looked at
     lines: list[str] = field(default_factory=list)
 
-    def compare(self, number: int, logged: TickRecord, computed: TickRecord) -> None:
+    def resumed(self, stamp: int, same: bool) -> None:
+        """A checkpoint was met from the ticks before it."""
+        if not same:
+            self.ticks += 1
+            self.lines.append(f"checkpoint before the tick at {stamp}: not the state that the ticks before it lead to")
+
+    def compare(self, logged: TickRecord, computed: TickRecord) -> None:
+        self.compared += 1
         encode = TICK_TOPIC.codec.encode
         if encode(logged) == encode(computed):
             return
         self.ticks += 1
         for name, was, now in zip(TICK_NAMES, logged, computed, strict=True):
             if repr(was) != repr(now) and float(was) != float(now) and len(self.lines) < SHOWN:
-                self.lines.append(f"tick {number}: {name}: logged {was!r}, replayed {now!r}")
+                self.lines.append(f"tick {self.compared}: {name}: logged {was!r}, replayed {now!r}")
 
     def __str__(self) -> str:
         if not self.ticks:
-            return "identical bit for bit"
+            after = f"; {self.unknown} more after lost messages not comparable" if self.unknown else ""
+            return f"identical bit for bit{after}"
         return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])
 
 
@@ -114,7 +139,11 @@ def _recompute(recordings: list[Recording], configuration: Configuration, argume
     if arguments.output:
         writer = RunWriter(_target(arguments), TOPICS, configuration.text, first.run)
     records = []
-    for tick, record in _run(recordings, configuration, arguments.engine, "replaying"):
+    course = _course(recordings, configuration, arguments.engine)
+    for _, tick in _ticks(recordings, configuration, "replaying"):
+        if tick.checkpoint is not None and not arguments.config:
+            course.reconfigure(tick.checkpoint)
+        record = course.step(tick)
         records.append(record)
         if writer is not None:
             for reading in tick.readings:
@@ -136,23 +165,28 @@ def _target(arguments: Namespace) -> Path:
     return output / Path(arguments.files[0]).name if output.is_dir() else output
 
 
-def _run(
-    recordings: list[Recording], configuration: Configuration, engine: str | None, what: str
-) -> Iterator[tuple[RecordedTick, TickRecord]]:
-    """Every tick of a run, its parts one after the other, as recorded and as computed now."""
+def _course(recordings: list[Recording], configuration: Configuration, engine: str | None) -> Course:
     first = recordings[0]
-    settings = settings_for(without_absent(configuration.settings, first), first.run)
+    settings = _settings(first, configuration)
     if settings.wrench is None and configuration.settings.wrench is not None:
         print(f"{first.path}: no /raw/wrench: replayed with the configured load", file=sys.stderr)
-    pipeline = Pipeline(settings, engine)
-    state = pipeline.start()
+    return Course(configuration, lambda given: _settings(first, given), engine)
+
+
+def _settings(first: Recording, configuration: Configuration) -> Settings:
+    return settings_for(without_absent(configuration.settings, first), first.run)
+
+
+def _ticks(
+    recordings: list[Recording], configuration: Configuration, what: str
+) -> Iterator[tuple[Recording, RecordedTick]]:
+    """Every tick of a run, its parts one after the other."""
     total = sum(recording.counts["/tick"] for recording in recordings)
-    with Progress(f"{what} {first.path.name}", total) as progress:
+    with Progress(f"{what} {recordings[0].path.name}", total) as progress:
         for recording in recordings:
-            for tick in played(recording, settings.rates.tick):
-                state, record = pipeline.step(state, tick.readings, tick.stamp)
+            for tick in played(recording, configuration.settings.rates.tick):
                 progress.advance()
-                yield tick, record
+                yield recording, tick
 
 
 def report(path: Path, ticks: np.ndarray) -> str:

@@ -1,0 +1,43 @@
+"""What a service manager is told: the sd_notify protocol, one datagram a message (man 3 sd_notify).
+
+Without a service manager nothing is sent, and nobody has to ask.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+
+READY, STOPPING, WATCHDOG = "READY=1", "STOPPING=1", "WATCHDOG=1"
+
+
+def reloading() -> str:
+    """That the configuration is being read again; READY ends it."""
+    return f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}"
+
+
+def status(text: str) -> str:
+    """One line for people, shown by `systemctl status`."""
+    return "STATUS=" + " ".join(text.split())
+
+
+class Notifier:
+    """The manager named by NOTIFY_SOCKET; `interval` [s] is how often its watchdog must be stroked, 0 for never."""
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        address = environment.get("NOTIFY_SOCKET", "")
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        wanted = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        timeout = environment.get("WATCHDOG_USEC", "0")
+        self.interval = int(timeout) * 1e-6 / 3 if wanted and timeout.isdecimal() else 0.0
+
+    def tell(self, *messages: str) -> None:
+        """Send what there is to say, as one datagram. Never waits and never raises: a manager that is gone is no
+        reason to stop."""
+        if not self._address:
+            return
+        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
+            out.sendto("\n".join(messages).encode(), self._address)

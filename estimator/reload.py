@@ -1,0 +1,60 @@
+"""A new configuration for a run that goes on: what may change, and what the state becomes.
+
+Calibration, noise, soil, load, effects and filter may change between two ticks. Devices, signals and rates belong to
+threads and buffers that already run: they need a restart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, replace
+
+from estimator.filter import Estimate
+from estimator.pipeline import Pipeline, State
+from estimator.segments import Memory
+from estimator.settings import Settings
+from estimator.tracker import TrackState
+
+_FIXED = ("testbed", "wheel", "pulley_radius", "devices", "rates", "place")
+_WIRING = ("device", "signal", "bits", "low", "high")  # of a channel: the reader's decoder was built with them
+_WRENCH_WIRING = ("device", "signal", "max_force", "max_torque")
+
+
+def needs_restart(old: Settings, new: Settings) -> str:
+    """The first key whose change a running daemon cannot take over; '' if there is none."""
+    return next(_changed(old, new), "")
+
+
+def _changed(old: Settings, new: Settings) -> Iterator[str]:
+    yield from _differing("", old, new, _FIXED)
+    if old.channels.keys() != new.channels.keys() or (old.wrench is None) != (new.wrench is None):
+        yield "channels"
+    for name in old.channels.keys() & new.channels.keys():
+        yield from _differing(f"channels.{name}.", old.channels[name], new.channels[name], _WIRING)
+    if old.wrench and new.wrench:
+        yield from _differing("channels.wrench.", old.wrench, new.wrench, _WRENCH_WIRING)
+    yield from _differing("logging.", old.logging, new.logging, [field.name for field in fields(old.logging)])
+
+
+def _differing(path: str, old: object, new: object, names: Iterable[str]) -> Iterator[str]:
+    yield from (path + name for name in names if getattr(old, name) != getattr(new, name))
+
+
+def carried(pipeline: Pipeline, state: State, before: Settings) -> State:
+    """The state of `before` for the pipeline that takes over.
+
+    The windows begin empty: what stands in them was read with another calibration. The estimate is kept where the soil
+    section is the same, with the prior's uncertainty, because what made it certain was read with the old configuration;
+    a new soil section is a new prior. Counters, time and the encoders' baselines go on.
+    """
+    fresh = pipeline.start()
+    fresh.sync.continued(state.sync)
+    track = fresh.track._replace(updates=state.track.updates, resets=state.track.resets)
+    if pipeline.settings.soil == before.soil:
+        track = _kept(track, state.track)
+    return replace(fresh, track=track, pull=state.pull, first=state.first, late=state.late, jumps=state.jumps)
+
+
+def _kept(track: TrackState, old: TrackState) -> TrackState:
+    estimate = Estimate(old.estimate.x, track.estimate.P, track.estimate.cross)
+    return track._replace(estimate=estimate, memory=Memory(estimate))

@@ -1,0 +1,157 @@
+"""What `gritd run` does beside its threads, ten times a second: tell people and the service manager, reload, tidy."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from math import degrees
+
+from drivers.queue import ReadingQueue
+from drivers.reader import Reader, ReaderStats
+from estimator import notify
+from estimator.config import load
+from estimator.daemon import INFO, WARNING, WATCH, Daemon, DaemonError
+from estimator.notify import Notifier
+from estimator.publish import Publisher
+from estimator.record import TICK_NAMES, Flag, Status
+from estimator.retention import trim
+from estimator.yamltree import ConfigError
+
+TIDY = 5.0  # [s] between looks at the disk
+
+
+class Watcher:
+    """Called by Daemon.serve. Prints a line of status now and then, and every change of a device's state at once."""
+
+    def __init__(
+        self, config: str, readers: Sequence[Reader], queue: ReadingQueue, publisher: Publisher, every: float
+    ) -> None:
+        self._config, self._readers, self._queue, self._publisher = config, readers, queue, publisher
+        self._notifier = Notifier()
+        self._every = every
+        self._states = {reader.device: "" for reader in readers}
+        self._writing, self._files, self._hanging, self._untidy = "writing", 1, "", ""
+        self._calls = 0
+        self._ready = self._reload_asked = False
+
+    def ask_reload(self) -> None:
+        """At the next call; may be called from a signal handler."""
+        self._reload_asked = True
+
+    def __call__(self, daemon: Daemon) -> None:
+        for reader in self._readers:
+            self._follow(daemon, reader.stats())
+        self._follow_writer(daemon)
+        self._follow_health(daemon)
+        if self._reload_asked:
+            self._reload_asked = False
+            self._reload(daemon)
+        if self._due(TIDY):
+            self._tidy(daemon)
+        self._notify(daemon)
+        if self._due(self._every):
+            print(status_line(daemon), flush=True)
+        self._calls += 1
+
+    def _due(self, period: float) -> bool:
+        return period > 0 and (self._calls + 1) % max(round(period / WATCH), 1) == 0
+
+    # --- what is told ---------------------------------------------------------------------------------------------
+
+    def _follow(self, daemon: Daemon, stats: ReaderStats) -> None:
+        if stats.state == self._states[stats.device]:
+            return
+        self._states[stats.device] = stats.state
+        trouble = stats.state not in ("OPEN", "ENDED")
+        self._tell(daemon, WARNING if trouble else INFO, f"device {stats.device} {stats.state} {stats.last_error}")
+
+    def _follow_writer(self, daemon: Daemon) -> None:
+        status = daemon.writer.status()
+        if status.state != self._writing:
+            self._writing = status.state
+            self._tell(daemon, WARNING if status.state == "degraded" else INFO, f"log {status.state} {status.error}")
+        if len(status.files) > self._files:
+            self._files = len(status.files)
+            self._tell(daemon, INFO, f"logging to {status.files[-1]}")
+
+    def _follow_health(self, daemon: Daemon) -> None:
+        if not self._publisher.alive:
+            daemon.fail("thread died: publisher")
+        if daemon.health != self._hanging:
+            self._hanging = daemon.health
+            text = (
+                f"hanging: {daemon.health}; the watchdog is not stroked" if daemon.health else "nothing hangs any more"
+            )
+            self._tell(daemon, WARNING if daemon.health else INFO, text)
+
+    def _tell(self, daemon: Daemon, level: int, text: str) -> None:
+        print(text.strip(), file=sys.stderr if level > INFO else sys.stdout, flush=True)
+        daemon.say(level, text.strip())
+
+    def _notify(self, daemon: Daemon) -> None:
+        """The service manager hears READY after the first tick, and of the watchdog while everything moves."""
+        if not self._ready and daemon.loop.ticks:
+            self._ready = True
+            self._notifier.tell(notify.READY)
+        if self._notifier.interval and self._due(self._notifier.interval) and not daemon.health:
+            self._notifier.tell(notify.WATCHDOG)
+        if self._due(1.0):
+            self._notifier.tell(notify.status(status_line(daemon)))
+
+    # --- what is done ---------------------------------------------------------------------------------------------
+
+    def _reload(self, daemon: Daemon) -> None:
+        """Read the configuration again; a bad one changes nothing."""
+        self._notifier.tell(notify.reloading())
+        try:
+            daemon.reload(load(self._config))
+            self._tell(daemon, INFO, f"{self._config}: reloaded")
+        except (ConfigError, DaemonError) as error:
+            self._tell(daemon, WARNING, f"{error}; the old configuration is kept")
+        self._notifier.tell(notify.READY)
+
+    def _tidy(self, daemon: Daemon) -> None:
+        """Keep the recordings under their cap."""
+        open_file = daemon.writer.status().files[-1]
+        trouble = ""
+        try:
+            for path in trim(open_file.parent, daemon.configuration.settings.logging.disk_cap, [open_file]):
+                self._tell(daemon, INFO, f"{path}: deleted, over logging.disk_cap")
+        except OSError as error:
+            trouble = f"{error.filename or open_file.parent}: logging.disk_cap cannot be kept: {error.strerror}"
+        if trouble and trouble != self._untidy:
+            self._tell(daemon, WARNING, trouble)
+        self._untidy = trouble
+
+    def report(self, daemon: Daemon) -> None:
+        """Every counter, once, at the end."""
+        self._notifier.tell(notify.STOPPING)
+        counts = self._queue.counts()
+        print(
+            f"queue: received {counts.received} = processed {counts.processed} + dropped {counts.dropped}"
+            f" + queued {counts.queued}"
+        )
+        for reader in self._readers:
+            s = reader.stats()
+            print(
+                f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, {s.garbage} garbage bytes,"
+                f" {s.lost} lost, {s.duplicates} duplicates, {s.quarantined} quarantined, {s.incomplete} incomplete,"
+                f" {s.unknown} unknown, {s.errors} bus errors, reopened {s.reopened} times"
+            )
+        print(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")
+
+
+def status_line(daemon: Daemon) -> str:
+    """The latest tick in one line."""
+    if daemon.loop.latest is None:
+        return "no tick yet"
+    tick, loop = daemon.loop.latest
+    t = dict(zip(TICK_NAMES, tick, strict=True))
+    line = (
+        f"{Status(int(t['status'])).name:10} slip {t['slip']:6.1%}  z {t['sinkage'] * 1e3:5.1f} mm"
+        f"  θ₁ {degrees(t['theta_1']):4.1f}°  W {t['load']:5.1f} N  T {t['torque']:5.2f} N·m"
+        f"  c {t['cohesion']:6.0f} ± {t['cohesion_sigma']:4.0f} Pa  tan φ {t['tan_phi']:.3f} ± {t['tan_phi_sigma']:.3f}"
+        f"  late {loop.lateness * 1e3:.2f} ms"
+    )
+    flags = [flag.name or "" for flag in Flag if flag and int(t["flags"]) & flag]
+    return f"{line}  {' '.join(flags)}".rstrip()

@@ -37,6 +37,7 @@ from estimator.wheel_state import REQUIRED_BITS, WheelState, classify
 SLIP_MEMORY = 20.0  # [s] k is estimated while slip has varied within this time …
 SLIP_VARIES = 0.05  # … by this standard deviation
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
+MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
 CONSISTENCY_MEMORY = 2.0  # [s]
 # Mean normalised innovation squared above which the filter is reset: with 20 independent windows of one component the
 # chance of a false reset is 3e-11 a window, 1 in 900 simulated hours (chi-square, 20 degrees of freedom).
@@ -45,6 +46,9 @@ MISMATCH = 2.5  # … and above which model and measurement are said to disagree
 PATIENCE = 5.0  # [s] after a reset before the next
 
 ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {"filterpy": FilterpyEngine, "plain": PlainEngine}
+
+
+Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
 
 
 class Aid(NamedTuple):
@@ -80,6 +84,7 @@ class TrackState(NamedTuple):
     memory: Memory
     recall: Mapping[str, float]  # what configured effects remember, by name
     columns: Columns = ()  # of the uncertain effect parameters, at the last update
+    linearised: Point | None = None  # where the memory was linearised last
     began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
@@ -190,17 +195,27 @@ class Tracker:
         return tuple(aids)
 
     def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:
-        """Add the window to the memory; when a new stretch begins, linearise all of them anew."""
+        """Add the window to the memory; when a new stretch begins and the state has moved, linearise all anew."""
         memory, begun = state.memory.extended(now, taken, self.measurement.chain.wheel.radius, elapsed)
         if not begun or len(memory.stretches) == 1:
             return state._replace(memory=memory)
         if len(memory.stretches) > CAPACITY:
             anchor = self._absorb(memory.anchor, memory.stretches[0], state)
             memory = Memory(anchor, memory.stretches[1:])
+        point = (self.estimates_k(state), state.estimate.x)
+        if not self._moved(state.linearised, point):
+            return state._replace(memory=memory)
         estimate = memory.anchor
         for stretch in memory.stretches:
             estimate = self._absorb(estimate, stretch, state)
-        return state._replace(memory=memory, estimate=project(estimate, self._bounds))
+        return state._replace(memory=memory, estimate=project(estimate, self._bounds), linearised=point)
+
+    def _moved(self, before: Point | None, now: Point) -> bool:
+        """Whether the state is so far from where the memory was linearised that its Jacobians no longer serve."""
+        if before is None or before[0] != now[0]:
+            return True
+        steps = zip(before[1], now[1], self._prior_sigma, strict=True)
+        return any(abs(b - a) > MOVED * sigma for a, b, sigma in steps)
 
     def _absorb(self, estimate: Estimate, stretch: Stretch, state: TrackState) -> Estimate:
         """Update with a whole stretch, its Jacobians taken at the present estimate of `state`."""
@@ -228,6 +243,7 @@ class Tracker:
         return state._replace(
             estimate=estimate,
             memory=Memory(estimate),
+            linearised=None,
             surprise=0.0,
             components=0.0,
             last_reset=state.window_end,

@@ -18,7 +18,7 @@ BRAKING_SLIP = -0.05  # the linearised shear displacement changes sign along the
 STALL_SLIP = 0.95
 SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
-STEADY = 0.1  # relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
+STEADY = 0.05  # relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 REQUIRED_BITS = sum(CHANNEL_BITS[name] for name in REQUIRED)
 

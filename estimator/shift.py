@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from math import log
+from math import acos, log, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
 REMEMBERED = 256  # evaluated points: all stretches of the filter's memory, and the windows since they were last used
+INSIDE = 1.0 - 1e-12  # as near to an edge as sin t allows
 ORDER = 24  # quadrature nodes in each zone
 INTEGRALS = len(Integrals._fields)
 PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
@@ -187,9 +188,8 @@ def _unit(x: float, span: tuple[float, float]) -> tuple[float, float]:
 
 
 def _polynomials(x: float, degree: int, slope: float) -> Array:
-    """(2, degree + 1): T₀ … T_degree at x, and their derivatives n U₍ₙ₋₁₎ times slope, by recurrence."""
-    t, u = [1.0, x], [1.0, 2.0 * x]
-    for _ in range(degree - 1):
-        t.append(2.0 * x * t[-1] - t[-2])
-        u.append(2.0 * x * u[-1] - u[-2])
-    return np.array((t, [0.0, *(slope * n * value for n, value in enumerate(u[:-1], start=1))]))
+    """(2, degree + 1): T₀ … T_degree at x = cos t, and their derivatives n sin(nt)/sin t times slope."""
+    angle = acos(min(max(x, -INSIDE), INSIDE))
+    orders = np.arange(degree + 1)
+    phase = orders * angle
+    return np.array((np.cos(phase), slope / sin(angle) * orders * np.sin(phase)))

@@ -104,7 +104,7 @@ def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:
     ax.set_xlabel("time [s]")
     ax.set_title("Normalised innovations, one an update", fontsize=11, loc="left")
     ax.legend(loc="upper right", ncols=2, fontsize=9, frameon=False)
-    _plain(ax)
+    plain(ax)
 
 
 def _inside(score: Array) -> str:
@@ -134,10 +134,11 @@ def _dress(ax: Axes, label: str, seconds: Array, scale: Array) -> None:
     ax.set_ylim(low - margin, high + 1.8 * margin)
     ax.set_xlim(seconds[0], seconds[-1])
     ax.set_ylabel(label)
-    _plain(ax)
+    plain(ax)
 
 
-def _plain(ax: Axes) -> None:
+def plain(ax: Axes) -> None:
+    """A faint grid, no box."""
     ax.grid(color="#dde3e7", lw=0.6)
     ax.set_axisbelow(True)
     for side in ("top", "right"):

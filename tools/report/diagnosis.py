@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tools.diagnose.result import Diagnosis, Location, Quantity, Scatter, SoilFit, Trace
 from tools.report import figures, hypotheses, redo
-from tools.report.html import Child, Markup, page, table, tag
+from tools.report.html import Child, Markup, page, section, table, tag
 from tools.report.words import (
     NOTHING,
     counted,
@@ -62,10 +62,6 @@ def render(found: Diagnosis) -> str:
         _next(found),
         _redo(found),
     )
-
-
-def section(title: str, *content: Child) -> Markup:
-    return tag("section", tag("h2", title), *content)
 
 
 def paragraph(*content: Child) -> Markup:

@@ -88,11 +88,11 @@ def trace_panel(trace: Trace) -> Markup:
 def trace_picture(trace: Trace) -> Markup:
     """Recording and simulation; under them recorded − simulated on a scale of its own."""
     unit, factor = shown(trace.unit)
-    time, used = np.asarray(trace.time, float), np.asarray(trace.used, bool)
+    time, used = np.asarray(trace.time, float) - trace.time[0], np.asarray(trace.used, bool)
     measured, before, after = (np.asarray(v, float) * factor for v in (trace.measured, trace.before, trace.after))
     both = differs(trace)
     seen = used if used.any() else np.ones(time.shape, bool)
-    span = (float(time[0]), float(time[-1]) or 1.0)
+    span = (0.0, float(time[-1]) or 1.0)
     simulated = [(np.where(seen, before, np.nan), "before")] + (
         [(np.where(seen, after, np.nan), "after")] if both else []
     )
@@ -188,7 +188,7 @@ def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Ma
     """Values with their uncertainty under each other, on one scale."""
     there = [(label, q, kind) for label, q, kind in rows if q is not None and np.isfinite(q.value)]
     ends = [q.value + s * _known(q.sigma) for _, q, _ in there for s in (-2.0, 2.0)]
-    across = plot.Scale(*plot.limits(ends), 92.0, 236.0)
+    across = plot.Scale(*plot.limits(ends), 88.0, 212.0)
     marks = [_interval(across, 14.0 + 24.0 * i, label, q, kind) for i, (label, q, kind) in enumerate(there)]
     said = "; ".join(f"{label} {quantity(q)}" for label, q, _ in there)
     return plot.picture(8.0 + 24.0 * len(there), f"{name}: {said}", *marks)
@@ -202,5 +202,5 @@ def _interval(across: plot.Scale, y: float, label: str, q: Quantity, kind: str) 
         tag("line", class_=f"line thin {kind}", x1=at[-2], x2=at[2], y1=y, y2=y),
         tag("line", class_=f"line thick {kind}", x1=at[-1], x2=at[1], y1=y, y2=y),
         tag("circle", class_=f"mark {kind}", cx=at[0], cy=y, r=4.0),
-        plot.text(248.0, y + 4.0, quantity(q)),
+        plot.text(224.0, y + 4.0, quantity(q)),
     )

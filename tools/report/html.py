@@ -79,7 +79,12 @@ def table(head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int 
     top = (tag("th", name, scope="col", class_=kind(at)) for at, name in enumerate(names))
     body = (tag("tr", (cell(at, content) for at, content in enumerate(row))) for row in rows)
     title = tag("caption", caption) if caption else None
-    return tag("table", title, tag("thead", tag("tr", top)), tag("tbody", body))
+    narrow = "narrow" if numbers and len(names) == 2 else None
+    return tag("table", title, tag("thead", tag("tr", top)), tag("tbody", body), class_=narrow)
+
+
+def section(title: str, *content: Child) -> Markup:
+    return tag("section", tag("h2", title), *content)
 
 
 def page(title: str, *body: Child) -> str:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import tools.report
 from tools.diagnose.result import Quantity
 from tools.report import figures, plot
-from tools.report.words import listed, number, percent, quantity
+from tools.report.words import held, listed, number, percent, quantity
 
 SIZES = st.floats(-1e6, 1e6, allow_nan=False)
 
@@ -119,3 +119,11 @@ def test_text_and_curves_stand_out_from_the_paper() -> None:
         assert contrast(colours["soft"], colours["wash"]) >= 4.5
         for name in ("before", "after"):
             assert contrast(colours[name], colours["band"]) >= 3.0, name
+
+
+def test_numbers_keep_their_units_at_the_end_of_a_line() -> None:
+    space = "\N{NO-BREAK SPACE}"
+    assert (
+        held("86 % of 3 N, c 1020 ± 60 Pa at high slip").replace(space, "_")
+        == "86_% of 3_N, c 1020_±_60_Pa at high slip"
+    )

@@ -13,6 +13,7 @@ from tools.report.words import (
     NOTHING,
     counted,
     covariate_shown,
+    held,
     listed,
     name_of,
     nats,
@@ -79,7 +80,7 @@ def _verdict(found: Diagnosis) -> Markup:
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
-        tag("p", found.summary, class_="summary"),
+        tag("p", held(found.summary), class_="summary"),
         tag("dl", (_figure(*figure) for figure in _figures(found)), class_="figures"),
         class_=f"verdict {found.verdict}",
     )
@@ -92,7 +93,9 @@ def explanation(found: Diagnosis) -> str:
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:
-    return tag("div", tag("dt", term), tag("dd", value), tag("dd", detail, class_="detail") if detail else None)
+    return tag(
+        "div", tag("dt", term), tag("dd", held(value)), tag("dd", held(detail), class_="detail") if detail else None
+    )
 
 
 def _figures(found: Diagnosis) -> Iterator[tuple[str, str, str]]:
@@ -186,7 +189,8 @@ def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
 def _hypotheses(found: Diagnosis) -> Markup | None:
     if not found.hypotheses:
         return None
-    return section("What was left out", paragraph(hypotheses.introduction(found)), hypotheses.groups(found.hypotheses))
+    title = "What was left out" if found.accepted else "What was tried"
+    return section(title, paragraph(hypotheses.introduction(found)), hypotheses.groups(found.hypotheses))
 
 
 def _soil(found: Diagnosis) -> Markup | None:

@@ -11,7 +11,7 @@ from estimator.terramechanics.soil import Array
 from tools.diagnose.result import Quantity, Scatter, SoilFit, Trace
 from tools.report import plot
 from tools.report.html import Child, Markup, tag
-from tools.report.words import counted, covariate_shown, name_of, number, quantity, shown
+from tools.report.words import counted, covariate_shown, held, name_of, number, quantity, shown
 
 BINS = 12  # of a scatter's running mean
 FEWEST = 4  # values in a bin
@@ -30,9 +30,9 @@ class Rows(NamedTuple):
 ROWS = Rows()
 
 
-def figure(caption: Child, *content: Child, legend: Child = None, small: bool = False) -> Markup:
+def figure(caption: str, *content: Child, legend: Child = None, small: bool = False) -> Markup:
     """`small` figures are never parted by a page break."""
-    return tag("figure", legend, *content, tag("figcaption", caption), class_="small" if small else None)
+    return tag("figure", legend, *content, tag("figcaption", held(caption)), class_="small" if small else None)
 
 
 def panels(items: Iterable[Child]) -> Markup:

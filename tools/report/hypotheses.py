@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tools.diagnose.result import Diagnosis, Hypothesis
 from tools.report.html import Child, Markup, table, tag
-from tools.report.words import counted, listed, name_of, nats, number, percent
+from tools.report.words import counted, held, listed, name_of, nats, number, percent
 
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
@@ -14,8 +14,9 @@ MOST = 8  # groups in view
 
 def introduction(found: Diagnosis) -> str:
     tried = counted(len(found.hypotheses), "effect")
+    beside = "the soil" if found.soil else "what is known of the rig"
     return (
-        f"{tried} fitted together with the soil to all channels, scored on runs and conditions not fitted to. "
+        f"{tried} fitted together with {beside} to all channels, scored on runs and conditions not fitted to. "
         "A gain is in nats: 3 nats make an effect twenty times as probable."
     )
 
@@ -49,7 +50,7 @@ def _group(group: Sequence[Hypothesis]) -> Markup:
     total = min(sum(h.probability for h in group), 1.0)
     said = f"Not told apart by these recordings; together {percent(total)}."
     bars = (_bar(h) for h in group)
-    return tag("div", tag("p", said, class_="apart"), bars, _separation(group), class_="group several")
+    return tag("div", tag("p", held(said), class_="apart"), bars, _separation(group), class_="group several")
 
 
 def _bar(h: Hypothesis) -> Markup:

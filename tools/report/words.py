@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 from tools.diagnose.result import Quantity
 
@@ -32,6 +33,7 @@ COVARIATES = {  # inside -> unit shown, factor; the others by their unit
 }
 LARGE = 0.3  # [m] lengths from here on are read in metres
 SCIENTIFIC = (1e-4, 1e6)
+HELD = re.compile(r"(?<=[0-9±<>]) (?=[0-9±%σ°]|(?:N|m|mm|s|Pa|kPa|nats)\b)|(?<=[0-9]) (?=±)")
 
 
 def name_of(key: str) -> str:
@@ -39,9 +41,14 @@ def name_of(key: str) -> str:
     return SOIL.get(key) or " ".join(PROPER.get(word, word) for word in key.split("_"))
 
 
+def held(words: str) -> str:
+    """Numbers and their units are not parted at the end of a line."""
+    return HELD.sub("\N{NO-BREAK SPACE}", words)
+
+
 def sentence(words: str) -> str:
     """With a capital and a full stop."""
-    words = words.strip()
+    words = held(words.strip())
     return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) or not words else ".")
 
 

@@ -6,24 +6,25 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isnan, sqrt
 from pathlib import Path
 
 import numpy as np
 
+from estimator.batch import estimates
+from estimator.cdr import TIME
 from estimator.config import Configuration, load, loads
 from estimator.course import Course
 from estimator.daemon import TICK_TOPIC, TOPICS
 from estimator.pipeline import TickRecord
 from estimator.playback import RecordedTick, played, settings_for, without_absent
-from estimator.record import TICK_NAMES, Status
+from estimator.record import TICK_FIELDS, TICK_NAMES
 from estimator.recording import RecordingError, RunWriter, parts
 from estimator.salvage import Recording, read
 from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from tools.progress import Progress
+from tools.replay_report import Rows, report
 
-INDEX = {name: place for place, name in enumerate(TICK_NAMES)}
 SHOWN = 5  # differing fields named in full
 
 
@@ -76,7 +77,7 @@ def _verify(recordings: list[Recording], configuration: Configuration) -> int:
     if first.topics["/tick"].names != TICK_TOPIC.names:
         version = first.versions.get("gritd", "another version")
         raise CommandError(f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE)
-    course = _course(recordings, configuration, None)
+    course = _course(recordings, configuration, None, as_it_ran=True)
     if first.run.part:
         course.lose()
     differing = Differences()
@@ -134,12 +135,24 @@ class Differences:
 
 
 def _recompute(recordings: list[Recording], configuration: Configuration, arguments: Namespace) -> None:
+    """Print what the filter makes of the recording; window by window, unless every tick is asked for."""
     first = recordings[0]
-    writer = None
-    if arguments.output:
-        writer = RunWriter(_target(arguments), TOPICS, configuration.text, first.run)
+    reloaded = first.counts["/checkpoint"] > 1 and not arguments.config
+    if arguments.output or len(recordings) > 1 or reloaded:
+        rows, each = _every_tick(recordings, configuration, arguments), "ticks"
+    else:
+        settings = _told(first, configuration, first)
+        rows, each = estimates(settings, first, arguments.engine or settings.filter.engine), "windows"
+    if not len(rows):
+        raise CommandError(f"{first.path}: holds no readings", DAMAGED)
+    print(report(first.path, rows, each))
+
+
+def _every_tick(recordings: list[Recording], configuration: Configuration, arguments: Namespace) -> Rows:
+    first = recordings[0]
+    writer = RunWriter(_target(arguments, first), TOPICS, configuration.text, first.run) if arguments.output else None
     records = []
-    course = _course(recordings, configuration, arguments.engine)
+    course = _course(recordings, configuration, arguments.engine, as_it_ran=False)
     for _, tick in _ticks(recordings, configuration, "replaying"):
         if tick.checkpoint is not None and not arguments.config:
             course.reconfigure(tick.checkpoint)
@@ -152,29 +165,36 @@ def _recompute(recordings: list[Recording], configuration: Configuration, argume
     if writer is not None:
         writer.close()
         print(f"wrote {writer.path}")
-    if not records:
-        raise CommandError(f"{first.path}: holds no readings", DAMAGED)
-    print(report(first.path, np.array(records, dtype=float)))
+    return np.array(records, dtype=[(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS])
 
 
-def _target(arguments: Namespace) -> Path:
+def _target(arguments: Namespace, recording: Recording) -> Path:
     """The output file; a folder where there are several recordings."""
     output = Path(arguments.output)
     if len(arguments.files) > 1 and not output.is_dir():
         raise CommandError(f"{output}: several recordings need a folder to be written to", USAGE)
-    return output / Path(arguments.files[0]).name if output.is_dir() else output
+    return output / recording.path.name if output.is_dir() else output
 
 
-def _course(recordings: list[Recording], configuration: Configuration, engine: str | None) -> Course:
+def _course(recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool) -> Course:
+    """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was silent, not absent."""
     first = recordings[0]
-    settings = _settings(first, configuration)
+    recorded = first if not as_it_ran or not first.counts["/tick"] else None
+    _told(first, configuration, recorded)
+    return Course(configuration, lambda given: _settings(first, given, recorded), engine)
+
+
+def _told(first: Recording, configuration: Configuration, recorded: Recording | None) -> Settings:
+    """The settings of a run; says so where they do without a configured sensor."""
+    settings = _settings(first, configuration, recorded)
     if settings.wrench is None and configuration.settings.wrench is not None:
         print(f"{first.path}: no /raw/wrench: replayed with the configured load", file=sys.stderr)
-    return Course(configuration, lambda given: _settings(first, given), engine)
+    return settings
 
 
-def _settings(first: Recording, configuration: Configuration) -> Settings:
-    return settings_for(without_absent(configuration.settings, first), first.run)
+def _settings(first: Recording, given: Configuration, recorded: Recording | None) -> Settings:
+    """Settings of the run, without the sensors that `recorded` does not hold."""
+    return settings_for(without_absent(given.settings, recorded) if recorded else given.settings, first.run)
 
 
 def _ticks(
@@ -187,51 +207,6 @@ def _ticks(
             for tick in played(recording, configuration.settings.rates.tick):
                 progress.advance()
                 yield recording, tick
-
-
-def report(path: Path, ticks: np.ndarray) -> str:
-    """What the filter made of a recording; ticks (n, fields) in the order of TICK_NAMES."""
-    last = dict(zip(TICK_NAMES, ticks[-1].tolist(), strict=True))
-    seconds = (ticks[-1, 0] - ticks[0, 0]) * 1e-9
-    return "\n".join(
-        [
-            f"{path}: {seconds:.1f} s, {len(ticks)} ticks, {int(last['updates'])} filter updates, "
-            f"{int(last['resets'])} resets",
-            f"  status     {_statuses(ticks)}",
-            f"  c          {last['cohesion']:.0f} ± {last['cohesion_sigma']:.0f} Pa",
-            f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with c "
-            f"{_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the prior's σ",
-            f"  k          {last['shear_modulus'] * 1e3:.1f} ± {last['shear_modulus_sigma'] * 1e3:.1f} mm",
-            *_side_by_side(ticks),
-            f"  innovations squared over their variance, last 2 s: {last['consistency']:.2f} (1 when honest)",
-        ]
-    )
-
-
-def _statuses(ticks: np.ndarray) -> str:
-    values, counts = np.unique(ticks[:, INDEX["status"]], return_counts=True)
-    shares = sorted(zip(counts.tolist(), values.tolist(), strict=True), reverse=True)
-    return ", ".join(f"{Status(int(value)).name} {count / len(ticks):.0%}" for count, value in shares)
-
-
-def _correlation(tick: dict[str, float]) -> float:
-    product = tick["cohesion_sigma"] * tick["tan_phi_sigma"]
-    return tick["cov_c_tan_phi"] / product if product else 0.0
-
-
-def _side_by_side(ticks: np.ndarray) -> Iterator[str]:
-    """Measured and predicted torque, drawbar pull and load while tracking."""
-    tracking = ticks[ticks[:, INDEX["status"]] == Status.TRACKING]
-    for name, unit in (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N")):
-        measured, predicted = tracking[:, INDEX[name]], tracking[:, INDEX[f"{name}_predicted"]]
-        if not len(tracking) or isnan(measured.mean()):
-            continue
-        difference = sqrt(np.mean((measured - predicted) ** 2))
-        sigma = tracking[:, INDEX[f"{name}_predicted_sigma"]].mean()
-        yield (
-            f"  {name.replace('_', ' '):13}measured {measured.mean():7.3f} {unit}, predicted {predicted.mean():7.3f} "
-            f"± {sigma:.3f}, rms difference {difference:.3f}"
-        )
 
 
 def _parser() -> Parser:

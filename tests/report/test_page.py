@@ -75,8 +75,26 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
         ("consistent", ("Consistent", "0.8 nats", "1020 ± 60 Pa", "p 0.41")),
         ("explained", ("Explained: Coulomb friction", "213 nats", "0.11 → 0.013 N·m", "noise 0.012 N·m")),
         ("several", ("Explained: Coulomb friction and soil patch", "cohesion change", "5 more runs")),
-        ("unlisted", ("Not in the list", "0.40 N·m · i²", "88 %", "0.02 N·m remain above the noise floor")),
-        ("insufficient", ("Not decided", "Repeat at a lighter and a heavier load", "8.0 nats")),
+        (
+            "unlisted",
+            (
+                "Not in the list",
+                "0.40 N·m · i²",
+                "slip 10.0 … 60.0 %",
+                "speed 20.0 … 20.0 mm/s",
+                "88 %",
+                "0.02 N·m remain above the noise floor",
+            ),
+        ),
+        (
+            "insufficient",
+            (
+                "Not decided",
+                "Every third of a run is predicted by a fit to the rest",
+                "Repeat at a lighter and a heavier load",
+                "8.0 nats",
+            ),
+        ),
     ],
 )
 def test_verdict_comes_first_with_its_numbers(case: str, expected: tuple[str, ...]) -> None:

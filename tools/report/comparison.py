@@ -11,7 +11,7 @@ import numpy as np
 from tools.diagnose.result import SoilFit, Trace
 from tools.report import figures, redo
 from tools.report.html import Markup, page, section, table, tag
-from tools.report.words import counted, listed, name_of, number, quantity, sentence, shown
+from tools.report.words import counted, held, listed, name_of, number, quantity, sentence, shown
 
 ALL = "all runs"
 KEY = {"measured": "recorded", "before": "simulated as configured", "after": "simulated, soil fitted"}
@@ -88,27 +88,29 @@ def render(found: Comparison) -> str:
 def _title(found: Comparison) -> Markup:
     effects = f"with {listed([name_of(b) for b in found.baseline])}" if found.baseline else "no effects"
     kicker = f"gritd compare · {found.testbed} · {counted(len(found.runs), 'run')} · {effects}"
-    lead = tag("p", sentence("; ".join(said_errors(found))), class_="summary")
+    said = f"As configured, the simulation is off by {_off(found, 'before')}."
+    if found.soil:
+        said += f" With the soil fitted, by {_off(found, 'after')}."
+    lead = tag("p", held(said), class_="summary")
     return tag(
         "header", tag("p", kicker, class_="kicker"), tag("h1", "Simulation and recording"), lead, class_="verdict"
     )
 
 
-def said_errors(found: Comparison) -> Iterator[str]:
-    """A clause a channel."""
+def _off(found: Comparison, which: str) -> str:
+    """The error of every channel over all runs."""
+    said = []
     for channel in found.channels:
         unit, factor = shown(_unit(found.traces, channel))
-        error = number(found.rms(channel, None, "before") * factor, 2)
-        fitted = (
-            f", {number(found.rms(channel, None, 'after') * factor, 2)} {unit} with the soil fitted"
-            if found.soil
-            else ""
-        )
-        yield f"{name_of(channel)} is {error} {unit} off{fitted}"
+        said.append(f"{number(found.rms(channel, None, which) * factor, 2)} {unit} in {name_of(channel)}")
+    return listed(said)
 
 
 def _pictures(found: Comparison) -> Iterator[Markup]:
     key = figures.legend({k: v for k, v in KEY.items() if found.soil or k != "after"} | {"unused": "not compared"})
+    if len(found.runs) == 1:
+        yield figures.figure(f"All channels of {found.runs[0]}.", figures.channels(found.traces), legend=key)
+        return
     for channel in found.channels:
         of = [trace for trace in found.traces if trace.channel == channel]
         caption = f"{name_of(channel).capitalize()} of {counted(len(of), 'run')}."
@@ -119,7 +121,7 @@ def _soil(found: Comparison) -> Markup | None:
     if found.soil is None:
         return None
     key = figures.legend({"prior": "known before", "after": "fitted"})
-    caption = "Soil, fitted within what was known before; ± 1σ thick and ± 2σ thin."
+    caption = "Soil, fitted within what was known before; ± 1σ thick and ± 2σ thin, as if nothing were left out."
     return section("The soil", figures.figure(caption, figures.soil(found.soil), legend=key, small=True))
 
 

@@ -6,13 +6,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tools.diagnose.result import Diagnosis, Location, Quantity, Scatter, SoilFit, Trace
-from tools.report import figures, hypotheses, redo
+from tools.diagnose.result import Diagnosis, Scatter, SoilFit, Trace
+from tools.report import figures, hypotheses, redo, tables
 from tools.report.html import Child, Markup, page, section, table, tag
 from tools.report.words import (
-    NOTHING,
     counted,
-    covariate_shown,
     held,
     listed,
     name_of,
@@ -23,6 +21,8 @@ from tools.report.words import (
     quantity,
     sentence,
     shown,
+    spaced,
+    with_unit,
 )
 
 VERDICTS = {  # verdict -> its name, and what it means
@@ -31,11 +31,13 @@ VERDICTS = {  # verdict -> its name, and what it means
     "unlisted": ("Not in the list", "Model and recordings differ, and no listed effect explains it."),
     "insufficient": ("Not decided", "These recordings cannot tell."),
 }
-UNITS = {"time": "s", "position": "m", "wheel_angle": "rad"}  # of places where a misfit starts or stops
 NOISE_SIZES = ("sigma", "configured", "configured_sigma")
-HELD_OUT = (
-    "Every run is predicted by a fit to the other runs; none of its own samples were used. Under each run: recorded "
-    "less simulated, with ± 2σ of the noise as a band. Grey stretches were not compared: standstill, lifted, unsteady."
+FEW = 3  # runs; of fewer, thirds are held out
+RUNS_HELD = "Every run is predicted by a fit to the other runs: none of its own samples were used."
+THIRDS_HELD = "Every third of a run is predicted by a fit to the rest: none of its own samples were used."
+DRAWN = (
+    "Under each run: recorded less simulated, with ± 2σ of the noise as a band. Grey "
+    "stretches were not compared: standstill, lifted, unsteady."
 )
 LOCATED_RUNS, OTHER_RUNS = 6, 3  # pictures in view of a channel where the misfit lives, and of another
 STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
@@ -55,10 +57,10 @@ def render(found: Diagnosis) -> str:
         _misfit(found),
         _hypotheses(found),
         _soil(found),
-        _parameters(found),
-        _location(found),
-        _errors(found),
-        _law(found),
+        tables.parameters(found),
+        tables.location(found),
+        tables.errors(found),
+        tables.law(found),
         _caveats(found),
         _next(found),
         _redo(found),
@@ -129,15 +131,11 @@ def _most_improved(found: Diagnosis) -> str | None:
 
 def _change(found: Diagnosis, channel: str) -> tuple[str, str]:
     """Held-out error before and after, and the noise floor, with their unit."""
-    unit, factor = shown(found.fit.unit.get(channel, ""))
+    unit = found.fit.unit.get(channel, "")
+    seen, factor = shown(unit)
     before, after = (number(side[channel] * factor, 2) for side in (found.fit.before, found.fit.after))
-    floor = number(_times(found.fit.noise_floor.get(channel), factor), 2)
     change = before if before == after else f"{before} → {after}"
-    return f"{change} {unit}".rstrip(), f"{floor} {unit}".rstrip()
-
-
-def _times(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor
+    return f"{change} {seen}".rstrip(), with_unit(found.fit.noise_floor.get(channel), unit, 2)
 
 
 # ---- pictures ------------------------------------------------------------------------------------------------------
@@ -146,28 +144,41 @@ def _times(value: float | None, factor: float) -> float | None:
 def _simulation(found: Diagnosis) -> Markup | None:
     if not found.traces:
         return None
-    channels = sorted({t.channel for t in found.traces}, key=[t.channel for t in found.traces].index)
-    drawn = [_channel(found, channel) for channel in channels]
-    return section("Simulation against recording", paragraph(HELD_OUT), drawn)
+    runs = {trace.run for trace in found.traces}
+    channels = dict.fromkeys(trace.channel for trace in found.traces)
+    drawn = [_one_run(found)] if len(runs) == 1 else [_channel(found, channel) for channel in channels]
+    said = f"{RUNS_HELD if len(runs) >= FEW else THIRDS_HELD} {DRAWN}"
+    return section("Simulation against recording", paragraph(said), drawn)
+
+
+def _one_run(found: Diagnosis) -> Markup:
+    """All its channels side by side."""
+    caption = "; ".join(_error_words(found, trace.channel) for trace in found.traces)
+    return figures.figure(sentence(caption), figures.channels(found.traces), legend=_key(found, found.traces))
 
 
 def _channel(found: Diagnosis, channel: str) -> Markup:
     """All runs of a channel; more of them in view where the misfit lives."""
     of = [trace for trace in found.traces if trace.channel == channel]
-    caption = f"{name_of(channel).capitalize()} of every run."
-    if channel in found.fit.before and channel in found.fit.after:
-        change, floor = _change(found, channel)
-        caption = f"{name_of(channel).capitalize()}. Error over all runs {change}; noise {floor}."
     most = LOCATED_RUNS if any(place.channel == channel for place in found.location) else OTHER_RUNS
-    key = figures.legend({"measured": "recorded", **_series(found, of), "unused": "not compared"})
-    return figures.figure(caption, figures.traces(of, most), legend=key)
+    caption = sentence(f"{_error_words(found, channel)} over all runs")
+    return figures.figure(caption, figures.traces(of, most), legend=_key(found, of))
 
 
-def _series(found: Diagnosis, of: Sequence[Trace]) -> dict[str, str]:
-    if not any(figures.differs(trace) for trace in of):
-        return {"before": "simulated"}
+def _error_words(found: Diagnosis, channel: str) -> str:
+    """The channel with its held-out error, where one was computed."""
+    if channel not in found.fit.before or channel not in found.fit.after:
+        return name_of(channel)
+    change, floor = _change(found, channel)
+    return f"{name_of(channel)} with an error of {change} (noise {floor})"
+
+
+def _key(found: Diagnosis, of: Sequence[Trace]) -> Markup:
     name = explanation(found)
-    return {"before": f"simulated without {name}", "after": f"simulated with {name}"}
+    series = {"before": f"simulated without {name}", "after": f"simulated with {name}"}
+    if not any(figures.differs(trace) for trace in of):
+        series = {"before": "simulated"}
+    return figures.legend({"measured": "recorded", **series, "unused": "not compared"})
 
 
 def _misfit(found: Diagnosis) -> Markup | None:
@@ -216,96 +227,6 @@ def _strain(strain: Mapping[str, float]) -> str:
     return f"Without an effect the fit moves {listed(far)} away from what was known before."
 
 
-# ---- tables --------------------------------------------------------------------------------------------------------
-
-
-def _parameters(found: Diagnosis) -> Markup | None:
-    parameters = [(h.effect, name, q) for h in found.accepted for name, q in h.parameters.items()]
-    parameters += [("calibration", name, q) for name, q in _strayed(found.nuisance).items()]
-    rows = [(f"{name_of(of)}: {name_of(name)}", quantity(q)) for of, name, q in parameters]
-    if not rows:
-        return None
-    return section("Parameters", table(("parameter", "value ± 1σ"), rows, numbers=1))
-
-
-def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Calibration constants that moved by more than their own uncertainty."""
-    return {name: q for name, q in nuisance.items() if q.sigma > 0.0 and abs(q.value) > q.sigma}
-
-
-def _location(found: Diagnosis) -> Markup | None:
-    if not found.location:
-        return None
-    rows = [
-        (name_of(p.channel), name_of(p.covariate), _words(found, p), percent(p.share), probability(p.q))
-        for p in found.location
-    ]
-    head = ("channel", "against", "in words", "share", "q")
-    note = "Share: the part of the channel's explainable misfit. q: false-discovery rate over all pairs tried."
-    return section("Where, in words", table(head, rows, numbers=3), tag("p", note, class_="note"))
-
-
-def _words(found: Diagnosis, place: Location) -> str:
-    """The sentence, and where the misfit starts or stops."""
-    if not place.changes:
-        return sentence(place.where)
-    drawn = (s.covariate_unit for s in found.scatters if s.covariate == place.covariate)
-    unit, factor = covariate_shown(place.covariate, next(drawn, UNITS.get(place.covariate, "")))
-    changes = [_with_unit(change * factor, unit) for change in place.changes]
-    return f"{sentence(place.where)} Changes at {listed(changes)}."
-
-
-def _errors(found: Diagnosis) -> Markup | None:
-    fit = found.fit
-    if not fit.before:
-        return None
-    innovations = fit.innovation_before is not None or fit.innovation_after is not None
-    head = ["channel", "without", "with", "noise floor", "with ÷ floor", *(["innovations"] if innovations else [])]
-    rows = []
-    for channel, before in fit.before.items():
-        unit, factor = shown(fit.unit.get(channel, ""))
-        after, floor = fit.after.get(channel), fit.noise_floor.get(channel)
-        values = (_with_unit(_times(v, factor), unit) for v in (before, after, floor))
-        ratio = after / floor if after is not None and floor else None
-        innovation = [_innovation(found, channel)] if innovations else []
-        rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
-    notes = [paragraph("Root mean square errors on data the fit did not see.")]
-    if innovations:
-        notes.append(paragraph("Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
-    if found.remaining:
-        notes.append(paragraph(sentence(found.remaining)))
-    return section("Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note"))
-
-
-def _with_unit(value: float | None, unit: str) -> str:
-    said = number(value)
-    return said if said == NOTHING else f"{said} {unit}".rstrip()
-
-
-def _innovation(found: Diagnosis, channel: str) -> str:
-    sides = (found.fit.innovation_before, found.fit.innovation_after)
-    said = [number((side or {}).get(channel), 2) for side in sides]
-    return NOTHING if said == [NOTHING, NOTHING] else " → ".join(said)
-
-
-def _law(found: Diagnosis) -> Markup | None:
-    law = found.law
-    if law is None:
-        return None
-    domain = [(name_of(name), f"{number(low)} … {number(high)}") for name, (low, high) in law.domain.items()]
-    values = [(name_of(name), quantity(q)) for name, q in law.parameters.items()]
-    return section(
-        "An empirical law",
-        paragraph(
-            f"No listed effect stands behind it. It takes {percent(law.share)} of the explainable misfit of "
-            f"{name_of(law.channel)}, and holds only inside its domain."
-        ),
-        tag("p", law.expression, class_="law"),
-        table(("domain", "from … to"), domain, numbers=1) if domain else None,
-        table(("parameter", "value ± 1σ"), values, numbers=1) if values else None,
-    )
-
-
 # ---- the end -------------------------------------------------------------------------------------------------------
 
 
@@ -343,5 +264,5 @@ def _noise(found: Diagnosis, channel: str, values: Mapping[str, float]) -> str:
     said = []
     for key, value in values.items():
         unit, factor = ("s", 1.0) if "time" in key else size if key in NOISE_SIZES else ("", 1.0)
-        said.append(f"{name_of(key)} {_with_unit(value * factor, unit)}")
+        said.append(f"{name_of(key)} {spaced(value * factor, unit)}")
     return ", ".join(said)

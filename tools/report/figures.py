@@ -77,12 +77,18 @@ def traces(of: Sequence[Trace], most: int) -> Markup:
     return tag("div", seen, tag("details", summary, panels(trace_panel(of[i]) for i in rest)))
 
 
-def trace_panel(trace: Trace) -> Markup:
+def channels(of: Sequence[Trace]) -> Markup:
+    """The channels of one run side by side."""
+    return panels(trace_panel(trace, name_of(trace.channel)) for trace in of)
+
+
+def trace_panel(trace: Trace, title: str = "") -> Markup:
+    """Under its run's name, or another title, beside its error."""
     unit, factor = shown(trace.unit)
     error = number(rms(trace, "before") * factor, 2)
     if differs(trace):
         error += f" → {number(rms(trace, 'after') * factor, 2)}"
-    return panel(trace.run, trace_picture(trace), f"rms {error} {unit}".rstrip())
+    return panel(title or trace.run, trace_picture(trace), f"rms {error} {unit}".rstrip())
 
 
 def trace_picture(trace: Trace) -> Markup:

@@ -129,6 +129,18 @@ def probability(p: float | None) -> str:
     return "< 0.001" if p < 0.001 else fixed(p, 3 if p < 0.1 else 2)
 
 
+def spaced(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number and its unit, both as shown."""
+    said = number(value, digits)
+    return said if said == NOTHING else f"{said} {unit}".rstrip()
+
+
+def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
+    """A value inside, in the unit it is shown in."""
+    seen, factor = shown(unit)
+    return spaced(None if value is None else value * factor, seen, digits)
+
+
 def nats(value: float | None) -> str:
     """Evidence: whole nats, tenths where they matter."""
     return NOTHING if value is None or not math.isfinite(value) else f"{fixed(value, int(abs(value) < 10.0))} nats"

@@ -1,0 +1,108 @@
+"""The tables of a diagnosis: parameters with units, where in words, held-out errors, the empirical law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tools.diagnose.result import Diagnosis, Location, Quantity
+from tools.diagnose.wheel_rig import UNITS
+from tools.report.html import Markup, section, table, tag
+from tools.report.words import (
+    NOTHING,
+    covariate_shown,
+    listed,
+    name_of,
+    number,
+    percent,
+    probability,
+    quantity,
+    sentence,
+    spaced,
+    with_unit,
+)
+
+
+def parameters(found: Diagnosis) -> Markup | None:
+    parameters = [(h.effect, name, q) for h in found.accepted for name, q in h.parameters.items()]
+    parameters += [("calibration", name, q) for name, q in _strayed(found.nuisance).items()]
+    rows = [(f"{name_of(of)}: {name_of(name)}", quantity(q)) for of, name, q in parameters]
+    if not rows:
+        return None
+    return section("Parameters", table(("parameter", "value ± 1σ"), rows, numbers=1))
+
+
+def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
+    """Calibration constants that moved by more than their own uncertainty."""
+    return {name: q for name, q in nuisance.items() if q.sigma > 0.0 and abs(q.value) > q.sigma}
+
+
+def location(found: Diagnosis) -> Markup | None:
+    if not found.location:
+        return None
+    rows = [
+        (name_of(p.channel), name_of(p.covariate), _words(found, p), percent(p.share), probability(p.q))
+        for p in found.location
+    ]
+    head = ("channel", "against", "in words", "share", "q")
+    note = "Share: the part of the channel's explainable misfit. q: false-discovery rate over all pairs tried."
+    return section("Where, in words", table(head, rows, numbers=3), tag("p", note, class_="note"))
+
+
+def _words(found: Diagnosis, place: Location) -> str:
+    """The sentence, and where the misfit starts or stops."""
+    if not place.changes:
+        return sentence(place.where)
+    unit, factor = covariate_shown(place.covariate, UNITS.get(place.covariate, ""))
+    changes = [spaced(change * factor, unit) for change in place.changes]
+    return f"{sentence(place.where)} Changes at {listed(changes)}."
+
+
+def errors(found: Diagnosis) -> Markup | None:
+    fit = found.fit
+    if not fit.before:
+        return None
+    innovations = fit.innovation_before is not None or fit.innovation_after is not None
+    head = ["channel", "without", "with", "noise floor", "with ÷ floor", *(["innovations"] if innovations else [])]
+    rows = []
+    for channel, before in fit.before.items():
+        after, floor = fit.after.get(channel), fit.noise_floor.get(channel)
+        values = (with_unit(v, fit.unit.get(channel, "")) for v in (before, after, floor))
+        ratio = after / floor if after is not None and floor else None
+        innovation = [_innovation(found, channel)] if innovations else []
+        rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
+    notes = [tag("p", "Root mean square errors on data the fit did not see.")]
+    if innovations:
+        notes.append(tag("p", "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
+    if found.remaining:
+        notes.append(tag("p", sentence(found.remaining)))
+    return section("Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note"))
+
+
+def _innovation(found: Diagnosis, channel: str) -> str:
+    sides = (found.fit.innovation_before, found.fit.innovation_after)
+    said = [number((side or {}).get(channel), 2) for side in sides]
+    return NOTHING if said == [NOTHING, NOTHING] else " → ".join(said)
+
+
+def law(found: Diagnosis) -> Markup | None:
+    law = found.law
+    if law is None:
+        return None
+    domain = [(name_of(name), _range(name, *ends)) for name, ends in law.domain.items()]
+    values = [(name_of(name), quantity(q)) for name, q in law.parameters.items()]
+    return section(
+        "An empirical law",
+        tag(
+            "p",
+            f"No listed effect stands behind it. It takes {percent(law.share)} of the explainable misfit of "
+            f"{name_of(law.channel)}, and holds only inside its domain.",
+        ),
+        tag("p", law.expression, class_="law"),
+        table(("domain", "from … to"), domain, numbers=1) if domain else None,
+        table(("parameter", "value ± 1σ"), values, numbers=1) if values else None,
+    )
+
+
+def _range(covariate: str, low: float, high: float) -> str:
+    unit, factor = covariate_shown(covariate, UNITS.get(covariate, ""))
+    return f"{number(low * factor)} … {spaced(high * factor, unit)}"

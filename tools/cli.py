@@ -22,6 +22,7 @@ COMMANDS = {
     "simulate": ("tools.simulate", "the forward model alone: a schedule in, a recording out"),
     "compare": ("tools.compare", "the forward simulation drawn over recordings, with the residual"),
     "replay": ("tools.replay", "the on-line filter over recordings"),
+    "diagnose": ("tools.diagnose.command", "where model and recordings differ, and which physics was left out"),
     "check-config": ("tools.check_config", "check a configuration and show what it implies"),
     "recover": ("tools.recover", "salvage an unclosed or damaged recording"),
     "import": ("tools.import_rig", "other rigs' public data to recordings"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,8 @@ from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base
 from tools.diagnose.noise import Noise, whiten
 from tools.diagnose.rig import Stack
+
+Maker = Callable[..., Effect]  # an effect's class, or one with some parameters given
 
 STEP = 0.02  # of a prior σ or an expected size, for differences
 ROUNDS = 8
@@ -23,8 +25,9 @@ WIDE = 3.0  # a strength's prior standard deviation, in units of the expected si
 class Free:
     """One parameter of an effect in the fit: its value is off + x · size, inside its bounds."""
 
-    effect: type[Effect]
+    effect: Maker
     parameter: Parameter
+    name: str  # of the effect
 
     def value(self, x: float) -> float:
         p = self.parameter
@@ -40,7 +43,7 @@ class Free:
 class Fitted:
     """A maximum of the posterior. x: constants in prior σ, then effect parameters in expected sizes, then tolerance."""
 
-    effects: tuple[type[Effect], ...]
+    effects: tuple[Maker, ...]
     free: tuple[Free, ...]
     u: Array  # (q,)
     x: Array  # (p,)
@@ -79,7 +82,7 @@ class Fitted:
         return Base(scaled, self.residual, pulled * self.penalty)
 
 
-def build(effects: Sequence[type[Effect]], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
+def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
     values: list[dict[str, float]] = [{} for _ in effects]
     for f, value in zip(free, x.tolist(), strict=True):
         values[effects.index(f.effect)][f.parameter.name] = f.value(value)
@@ -92,11 +95,11 @@ class Problem:
     def __init__(self, stack: Stack, noise: Noise, tolerance: Array) -> None:
         """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be off by."""
         self.stack, self.noise = stack, noise
-        self.tolerance = whiten(stack, tolerance, noise) if tolerance.size else np.zeros((stack.size, 0))
-        self.measured = whiten(stack, stack.measured, noise)
+        self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
+        self.measured = whiten(noise, stack.measured)
 
     def descend(
-        self, effects: Sequence[type[Effect]], free: Sequence[Free], u: Array, x: Array, rounds: int = ROUNDS
+        self, effects: Sequence[Maker], free: Sequence[Free], u: Array, x: Array, rounds: int = ROUNDS
     ) -> Fitted:
         """The nearest optimum from constants u and effect parameters x."""
         q = len(u)
@@ -116,7 +119,7 @@ class Problem:
         return best
 
     def _search(
-        self, effects: Sequence[type[Effect]], free: Sequence[Free], best: Fitted, step: Array, q: int, penalty: Array
+        self, effects: Sequence[Maker], free: Sequence[Free], best: Fitted, step: Array, q: int, penalty: Array
     ) -> Fitted | None:
         """The first shortened step that improves, with its Jacobian."""
         centre = np.concatenate((best.u, best.x))
@@ -136,9 +139,9 @@ class Problem:
         out[:q] = np.clip(out[:q], -8.0, 8.0)
         return out
 
-    def _at(self, effects: Sequence[type[Effect]], free: Sequence[Free], centre: Array, q: int) -> tuple[Array, Array]:
+    def _at(self, effects: Sequence[Maker], free: Sequence[Free], centre: Array, q: int) -> tuple[Array, Array]:
         predicted = self.stack.predict(centre[:q], build(effects, free, centre[q:]))
-        return predicted, self.measured - whiten(self.stack, predicted, self.noise)
+        return predicted, self.measured - whiten(self.noise, predicted)
 
     def _slack(self, residual: Array, centre: Array, penalty: Array) -> tuple[Array, float]:
         """Best tolerance for a residual, and the objective with it."""
@@ -150,7 +153,7 @@ class Problem:
 
     def _state(
         self,
-        effects: Sequence[type[Effect]],
+        effects: Sequence[Maker],
         free: Sequence[Free],
         centre: Array,
         q: int,
@@ -161,14 +164,14 @@ class Problem:
         slack, objective = self._slack(residual, centre, penalty)
         columns = [self._difference(effects, free, centre, q, i, predicted) for i in range(len(centre))]
         raw = np.column_stack(columns)
-        jacobian = whiten(self.stack, raw, self.noise)
+        jacobian = whiten(self.noise, raw)
         return Fitted(
             tuple(effects), tuple(free), centre[:q], centre[q:], predicted, residual,
             np.column_stack((jacobian, self.tolerance)), raw, penalty, slack, objective,
         )  # fmt: skip
 
     def _difference(
-        self, effects: Sequence[type[Effect]], free: Sequence[Free], centre: Array, q: int, i: int, predicted: Array
+        self, effects: Sequence[Maker], free: Sequence[Free], centre: Array, q: int, i: int, predicted: Array
     ) -> Array:
         """Derivative of the prediction by one unknown; away from a bound."""
         step = STEP
@@ -189,9 +192,4 @@ class Problem:
 
 
 def free_of(effects: Sequence[type[Effect]]) -> tuple[Free, ...]:
-    return tuple(Free(e, p) for e in effects for p in e.parameters())
-
-
-def start(free: Sequence[Free], values: Mapping[tuple[str, str], float]) -> Array:
-    """Effect parameters in expected sizes from values by (effect, parameter)."""
-    return np.array([(values[f.effect.name, f.parameter.name] - f.parameter.centre) / f.parameter.sigma for f in free])
+    return tuple(Free(e, p, e.name) for e in effects for p in e.parameters())

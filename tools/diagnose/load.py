@@ -107,7 +107,11 @@ def _analogue(
     if not rows.size:
         return found
     time = rows["stamp"] * NS - wrench.latency
-    axes = {"drawbar_pull": ("fx", wrench.drawbar_pull), "load": ("fz", wrench.load), "axle_torque": ("ty", wrench.torque)}
+    axes = {
+        "drawbar_pull": ("fx", wrench.drawbar_pull),
+        "load": ("fz", wrench.load),
+        "axle_torque": ("ty", wrench.torque),
+    }
     return found | {name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()}
 
 

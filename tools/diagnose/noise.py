@@ -12,8 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy import sparse
+from scipy.signal import lfilter
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose.rig import Bools, Stack
@@ -24,6 +27,7 @@ FAST = (0.0, 0.4, 0.9)  # shares of the rest that the fast part takes
 FAST_TIME = 1.5  # correlation time of the fast part, in grid intervals
 SURROGATE_COLOURS = 20  # drawn from the posterior of the colour
 RIDGE = 1e-9
+NEGLIGIBLE = 1e-5  # weight of a value long past in an innovation
 STEADY = 1.3  # values noisier than this share of their channel's, for blur, say nothing of the noise
 CAREFUL = 0.8
 COLUMNS = 40  # of the saturated mean, at most
@@ -41,16 +45,30 @@ class Colour:
 
 @dataclass(frozen=True)
 class Noise:
-    """The most probable colour of each channel, and draws from its posterior."""
+    """A colour for each channel to whiten with, and draws from its posterior for surrogates."""
 
+    stack: Stack
     colours: tuple[Colour, ...]
     draws: tuple[tuple[Colour, ...], ...]  # per channel
     blur: Array  # (N,) what the grid itself blurs where the prediction bends, same unit as the value
 
-    def loose(self, stack: Stack) -> Array:
+    @cached_property
+    def loose(self) -> Array:
         """(N,) by how much a value's noise exceeds its channel's."""
-        sigma = np.array([c.sigma for c in self.colours])[stack.channel]
+        sigma = np.array([c.sigma for c in self.colours])[self.stack.channel]
         return np.sqrt(1.0 + (self.blur / sigma) ** 2)
+
+    @cached_property
+    def whitener(self) -> sparse.csr_matrix:
+        """(N, N): values to units of independent unit noise; each run and channel for itself."""
+        blocks = []
+        for channel, number in self.stack.parts:
+            colour = self.colours[self.stack.rig.channels.index(channel)]
+            own = self.stack.of(channel) & (self.stack.run == number)
+            inverse = whiten_unit(np.eye(int(own.sum())), self.stack.gaps[own], [colour])[0][0]
+            inverse[np.abs(inverse) < NEGLIGIBLE] = 0.0
+            blocks.append(sparse.csr_matrix(inverse / (colour.sigma * self.loose[own])))
+        return sparse.block_diag(blocks, format="csr")
 
 
 BLUR = 0.5  # of the bend between neighbours: speeds are slopes over three intervals, corners are cut
@@ -73,17 +91,17 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         step = np.diff(residual, prepend=0.0)[inside]
         sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
-    return Noise(tuple(colours), tuple((c,) for c in colours), blur(stack, predicted))
+    return Noise(stack, tuple(colours), tuple((c,) for c in colours), blur(stack, predicted))
 
 
 def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np.random.Generator) -> Noise:
     """Size and colour of each channel, from the prediction (N,) and the columns of the saturated mean (N, p)."""
-    steady = before.loose(stack) < STEADY
+    steady = before.loose < STEADY
     found = [
         _fit_channel(stack, channel, stack.measured - predicted, saturated, steady & stack.of(channel), rng)
         for channel in stack.rig.channels
     ]
-    return Noise(tuple(f[0] for f in found), tuple(f[1:] for f in found), blur(stack, predicted))
+    return Noise(stack, tuple(f[0] for f in found), tuple(f[1:] for f in found), blur(stack, predicted))
 
 
 def _fit_channel(
@@ -182,25 +200,21 @@ def _step(gaps: Array) -> float:
     return float(np.median(inside)) if inside.size else 1.0
 
 
-def whiten(stack: Stack, columns: Array, noise: Noise) -> Array:
+def whiten(noise: Noise, columns: Array) -> Array:
     """Columns (N, m) or (N,) in units of independent unit noise."""
-    matrix = columns[:, None] if columns.ndim == 1 else columns
-    matrix = matrix / noise.loose(stack)[:, None]
-    out = np.empty_like(matrix)
-    for channel, colour in zip(stack.rig.channels, noise.colours, strict=True):
-        own = stack.of(channel)
-        out[own] = whiten_unit(matrix[own], stack.gaps[own], [colour])[0][0] / colour.sigma
-    return out[:, 0] if columns.ndim == 1 else out
+    out: Array = noise.whitener @ columns
+    return out
 
 
-def surrogates(stack: Stack, noise: Noise, count: int, rng: np.random.Generator) -> Array:
-    """Noise (N, count) with sizes and colours drawn from their posterior: what the recordings hold when nothing is amiss."""
+def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
+    """Noise (N, count), size and colour drawn from their posterior: what the recordings hold when nothing is amiss."""
+    stack = noise.stack
     out = np.empty((stack.size, count))
     for channel, draws in zip(stack.rig.channels, noise.draws, strict=True):
         own = stack.of(channel)
         for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
             out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
-    return out * noise.loose(stack)[:, None]
+    return out * noise.loose[:, None]
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:
@@ -214,9 +228,10 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
 
 
 def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
-    """An Ornstein-Uhlenbeck process of unit variance (n, count)."""
-    kept = np.exp(-gaps / time)
-    out = rng.standard_normal((len(gaps), count)) * np.sqrt(1.0 - kept**2)[:, None]
-    for i in range(1, len(gaps)):
-        out[i] += kept[i] * out[i - 1]
-    return out
+    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then at the places that are used."""
+    step = _step(gaps)
+    apart = 5 * (1 + round(time / step))  # grid places between runs: enough to forget
+    place = np.cumsum(np.maximum(np.rint(np.where(np.isfinite(gaps), gaps / step, apart)), 1.0)).astype(int)
+    kept = float(np.exp(-step / time))
+    kicks = rng.standard_normal((int(place[-1]) + 1, count)) * np.sqrt(1.0 - kept**2)
+    return np.asarray(lfilter([1.0], [1.0, -kept], kicks, axis=0)[place])

@@ -16,7 +16,6 @@ from scipy.special import logsumexp
 from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base, Signature, log_evidence
 from tools.diagnose.noise import Noise, surrogates, whiten
-from tools.diagnose.rig import Stack
 
 LEVEL = 0.01  # false alarms aimed at, half of what is allowed
 NULLS = 400
@@ -64,18 +63,18 @@ def tail_quantile(values: Array, level: float) -> float:
     return start + float(beyond.mean()) * np.log(0.1 / level) if beyond.size else start
 
 
-def whitened(stack: Stack, noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:
+def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:
     """All columns whitened in one pass."""
     if not signatures:
         return []
-    columns = whiten(stack, np.column_stack([s.columns for s in signatures]), noise)
+    columns = whiten(noise, np.column_stack([s.columns for s in signatures]))
     ends = np.cumsum([len(s.sign) for s in signatures])
     return [Whitened(s, columns[:, end - len(s.sign) : end]) for s, end in zip(signatures, ends, strict=True)]
 
 
-def noise_draws(stack: Stack, noise: Noise, size: int, rng: np.random.Generator) -> tuple[Array, Array]:
+def noise_draws(noise: Noise, size: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Whitened surrogates (N, NULLS) and strains of the constants (size, NULLS)."""
-    return whiten(stack, surrogates(stack, noise, NULLS, rng), noise), rng.standard_normal((size, NULLS))
+    return whiten(noise, surrogates(noise, NULLS, rng)), rng.standard_normal((size, NULLS))
 
 
 def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array]) -> Screen:

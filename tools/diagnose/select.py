@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from estimator.effects.base import Effect
 from estimator.terramechanics.soil import Array
-from tools.diagnose.evidence import Base, Signature
+from tools.diagnose.evidence import Signature
 from tools.diagnose.fit import Fitted, Free, Problem, free_of
 from tools.diagnose.screen import Screen, Whitened, screen, whitened
-from tools.diagnose.signatures import raw_signatures, shape_grid, signature, strengths
+from tools.diagnose.signatures import shape_grid, signature, strengths
 
 REACH = 0.35  # of the best effect's evidence: less cannot catch up in the nonlinear fit
 MOST = 9  # effects fitted at the first step
@@ -57,7 +57,7 @@ def rescreen(search: Search, model: Model, names: list[str] | None = None) -> Sc
     stack, fitted = search.problem.stack, model.fitted
     signatures = list(_beside(search, model, names))
     base = fitted.base()
-    ready = whitened(stack, search.problem.noise, [*signatures, *search.generics])
+    ready = whitened(search.problem.noise, [*signatures, *search.generics])
     noise, strain = search.draws
     found = screen(base, ready, (noise, _resized(strain, base)))
     search.screens[model.names] = found
@@ -115,7 +115,9 @@ def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) 
     amplitude = np.linalg.solve(a + 0.1 * np.eye(len(b)), b)
     amplitude = np.where(np.array(best.signature.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
     free = (*model.fitted.free, *free_of((effect,)))
-    x = np.concatenate((model.fitted.x, _start(free[len(model.fitted.free) :], effect, amplitude, best.signature.shape)))
+    x = np.concatenate(
+        (model.fitted.x, _start(free[len(model.fitted.free) :], effect, amplitude, best.signature.shape))
+    )
     fitted = search.problem.descend((*model.fitted.effects, effect), free, model.fitted.u, x)
     names = (*model.names, effect.name)
     return Model(fitted, names, model.log_prior + (PAIR_PRIOR if model.names else 0.0))
@@ -130,12 +132,14 @@ def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: 
     return np.clip(np.array(values), -20.0, 20.0)
 
 
-def run(search: Search, first: Model, advance: object = None) -> None:
+def run(search: Search, first: Model, step: Callable[[str], None] = lambda _: None) -> None:
     """Forward steps from the base model while the screen alarms; each from the best few models of the step before."""
+    step("screening every effect")
     search.models.append(first)
     found = rescreen(search, first)
     if not found.alarmed:
         return
+    step("fitting the likely effects")
     extend(search, first, found, MOST)
     for size in range(1, STEPS):
         here = sorted((m for m in search.models if len(m.names) == size), key=lambda m: -m.evidence)
@@ -143,6 +147,7 @@ def run(search: Search, first: Model, advance: object = None) -> None:
         if not here:
             return
         for model in here:
+            step(f"looking beside {' and '.join(model.names)}")
             found = rescreen(search, model)
             if found.alarmed:
                 extend(search, model, found, SECOND)
@@ -168,6 +173,3 @@ def _retest(search: Search) -> None:
 
 def _at(fitted: Fitted, wanted: Free) -> float:
     return float(next(x for f, x in zip(fitted.free, fitted.x, strict=True) if f == wanted))
-
-
-__all__ = ["Model", "Search", "raw_signatures", "rescreen", "run"]

@@ -34,7 +34,12 @@ def raw_signatures(stack: Stack, u: Array, base: Array, names: list[str] | None 
 
 
 def signature(
-    stack: Stack, u: Array, base: Array, effect: type[Effect], shape: Mapping[str, float], others: tuple[Effect, ...] = ()
+    stack: Stack,
+    u: Array,
+    base: Array,
+    effect: type[Effect],
+    shape: Mapping[str, float],
+    others: tuple[Effect, ...] = (),
 ) -> Signature | None:
     """None where the effect changes nothing that is measured."""
     columns = np.column_stack(
@@ -57,7 +62,9 @@ def _values(rig: Rig, parameter: Parameter) -> list[float]:
     if parameter.scan and parameter.unit == "s":
         length = max(float(np.ptp(run.time)) for run in rig.runs)
         campaign = max(float(run.time[-1]) for run in rig.runs)
-        return sorted({float(np.clip(f * t, parameter.low, parameter.high)) for f in RELATIVE_TIMES for t in (length, campaign)})
+        return sorted(
+            {float(np.clip(f * t, parameter.low, parameter.high)) for f in RELATIVE_TIMES for t in (length, campaign)}
+        )
     if parameter.scan and parameter.unit == "m":
         return _places(rig, parameter)
     if parameter.scan:

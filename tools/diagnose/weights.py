@@ -31,7 +31,9 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     low, high = np.quantile(load, (0.1, 0.9))
     if max(abs(low - stated), abs(high - stated)) <= CLOSE * stated + 1.0:
         return Weights(constant, True)
-    note = "Weights change within a run, so they are taken from the measured load: friction of the load axis cannot show."
+    note = (
+        "Weights change within a run, so they are taken from the measured load: friction of the load axis cannot show."
+    )
     if note not in caveats:
         caveats.append(note)
     return Weights(levels(signals.time, load), False)

@@ -9,12 +9,13 @@ import numpy as np
 
 from estimator.effects import EFFECTS, configured, make
 from estimator.effects.base import Effect
-from estimator.forward import Response, simulate_arrays
+from estimator.forward import simulate_arrays
 from estimator.history import rate_of
 from estimator.settings import Calibration, Settings, Uncertain
-from estimator.situation import Motion, situation_of
+from estimator.situation import Motion, Sensed, situation_of
 from estimator.terramechanics.soil import Array, Soil
 from tools.diagnose.load import Signals
+from tools.diagnose.proposals import proposed
 from tools.diagnose.rig import Bools, Known, Run
 from tools.diagnose.weights import weights_of
 
@@ -25,13 +26,29 @@ SETTLING = 0.5  # [s] after the wheel starts, before the comparison counts
 RESTING = 0.4  # [s] the wheel must have stood before its current counts as the reading at rest
 TIMING = 5e-3  # [s] by which a channel's stamps may be off
 BLUR = 0.3  # second differences by which speeds, slopes over three intervals, cut corners that a channel does not
-FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}  # least relative sigma of what is "known exactly"
+FLOORS = {
+    "c": 0.05,
+    "tan_phi": 0.02,
+    "k": 0.03,
+    "n": 0.01,
+    "K": 0.02,
+}  # least relative sigma of what is "known exactly"
 SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-", "speed": "m/s",
     "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s", "run": "-",
     "direction": "-", "constant": "-",
 }  # fmt: skip
+PHYSICS = (
+    "c",
+    "tan_phi",
+    "k",
+    "n",
+    "K",
+    "weights",
+    "carriage_scale",
+)  # what needs the forward model; the rest does not
+KEPT = 4  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
 
 
@@ -50,7 +67,9 @@ class WheelRig:
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]
         self.channels = _channels(signals, settings, [w.known for w in self._weights])
         began = min(s.start for s in signals)
-        self._motions = [_motion(s, w.values, settings, s.start - began) for s, w in zip(signals, self._weights, strict=True)]
+        self._motions = [
+            _motion(s, w.values, settings, s.start - began) for s, w in zip(signals, self._weights, strict=True)
+        ]
         self.baseline = configured(settings.effects)
         self.constants = (*_soil(settings, self.caveats), *self._calibrations(), *_configured(settings))
         self.effects = {
@@ -58,6 +77,8 @@ class WheelRig:
             if not e.filter_only and n not in LEFT_OUT and n not in {b.name for b in self.baseline}
         }  # fmt: skip
         self._starts: list[Array | None] = [None] * len(signals)
+        self._kept: list[dict[tuple[object, ...], Array]] = [{} for _ in signals]
+        self._steps = [float(np.median(np.diff(s.time))) for s in signals]
         self.runs = [self._run(s, n) for n, s in enumerate(signals)]
 
     # ---- prediction --------------------------------------------------------------------------------------------------
@@ -67,7 +88,17 @@ class WheelRig:
         acting = (*self._baseline(value), *effects)
         return [self._predict(number, value, acting) for number in range(len(self._motions))]
 
-    def _predict(self, number: int, value: Mapping[str, float], effects: Sequence[Effect]) -> dict[str, Array]:
+    def _predict(self, number: int, value: Mapping[str, float], effects: tuple[Effect, ...]) -> dict[str, Array]:
+        physics = (*(value[name] for name in PHYSICS), *effects)
+        kept = self._kept[number]
+        if physics not in kept:
+            if len(kept) >= KEPT:
+                kept.pop(next(iter(kept)))
+            kept[physics] = self._simulated(number, value, effects)
+        return self._read(number, kept[physics], value)
+
+    def _simulated(self, number: int, value: Mapping[str, float], effects: Sequence[Effect]) -> Array:
+        """True readings (channels, n) before scale, offset and delay."""
         motion = self._motions[number]
         travelled = 1.0 + value["carriage_scale"]
         motion = replace(
@@ -82,14 +113,23 @@ class WheelRig:
             torque_constant=self._constant, theta_1=self._starts[number], order=ORDER,
         )  # fmt: skip
         self._starts[number] = response.theta_1
-        return {c: self._read(c, response, value, np.asarray(motion.time)) for c in self.channels}
+        return np.stack([self._sensed(response.sensed, channel) for channel in self.channels])
 
-    def _read(self, channel: str, response: Response, value: Mapping[str, float], time: Array) -> Array:
-        sensed = response.sensed
-        true = self._constant * sensed.current if channel == "torque" else _sensed(sensed, channel)
-        read = np.asarray(true) * (1.0 + value[f"{channel}_scale"]) + value[f"{channel}_offset"]
-        bend = np.pad(np.diff(read, n=2), 1)
-        return read - value[f"{channel}_delay"] * np.gradient(read, time) + value[f"{channel}_blur"] * bend
+    def _read(self, number: int, true: Array, value: Mapping[str, float]) -> dict[str, Array]:
+        scale, offset, delay, blur = (
+            np.array([value[f"{c}_{what}"] for c in self.channels])[:, None]
+            for what in ("scale", "offset", "delay", "blur")
+        )
+        read = true * (1.0 + scale) + offset
+        rate, bend = np.zeros_like(read), np.zeros_like(read)
+        rate[:, 1:-1] = (read[:, 2:] - read[:, :-2]) / (2.0 * self._steps[number])
+        bend[:, 1:-1] = read[:, 2:] + read[:, :-2] - 2.0 * read[:, 1:-1]
+        return dict(zip(self.channels, read - delay * rate + blur * bend, strict=True))
+
+    def _sensed(self, sensed: Sensed, channel: str) -> Array:
+        if channel == "torque":
+            return np.asarray(self._constant * sensed.current)
+        return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))
 
     def _baseline(self, value: Mapping[str, float]) -> tuple[Effect, ...]:
         return tuple(
@@ -100,6 +140,17 @@ class WheelRig:
     @property
     def _constant(self) -> float:
         return self.settings.drive.torque_constant.value
+
+    def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
+        """Channels under a proposed experiment (see proposals.py), for constants and effects as fitted."""
+        value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
+        soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
+        acting = (*self._baseline(value), *effects)
+        motion = proposed(key, self._motions, self.settings.wheel.radius)
+        sensed = simulate_arrays(
+            self.settings.wheel, soil, motion, acting, torque_constant=self._constant, order=ORDER
+        ).sensed
+        return {c: self._sensed(sensed, c) + value[f"{c}_offset"] for c in self.channels}
 
     # ---- what is known -----------------------------------------------------------------------------------------------
 
@@ -157,10 +208,6 @@ class WheelRig:
         }
 
 
-def _sensed(sensed: object, channel: str) -> Array:
-    return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))
-
-
 def _channels(signals: Sequence[Signals], settings: Settings, weights_known: Sequence[bool]) -> tuple[str, ...]:
     """Those that some recording has and that carry information."""
     source = {"torque": "current"}
@@ -215,7 +262,9 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
     raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
     if raised:
         least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
-        caveats.append(f"The configuration states {', '.join(raised)} as almost exact; they float within {least} instead.")
+        caveats.append(
+            f"The configuration states {', '.join(raised)} as almost exact; they float within {least} instead."
+        )
     low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
     return tuple(
         Known(name, value, max(sigma, FLOORS[name] * value, 1e-12), unit, True, name in ("k", "K"), low.get(name, 0.0))
@@ -230,7 +279,9 @@ def _configured(settings: Settings) -> tuple[Known, ...]:
         for p in EFFECTS[effect.name].parameters():
             stated = effect.parameters.get(p.name)
             if stated is not None and stated.sigma > 0.0:
-                known.append(Known(f"{effect.name}.{p.name}", stated.value, stated.sigma, p.unit, low=p.low, high=p.high))
+                known.append(
+                    Known(f"{effect.name}.{p.name}", stated.value, stated.sigma, p.unit, low=p.low, high=p.high)
+                )
     return tuple(known)
 
 

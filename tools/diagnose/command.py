@@ -1,0 +1,111 @@
+"""`gritd diagnose`: recordings and a configuration in; verdict, JSON, report and the improved configuration out."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from estimator import config, effects
+from estimator.recording import versions
+from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from tools.diagnose.apply import applied
+from tools.diagnose.engine import diagnose
+from tools.diagnose.load import load, sha256
+from tools.diagnose.result import Diagnosis
+from tools.diagnose.wheel_rig import WheelRig
+
+RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))  # all runs together up to so long [s]: grid [Hz]
+FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole."""
+    arguments = _parser().parse_args(argv)
+    configuration = config.load(arguments.config, effects.units)
+    for path in (arguments.json, arguments.report, arguments.apply):
+        if path is not None and not path.parent.is_dir():
+            raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)
+    found, damage = of_files(arguments.files, configuration, arguments.seed, _said)
+    if arguments.json is not None:
+        arguments.json.write_text(json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    if arguments.report is not None:
+        importlib.import_module("tools.report.diagnosis").write(found, arguments.report)
+    if arguments.apply is not None:
+        arguments.apply.write_text(applied(configuration, found), encoding="utf-8")
+    print(text(found))
+    return DAMAGED if damage else DONE
+
+
+def of_files(
+    files: Sequence[Path], configuration: config.Configuration, seed: int, step: object = None
+) -> tuple[Diagnosis, list[str]]:
+    """The diagnosis, and what was damaged in the files. Raises CommandError."""
+    rough = load(files, configuration.settings, FIRST)
+    length = sum(float(s.time[-1]) for s in rough)
+    rate = next(hertz for limit, hertz in RATES if length <= limit)
+    signals = load(files, configuration.settings, rate)
+    rig = WheelRig(signals, configuration.settings)
+    if not rig.channels:
+        raise CommandError(f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED)
+    redo = {
+        "files": {str(path): sha256(path) for path in files},
+        "configuration": configuration.text,
+        "grid_hz": rate,
+        "versions": versions(),
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None)
+    return found, [f"{s.path}: {line}" for s in signals for line in s.damage]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd diagnose",
+        description="Find where model and recordings differ, name the physics left out, model it, show the fit improve.",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings, one a run")
+    parser.add_argument("--config", required=True, help="the testbed and what is known of the soil")
+    parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
+    parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
+    parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
+    parser.add_argument("--seed", type=int, default=0, help="of the surrogates; default 0")
+    return parser
+
+
+def _said(what: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\033[K{what} …", end="", file=sys.stderr, flush=True)
+
+
+def text(found: Diagnosis) -> str:
+    """The verdict for a person."""
+    lines = [f"verdict: {found.verdict}", found.summary]
+    for place in found.location[:4]:
+        lines.append(f"  where: {place.where} (share {place.share:.0%}, p {place.p:.2g})")
+    for h in found.hypotheses[:4]:
+        values = ", ".join(f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in h.parameters.items())
+        alike = f"; like {', '.join(h.indistinguishable_from)}" if h.indistinguishable_from else ""
+        lines.append(f"  {'*' if h.accepted else ' '} {h.effect} {h.probability:.2f}: {values}{alike}")
+    if found.law is not None:
+        lines.append(f"  law: {found.law.expression} (takes {found.law.share:.0%})")
+    if found.soil is not None:
+        for name in ("c", "tan_phi"):
+            before, after = found.soil.before[name], found.soil.after[name]
+            lines.append(
+                f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
+                f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
+            )
+    for channel, unit in found.fit.unit.items():
+        lines.append(
+            f"  held-out {channel}: {found.fit.before[channel]:.3g} before, {found.fit.after[channel]:.3g} after, "
+            f"noise {found.fit.noise_floor[channel]:.2g} {unit}"
+        )
+    if found.next_experiment is not None:
+        lines.append(f"  next: {found.next_experiment.action} ({found.next_experiment.expected_gain_nats:.0f} nats)")
+    return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])

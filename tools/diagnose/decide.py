@@ -1,0 +1,132 @@
+"""From fitted models to a verdict, probabilities and groups.
+
+Probabilities are Bayes weights of all fitted models, softened: evidence is divided by a temperature that grows with
+what the best model leaves unexplained, because a model whose form is wrong is overconfident (tempered posterior,
+Holmes and Walker 2017, Biometrika 104, 497-503). An effect has the weight of all models that hold it. What no listed
+effect explains takes the share UNLISTED gives it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tools.diagnose.evidence import Base
+from tools.diagnose.result import Verdict
+from tools.diagnose.screen import Screen, whitened
+from tools.diagnose.select import Model, Search
+
+TEMPERATURE = 2.0  # of evidence where nothing remains
+LEFTOVER = 0.15  # further temperature per nat left unexplained
+ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off, cannot be told apart
+TAKEN = 0.8  # share of the explainable misfit a listed explanation must take
+POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
+
+
+@dataclass(frozen=True)
+class Decision:
+    verdict: Verdict
+    best: Model
+    share: float  # of the explainable misfit that the best model takes
+    left: float  # nats that smooth functions could still gain
+    left_significant: bool
+    probability: dict[str, float]
+    unlisted: float
+    groups: dict[str, tuple[str, ...]]
+
+
+def decide(search: Search) -> Decision:
+    base, found = search.models[0], search.screens[()]
+    if not found.alarmed:
+        verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
+        return Decision(verdict, base, 1.0, 0.0, False, _quiet(found), 0.0, {})
+    best, share, left, significant = _explanation(search)
+    listed = bool(best.names) and (not significant or share >= TAKEN)
+    unlisted = _unlisted(share, significant, bool(best.names))
+    temperature = TEMPERATURE + LEFTOVER * left
+    probability = {n: p * (1.0 - unlisted) for n, p in probabilities(search.models, temperature).items()}
+    return Decision(
+        "explained" if listed else "unlisted",
+        best, share, left, significant, probability, unlisted, groups(search, best, temperature),
+    )  # fmt: skip
+
+
+def _explanation(search: Search) -> tuple[Model, float, float, bool]:
+    """The fewest effects that take (nearly) all, else the most probable model."""
+    base = search.models[0]
+    best = search.best()
+    left, significant = remaining(search, best)
+    gained = 0.5 * (base.fitted.objective - best.fitted.objective)
+    return best, gained / max(gained + left, 1e-9), left, significant
+
+
+def remaining(search: Search, model: Model) -> tuple[float, bool]:
+    """Nats that smooth functions of the covariates would still gain beyond chance; whether that is significant."""
+    base = model.fitted.base()
+    columns = np.column_stack([w.columns for w in whitened(search.problem.noise, search.generics)])
+    a, b = base.projected(columns)
+    noise, strain = search.draws
+    size = base.jacobian.shape[1]
+    strain = np.resize(strain, (size, strain.shape[1])) if size > strain.shape[0] else strain[:size]
+    null = base.scores(columns, noise, strain)
+    smooth = np.linalg.inv(a + np.eye(len(b)))
+    value, nulls = 0.5 * b @ smooth @ b, 0.5 * np.sum(null * (smooth @ null), axis=0)
+    return float(max(value - nulls.mean(), 0.0)), bool(value > np.quantile(nulls, 0.98))
+
+
+def _unlisted(share: float, significant: bool, any_effect: bool) -> float:
+    """Probability that the physics is not in the library."""
+    if not any_effect:
+        return 0.95
+    if not significant:
+        return 0.02
+    return float(1.0 / (1.0 + np.exp((share - TAKEN) / 0.06)))
+
+
+def probabilities(models: Sequence[Model], temperature: float) -> dict[str, float]:
+    """Weight of all models that hold an effect."""
+    evidence = np.array([m.evidence for m in models]) / temperature
+    weight = np.exp(evidence - evidence.max())
+    weight /= weight.sum()
+    out: dict[str, float] = {}
+    for model, w in zip(models, weight, strict=True):
+        for name in model.names:
+            out[name] = out.get(name, 0.0) + float(w)
+    return out
+
+
+def _quiet(found: Screen) -> dict[str, float]:
+    """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
+    listed = {n: e for n, e in found.evidence.items() if "~" not in n}
+    weight = {n: float(np.exp(min(e, 20.0) / TEMPERATURE)) / max(len(listed), 1) for n, e in listed.items()}
+    total = 20.0 + sum(weight.values())
+    return {n: w / total for n, w in weight.items()}
+
+
+def groups(search: Search, best: Model, temperature: float) -> dict[str, tuple[str, ...]]:
+    """For each effect of the best model, those that could stand in its place."""
+    out: dict[str, tuple[str, ...]] = {}
+    for name in best.names:
+        rest = set(best.names) - {name}
+        rivals = [
+            m for m in search.models
+            if len(m.names) == len(best.names) and rest <= set(m.names) and m is not best
+            and best.evidence - m.evidence < ALIKE * temperature / TEMPERATURE
+        ]  # fmt: skip
+        rivals.sort(key=lambda m: -m.evidence)
+        out[name] = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in rest))
+    return out
+
+
+def power(search: Search, found: Screen) -> float:
+    """Share of the listed effects that would be seen at their expected size."""
+    base: Base = search.models[0].fitted.base()
+    seen = []
+    for name, ready in found.best.items():
+        if "~" not in name:
+            a, _ = base.projected(ready.columns)
+            gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
+            seen.append(gain > found.threshold)
+    return float(np.mean(seen)) if seen else 0.0

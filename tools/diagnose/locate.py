@@ -1,0 +1,88 @@
+"""Where the misfit lives: channel by covariate, with its share, its chance, and a sentence with numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose.decide import whitened
+from tools.diagnose.result import Location
+from tools.diagnose.rig import Stack
+from tools.diagnose.select import Model, Search
+
+DISCOVERY = 0.05  # false-discovery rate of the list
+MOST = 8
+LEAST = 0.05  # share below which a place is not worth naming
+WORDS = {
+    "slip": "slip", "speed": "rim speed [m/s]", "load": "load [N]", "sinkage": "sinkage [m]", "position": "place [m]",
+    "time": "time [s]", "heat": "∫I² [A²s]", "acceleration": "acceleration [rad/s²]", "wheel_angle": "wheel angle",
+}  # fmt: skip
+
+
+def locate(search: Search, model: Model) -> tuple[Location, ...]:
+    """Places of the misfit of a model, by share; only those that survive false-discovery control."""
+    stack = search.problem.stack
+    base, (noise, strain) = model.fitted.base(), search.draws
+    ready = whitened(search.problem.noise, search.generics)
+    columns = np.column_stack([w.columns for w in ready])
+    a, b = base.projected(columns)
+    null = base.scores(columns, noise, np.resize(strain, (base.jacobian.shape[1], strain.shape[1])))
+    ends = np.cumsum([w.columns.shape[1] for w in ready])
+    own = [slice(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
+    gain = [_gain(a[s, s], b[s], null[s]) for s in own]
+    channels = [w.signature.name.partition("~")[0] for w in ready]
+    whole = {c: _whole(a, b, null, [s for s, d in zip(own, channels, strict=True) if d == c]) for c in set(channels)}
+    p = np.array([g[1] for g in gain])
+    q = _false_discovery(p)
+    found = []
+    for w, channel, (value, _), p_i, q_i in zip(ready, channels, gain, p, q, strict=True):
+        share = float(np.clip(value / max(whole[channel], 1e-9), 0.0, 1.0))
+        if q_i <= DISCOVERY and share >= LEAST:
+            covariate = w.signature.name.partition("~")[2]
+            where = sentence(stack, model, channel, covariate)
+            found.append((value, Location(channel, covariate, share, float(p_i), float(q_i), where)))
+    found.sort(key=lambda item: -item[0])
+    return tuple(location for _, location in found[:MOST])
+
+
+def _gain(a: Array, b: Array, null: Array) -> tuple[float, float]:
+    """Nats gained beyond chance, and the chance of as much."""
+    smooth = np.linalg.inv(a + np.eye(len(b)))
+    value, nulls = 0.5 * float(b @ smooth @ b), 0.5 * np.sum(null * (smooth @ null), axis=0)
+    return max(value - float(nulls.mean()), 0.0), float((1 + np.sum(nulls >= value)) / (1 + nulls.size))
+
+
+def _whole(a: Array, b: Array, null: Array, parts: list[slice]) -> float:
+    index = np.concatenate([np.arange(s.start, s.stop) for s in parts])
+    return _gain(a[np.ix_(index, index)], b[index], null[index])[0]
+
+
+def _false_discovery(p: Array) -> Array:
+    """Adjusted p-values (Benjamini and Hochberg 1995, J. R. Stat. Soc. B 57, 289-300)."""
+    order = np.argsort(p)
+    ranked = p[order] * len(p) / np.arange(1, len(p) + 1)
+    out = np.empty_like(p)
+    out[order] = np.minimum(np.minimum.accumulate(ranked[::-1])[::-1], 1.0)
+    return out
+
+
+def sentence(stack: Stack, model: Model, channel: str, covariate: str) -> str:
+    """Measured less predicted in words, at the low and the high end of the covariate."""
+    own = stack.of(channel)
+    residual = (stack.measured - model.fitted.predicted)[own]
+    unit = stack.rig.units[channel]
+    name = covariate.split("·")[0]
+    size = f"{float(np.sqrt(np.mean(residual**2))):.3g} {unit} r.m.s."
+    if name == "constant":
+        return f"{channel}: measured less predicted is {residual.mean():+.3g} {unit} on average"
+    if name == "run":
+        means = {stack.rig.runs[r].name: residual[stack.run[own] == r].mean() for r in np.unique(stack.run[own])}
+        return (
+            f"{channel}: differs from run to run: " + ", ".join(f"{n} {m:+.2g}" for n, m in means.items()) + f" {unit}"
+        )
+    if name in ("wheel_angle", "direction") or "·" in covariate:
+        return f"{channel}: varies with {covariate.replace('·', ' and ')}, {size}"
+    x = stack.covariate(name)[own]
+    low, high = np.quantile(x, (0.15, 0.85))
+    ends = f"{residual[x <= low].mean():+.3g} {unit} at {low:.3g} to {residual[x >= high].mean():+.3g} {unit} at {high:.3g}"
+    return f"{channel}: measured less predicted goes from {ends} of {WORDS.get(name, name)}"

@@ -1,0 +1,42 @@
+"""From a rig to a problem: the base model fitted, the noise known, the surrogates drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose import generic, noise
+from tools.diagnose.evidence import Signature
+from tools.diagnose.fit import Fitted, Problem
+from tools.diagnose.rig import Rig, Stack
+from tools.diagnose.screen import noise_draws
+from tools.diagnose.signatures import raw_signatures
+
+TOLERANCE = 2e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
+ROUGH = 3  # rounds of the first fit, whose only use is to linearise
+
+
+@dataclass(frozen=True)
+class Prepared:
+    problem: Problem
+    base: Fitted
+    generics: list[Signature]
+    draws: tuple[Array, Array]
+
+
+def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
+    """Fit with white noise, find the noise's size and colour with everything explained away, fit again."""
+    stack = Stack(rig)
+    u = np.zeros(len(rig.constants))
+    tolerance = generic.tolerance(stack, TOLERANCE)
+    first = noise.first_guess(stack, stack.predict(u))
+    rough = Problem(stack, first, tolerance).descend((), (), u, np.zeros(0), ROUGH)
+    generics = generic.signatures(stack)
+    smooth = [n for n, e in rig.effects.items() if not any(p.scan and not p.unit for p in e.parameters())]
+    explained = [s.columns for s in (*raw_signatures(stack, rough.u, rough.predicted, smooth), *generics)]
+    found = noise.fit(stack, rough.predicted, np.column_stack([*explained, rough.raw]), first, rng)
+    problem = Problem(stack, found, tolerance)
+    base = problem.descend((), (), rough.u, np.zeros(0))
+    return Prepared(problem, base, generics, noise_draws(found, base.jacobian.shape[1], rng))

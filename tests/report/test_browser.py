@@ -48,7 +48,7 @@ def test_nothing_is_wider_than_the_screen(case: str, width: int, tmp_path: Path)
 
 def test_prints(tmp_path: Path) -> None:
     page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
-    diagnosis.write(page, cases.explained())
+    diagnosis.write(cases.explained(), page)
     browse(tmp_path, page, f"--print-to-pdf={printed}", "--no-pdf-header-footer")
     text = printed.read_bytes()
     assert text.startswith(b"%PDF") and 4 <= len(re.findall(rb"/Type\s*/Page\b", text)) <= 10

@@ -142,7 +142,7 @@ def test_text_from_outside_stays_text() -> None:
 
 
 def test_writes_utf8(tmp_path: Path) -> None:
-    diagnosis.write(tmp_path / "r.html", cases.hostile())
+    diagnosis.write(cases.hostile(), tmp_path / "r.html")
     assert "±" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
@@ -176,3 +176,9 @@ def test_redo_takes_whatever_it_finds() -> None:
     found = replace(cases.consistent(), redo={"files": {"a.mcap": {"sha256": "f" * 64}}, "settings": {"level": 0.01}})
     said = words(diagnosis.render(found))
     assert "a.mcap " + "f" * 64 in said and "level 0.01" in said
+    found = replace(found, redo={"files": {"my run.mcap": "e" * 64}, "seed": 3})
+    said = words(diagnosis.render(found))
+    assert (
+        "gritd diagnose 'my run.mcap' --config configuration.yaml --seed 3" in said
+        and "my run.mcap " + "e" * 64 in said
+    )

@@ -43,7 +43,7 @@ LOCATED_RUNS, OTHER_RUNS = 6, 3  # pictures in view of a channel where the misfi
 STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
 
 
-def write(path: Path, found: Diagnosis) -> None:
+def write(found: Diagnosis, path: Path) -> None:
     """Raises OSError."""
     path.write_text(render(found), encoding="utf-8")
 
@@ -82,7 +82,7 @@ def _verdict(found: Diagnosis) -> Markup:
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
-        tag("p", held(found.summary), class_="summary"),
+        tag("p", held(_named(found, found.summary)), class_="summary"),
         tag("dl", (_figure(*figure) for figure in _figures(found)), class_="figures"),
         class_=f"verdict {found.verdict}",
     )
@@ -92,6 +92,13 @@ def explanation(found: Diagnosis) -> str:
     """What makes the difference between before and after, in words."""
     names = [name_of(h.effect) for h in found.accepted]
     return listed(names) if names else "the empirical law" if found.law else "it"
+
+
+def _named(found: Diagnosis, text: str) -> str:
+    """Effects in words instead of by their keys."""
+    for h in found.hypotheses:
+        text = text.replace(h.effect, name_of(h.effect))
+    return text
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:

@@ -150,11 +150,11 @@ def scatter(of: Scatter, explanation: str) -> Markup:
 
 
 def _along(of: Scatter) -> tuple[Array, str]:
-    """The covariate as drawn, and its label; angles of the wheel are folded into one turn."""
-    x = np.asarray(of.x, float)
-    unit, factor = covariate_shown(of.covariate, of.covariate_unit)
-    x = np.mod(x, TURN) if of.covariate == "wheel_angle" else x
-    return x * factor, f"{name_of(of.covariate)}" + (f" [{unit}]" if unit else "")
+    """The covariate as drawn, and its label; angles of the wheel are folded into one turn. Of a product the first."""
+    x, covariate = np.asarray(of.x, float), of.covariate.split("·")[0]
+    unit, factor = covariate_shown(covariate, of.covariate_unit)
+    x = np.mod(x, TURN) if covariate == "wheel_angle" else x
+    return x * factor, name_of(covariate) + (f" [{unit}]" if unit else "")
 
 
 def _some(x: Array, y: Array) -> tuple[Array, Array]:

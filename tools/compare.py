@@ -14,8 +14,9 @@ from estimator.config import Configuration
 from estimator.terramechanics.soil import Array
 from tools.command import DONE, FAILED, CommandError, Parser
 from tools.diagnose import noise
-from tools.diagnose.fit import Fitted, Problem
+from tools.diagnose.fit import Fitted
 from tools.diagnose.load import load, sha256
+from tools.diagnose.prepare import prepare
 from tools.diagnose.result import Quantity, SoilFit, Trace
 from tools.diagnose.rig import Stack
 from tools.diagnose.wheel_rig import WheelRig
@@ -65,8 +66,11 @@ def compare(
             f"{paths[0]}: found no sample where the wheel drives under load; expected some seconds", FAILED
         )
     configured = np.zeros(len(rig.constants))
-    sizes = noise.first_guess(stack, stack.predict(configured))
-    fit = Problem(stack, sizes, np.zeros((stack.size, 0))).descend((), (), configured, np.zeros(0)) if fitted else None
+    if fitted:
+        prepared = prepare(rig, np.random.default_rng(0))
+        fit, sizes = prepared.base, prepared.problem.noise
+    else:
+        fit, sizes = None, noise.first_guess(stack, stack.predict(configured))
     sigma = {c: colour.sigma for c, colour in zip(rig.channels, sizes.colours, strict=True)}
     return Comparison(
         settings.testbed,

@@ -111,7 +111,7 @@ def base(**changed: object) -> Diagnosis:
         next_experiment=None,
         caveats=("The configuration states n as almost exact; it floats within 1 % instead.",),
         remaining="Nothing remains above the noise floor",
-        nuisance={"sinkage_offset": Quantity(4e-5, 6e-5, "m"), "torque_scale": Quantity(0.004, 0.002, "")},
+        nuisance={"sinkage_offset": Quantity(4e-5, 6e-5, "m"), "torque_scale": Quantity(0.004, 0.0015, "")},
         noise={c: {"sigma": s, "correlation": 0.2, "configured": s} for c, s in SIGMA.items()},
         baseline=("stress_linearisation",),
         traces=plain,

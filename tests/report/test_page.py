@@ -74,7 +74,15 @@ def test_numbers_of_pictures_are_finite(page: str) -> None:
     [
         ("consistent", ("Consistent", "0.8 nats", "1020 ± 60 Pa", "p 0.41")),
         ("explained", ("Explained: Coulomb friction", "213 nats", "0.11 → 0.013 N·m", "noise 0.012 N·m")),
-        ("several", ("Explained: Coulomb friction and soil patch", "cohesion change", "5 more runs")),
+        (
+            "several",
+            (
+                "Explained: Coulomb friction and soil patch",
+                "cohesion change",
+                "simulated with these 2 effects",
+                "5 more runs",
+            ),
+        ),
         (
             "unlisted",
             (
@@ -120,7 +128,7 @@ def test_explained_says_everything_it_was_given() -> None:
         "gritd diagnose run1.mcap run2.mcap --config testbed.yaml",
         "radius: 72 mm",
         "numpy 1.26.4",
-        "torque scale 0.0040 ± 0.0020",  # a calibration constant that strayed
+        "torque scale 0.0040 ± 0.0015",  # a calibration constant that strayed
     ):
         assert text in said, text
     assert "sinkage offset" not in said  # it stayed within its uncertainty
@@ -182,3 +190,23 @@ def test_redo_takes_whatever_it_finds() -> None:
         "gritd diagnose 'my run.mcap' --config configuration.yaml --seed 3" in said
         and "my run.mcap " + "e" * 64 in said
     )
+
+
+def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
+    found = cases.explained()
+    scatter = replace(
+        found.scatters[0], covariate="run", covariate_unit="-", x=[float(r) for r in found.scatters[0].run]
+    )
+    everywhere = replace(scatter, covariate="constant", x=[1.0] * len(scatter.x))
+    page = diagnosis.render(replace(found, scatters=(scatter, everywhere)))
+    pictures = [e for e in parsed(page).iter("svg") if "against run" in (e[0].text or "")]
+    assert len(pictures) == 2  # without and with, not drawn again for the constant
+    labels = [t.text for t in pictures[0].iter("text")]
+    assert all(run in labels for run in ("40 N", "120 N"))
+    means = [p for p in pictures[0].iter("path") if p.get("class") == "line mean"]
+    assert len(means) == len(cases.LOADS)
+
+
+def test_keys_of_effects_and_channels_are_said_in_words() -> None:
+    found = replace(cases.explained(), summary="coulomb_friction explains drawbar_pull")
+    assert "Coulomb friction explains drawbar pull" in words(diagnosis.render(found))

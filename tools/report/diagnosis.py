@@ -76,13 +76,14 @@ def paragraph(*content: Child) -> Markup:
 
 def _verdict(found: Diagnosis) -> Markup:
     name, meaning = VERDICTS[found.verdict]
-    title = f"{name}: {explanation(found)}" if found.verdict == "explained" and found.accepted else name
-    runs = list(dict.fromkeys(trace.run for trace in found.traces))
+    effects = [name_of(h.effect) for h in found.accepted]
+    title = f"{name}: {listed(effects)}" if found.verdict == "explained" and effects else name
+    runs = {trace.run for trace in found.traces}
     return tag(
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
-        tag("p", held(_named(found, found.summary)), class_="summary"),
+        tag("p", held(tables.named(found, found.summary)), class_="summary"),
         tag("dl", (_figure(*figure) for figure in _figures(found)), class_="figures"),
         class_=f"verdict {found.verdict}",
     )
@@ -90,15 +91,9 @@ def _verdict(found: Diagnosis) -> Markup:
 
 def explanation(found: Diagnosis) -> str:
     """What makes the difference between before and after, in words."""
-    names = [name_of(h.effect) for h in found.accepted]
-    return listed(names) if names else "the empirical law" if found.law else "it"
-
-
-def _named(found: Diagnosis, text: str) -> str:
-    """Effects in words instead of by their keys."""
-    for h in found.hypotheses:
-        text = text.replace(h.effect, name_of(h.effect))
-    return text
+    if found.accepted:
+        return name_of(found.accepted[0].effect) if len(found.accepted) == 1 else f"these {len(found.accepted)} effects"
+    return "the empirical law" if found.law else "it"
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:
@@ -192,16 +187,21 @@ def _misfit(found: Diagnosis) -> Markup | None:
     if not found.scatters:
         return None
     title = "Where the misfit lives" if found.verdict != "consistent" else "What is left"
-    return section(title, (_scatter(found, scatter) for scatter in found.scatters))
+    by_picture = {(s.channel, figures.drawn_against(s)): s for s in reversed(found.scatters)}
+    return section(title, (_scatter(found, scatter) for scatter in reversed(by_picture.values())))
 
 
 def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
     here = (scatter.channel, scatter.covariate)
     words = [place.where for place in found.location if (place.channel, place.covariate) == here]
-    about = f"Residual of {name_of(scatter.channel)} against {name_of(scatter.covariate)}"
-    key = figures.legend({"mean": "mean in bins", "band": "± 2σ of the noise"})
-    caption = f"{about}. {sentence(words[0])}" if words else f"{about}."
-    return figures.figure(caption, figures.scatter(scatter, explanation(found)), legend=key, small=True)
+    against = figures.drawn_against(scatter)
+    about = f"Residual of {name_of(scatter.channel)} against {name_of(against)}"
+    if against == "run":
+        about = f"Residual of {name_of(scatter.channel)} in each run, in order of time"
+    key = figures.legend({"mean": "mean", "band": "± 2σ of the noise"})
+    caption = f"{about}. {sentence(tables.named(found, words[0]))}" if words else f"{about}."
+    runs = list(dict.fromkeys(trace.run for trace in found.traces))
+    return figures.figure(caption, figures.scatter(scatter, explanation(found), runs), legend=key, small=True)
 
 
 def _hypotheses(found: Diagnosis) -> Markup | None:

@@ -15,6 +15,8 @@ from tools.report.words import counted, covariate_shown, held, name_of, number, 
 
 BINS = 12  # of a scatter's running mean
 FEWEST = 4  # values in a bin
+COLUMN = 0.7  # width of a run's column, of the distance between runs
+MOST_LETTERS = 40  # of all names under a picture
 SCATTERED = 1500  # dots a panel
 TURN = 2.0 * np.pi
 
@@ -127,34 +129,64 @@ def _known(sigma: float) -> float:
 # ---- residual against a covariate ----------------------------------------------------------------------------------
 
 
-def scatter(of: Scatter, explanation: str) -> Markup:
-    """Residuals without and with the explanation, on one scale; a running mean through them."""
+def drawn_against(of: Scatter) -> str:
+    """The covariate a scatter is drawn against: of a product the first; what is the same everywhere, run by run."""
+    first = of.covariate.split("·")[0]
+    return "run" if first == "constant" else first
+
+
+def scatter(of: Scatter, explanation: str, runs: Sequence[str]) -> Markup:
+    """Residuals without and with the explanation, on one scale; their mean through them."""
     unit, factor = shown(of.unit)
-    x, name = _along(of)
     sides = [(f"without {explanation}", "before")] + ([(f"with {explanation}", "after")] if differs(of) else [])
     values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
     sigma = _known(of.sigma) * factor
     y_limits = plot.limits(*values.values(), [-2 * sigma, 2 * sigma], keep=0.0)
-    at = plot.axes(plot.limits(x), y_limits, 20.0, 190.0)
+    x, name, x_limits, names = _by_run(of, runs) if drawn_against(of) == "run" else _along(of)
+    at = plot.axes(x_limits, y_limits, 20.0, 190.0)
     drawn = []
     for title, kind in sides:
         label = f"Residual of {name_of(of.channel)} against {name}, {title}"
         marks = (
             plot.band(at, -2 * sigma, 2 * sigma),
-            plot.frame(at, f"residual [{unit or '–'}]", below=name),
+            plot.frame(at, f"residual [{unit or '–'}]", below=name, names=names),
             plot.dots(at, *_some(x, values[kind]), f"dots {kind}"),
-            plot.line(at, *running_mean(x, values[kind]), "line mean"),
+            _levels(at, of, values[kind]) if names else plot.line(at, *running_mean(x, values[kind]), "line mean"),
         )
         drawn.append(panel(title if len(sides) > 1 else "", plot.picture(224.0, label, *marks)))
     return panels(drawn)
 
 
-def _along(of: Scatter) -> tuple[Array, str]:
-    """The covariate as drawn, and its label; angles of the wheel are folded into one turn. Of a product the first."""
-    x, covariate = np.asarray(of.x, float), of.covariate.split("·")[0]
+Along = tuple[Array, str, tuple[float, float], list[str] | None]  # values, label, limits, names of 0, 1, 2 …
+
+
+def _along(of: Scatter) -> Along:
+    """The covariate in the unit shown; angles of the wheel are folded into one turn."""
+    covariate, x = drawn_against(of), np.asarray(of.x, float)
     unit, factor = covariate_shown(covariate, of.covariate_unit)
-    x = np.mod(x, TURN) if covariate == "wheel_angle" else x
-    return x * factor, name_of(covariate) + (f" [{unit}]" if unit else "")
+    x = (np.mod(x, TURN) if covariate == "wheel_angle" else x) * factor
+    return x, name_of(covariate) + (f" [{unit}]" if unit else ""), plot.limits(x), None
+
+
+def _by_run(of: Scatter, runs: Sequence[str]) -> Along:
+    """A column a run, its values from left to right in order of time."""
+    run = np.asarray(of.run, dtype=int)
+    count = max([len(runs), *(run + 1).tolist()])
+    x = run.astype(float)
+    for each in np.unique(run):
+        own = run == each
+        x[own] += COLUMN * (np.arange(own.sum()) / max(own.sum() - 1, 1) - 0.5)
+    longest = max(MOST_LETTERS // count, 1)
+    names = [(n if len(n) <= longest else str(i + 1)) for i, n in enumerate([*runs, *[""] * (count - len(runs))])]
+    return x, "run", (-0.5, count - 0.5), names
+
+
+def _levels(at: plot.Axes, of: Scatter, values: Array) -> list[Markup]:
+    """The mean of each run, as wide as its column."""
+    run = np.asarray(of.run, dtype=int)
+    means = [(each, float(np.nanmean(values[run == each]))) for each in np.unique(run[np.isfinite(values)]).tolist()]
+    half = 0.5 * COLUMN
+    return [plot.line(at, [each - half, each + half], [mean, mean], "line mean") for each, mean in means]
 
 
 def _some(x: Array, y: Array) -> tuple[Array, Array]:

@@ -65,7 +65,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int 
     names = list(head)
 
     def kind(at: int, content: Child = "") -> str | None:
-        if numbers and at >= numbers:
+        if 0 < numbers <= at:
             return "number"
         return (
             "short" if isinstance(content, str) and not isinstance(content, Markup) and len(content) <= SHORT else None
@@ -73,7 +73,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int 
 
     def cell(at: int, content: Child) -> Markup:
         if at == 0:
-            return tag("th", content, scope="row")
+            return tag("th", content, scope="row", class_=kind(at, content))
         return tag("td", tag("span", content), class_=kind(at, content), data_name=names[at])
 
     top = (tag("th", name, scope="col", class_=kind(at)) for at, name in enumerate(names))

@@ -86,9 +86,14 @@ def tick_labels(values: Sequence[float]) -> list[str]:
     return [fixed(v + 0.0, places) if abs(v) > 1e-9 * step else "0" for v in values]
 
 
-def frame(at: Axes, label: str, *, below: str | None = None, most: int = 5) -> Markup:
-    """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None leaves it bare."""
-    heights, widths = ticks(at.y.low, at.y.high, most), ticks(at.x.low, at.x.high, 6)
+def frame(
+    at: Axes, label: str, *, below: str | None = None, most: int = 5, names: Sequence[str] | None = None
+) -> Markup:
+    """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None leaves it bare.
+
+    names: stand at 0, 1, 2 … on the horizontal axis in place of numbers.
+    """
+    heights = ticks(at.y.low, at.y.high, most)
     parts = []
     for value, said in zip(heights, tick_labels(heights), strict=True):
         height = float(at.y(value))
@@ -96,7 +101,8 @@ def frame(at: Axes, label: str, *, below: str | None = None, most: int = 5) -> M
         parts.append(text(at.x.start - 6, height + 3.5, said, "end"))
     parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
     if below is not None:
-        for value, said in zip(widths, tick_labels(widths), strict=True):
+        widths = ticks(at.x.low, at.x.high, 6) if names is None else [float(i) for i in range(len(names))]
+        for value, said in zip(widths, names if names is not None else tick_labels(widths), strict=True):
             parts.append(text(float(at.x(value)), at.y.start + 14, said, "middle"))
         parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
     return tag("g", parts)

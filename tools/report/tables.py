@@ -21,6 +21,8 @@ from tools.report.words import (
     with_unit,
 )
 
+STRAYED = 2.0  # [σ]
+
 
 def parameters(found: Diagnosis) -> Markup | None:
     parameters = [(h.effect, name, q) for h in found.accepted for name, q in h.parameters.items()]
@@ -32,8 +34,8 @@ def parameters(found: Diagnosis) -> Markup | None:
 
 
 def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Calibration constants that moved by more than their own uncertainty."""
-    return {name: q for name, q in nuisance.items() if q.sigma > 0.0 and abs(q.value) > q.sigma}
+    """Calibration constants that are not zero by more than STRAYED of their uncertainty."""
+    return {name: q for name, q in nuisance.items() if q.sigma > 0.0 and abs(q.value) > STRAYED * q.sigma}
 
 
 def location(found: Diagnosis) -> Markup | None:
@@ -50,11 +52,12 @@ def location(found: Diagnosis) -> Markup | None:
 
 def _words(found: Diagnosis, place: Location) -> str:
     """The sentence, and where the misfit starts or stops."""
+    where = sentence(named(found, place.where))
     if not place.changes:
-        return sentence(place.where)
+        return where
     unit, factor = covariate_shown(place.covariate, UNITS.get(place.covariate, ""))
     changes = [spaced(change * factor, unit) for change in place.changes]
-    return f"{sentence(place.where)} Changes at {listed(changes)}."
+    return f"{where} Changes at {listed(changes)}."
 
 
 def errors(found: Diagnosis) -> Markup | None:
@@ -74,7 +77,7 @@ def errors(found: Diagnosis) -> Markup | None:
     if innovations:
         notes.append(tag("p", "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
     if found.remaining:
-        notes.append(tag("p", sentence(found.remaining)))
+        notes.append(tag("p", sentence(named(found, found.remaining))))
     return section("Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note"))
 
 
@@ -101,6 +104,13 @@ def law(found: Diagnosis) -> Markup | None:
         table(("domain", "from … to"), domain, numbers=1) if domain else None,
         table(("parameter", "value ± 1σ"), values, numbers=1) if values else None,
     )
+
+
+def named(found: Diagnosis, text: str) -> str:
+    """Effects and channels in words instead of by their keys."""
+    for key in (*(h.effect for h in found.hypotheses), *found.fit.unit):
+        text = text.replace(key, name_of(key))
+    return text
 
 
 def _range(covariate: str, low: float, high: float) -> str:

@@ -126,7 +126,7 @@ def probability(p: float | None) -> str:
     """A p-value: small ones as a bound."""
     if p is None or not math.isfinite(p):
         return NOTHING
-    return "< 0.001" if p < 0.001 else fixed(p, 3 if p < 0.1 else 2)
+    return "< 0.001" if p < 0.001 else number(p, 2)
 
 
 def spaced(value: float | None, unit: str, digits: int = 3) -> str:

@@ -1,0 +1,1 @@
+"""Blind trials of `gritd diagnose`: an independent plant, sealed answers, and the score."""

@@ -283,12 +283,15 @@ def fit(soil: Soil, shift: IntegralShift | None = None) -> tuple[float, float]:
     solved = balance.solve(WHEEL, balance.Contact(soil, ContactLaw(0.5), slip, load))
     k = float(soil.shear_modulus)
     conditions = [
-        (theta_1, i, w, shift and shift.at(k, theta_1, i))
+        (theta_1, i, w, None if shift is None else shift.at(k, theta_1, i))
         for theta_1, i, w in zip(solved.theta_1.tolist(), slip.tolist(), load.tolist(), strict=True)
     ]
 
     def misfit(x: Array) -> Array:
-        closed = [linear.predict(WHEEL, 1e3 * x[0], x[1], k, *at, shift=shifted) for *at, shifted in conditions]
+        closed = [
+            linear.predict(WHEEL, 1e3 * x[0], x[1], k, theta_1, i, w, shift=shifted)
+            for theta_1, i, w, shifted in conditions
+        ]
         torque = (np.array([p.torque for p in closed]) - solved.forces.torque) / 0.05
         pull = (np.array([p.drawbar_pull for p in closed]) - solved.forces.drawbar_pull) / 0.5
         return np.concatenate((torque, pull))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tools.diagnose.result import Diagnosis, Scatter, SoilFit, Trace
+from tools.diagnose.result import Diagnosis, Hypothesis, Scatter, SoilFit, Trace
 from tools.report import figures, hypotheses, redo, tables
 from tools.report.html import Child, Markup, page, section, table, tag
 from tools.report.words import (
@@ -76,7 +76,7 @@ def paragraph(*content: Child) -> Markup:
 
 def _verdict(found: Diagnosis) -> Markup:
     name, meaning = VERDICTS[found.verdict]
-    effects = [name_of(h.effect) for h in found.accepted]
+    effects = [_or_alike(h) for h in found.accepted]
     title = f"{name}: {listed(effects)}" if found.verdict == "explained" and effects else name
     runs = {trace.run for trace in found.traces}
     return tag(
@@ -96,6 +96,19 @@ def explanation(found: Diagnosis) -> str:
     return "the empirical law" if found.law else "it"
 
 
+def _or_alike(h: Hypothesis) -> str:
+    """An effect's name, and how many others the recordings cannot tell it from."""
+    others = len(h.indistinguishable_from)
+    rivals = f" or {name_of(h.indistinguishable_from[0])}" if others == 1 else f" or one of {others} like it"
+    return name_of(h.effect) + (rivals if others else "")
+
+
+def _together(found: Diagnosis, h: Hypothesis) -> float:
+    """Probability that it is this effect or one like it."""
+    group = {h.effect, *h.indistinguishable_from}
+    return min(sum(other.probability for other in found.hypotheses if other.effect in group), 1.0)
+
+
 def _figure(term: str, value: str, detail: str) -> Markup:
     return tag(
         "div", tag("dt", term), tag("dd", held(value)), tag("dd", held(detail), class_="detail") if detail else None
@@ -108,8 +121,10 @@ def _figures(found: Diagnosis) -> Iterator[tuple[str, str, str]]:
     alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
     yield "evidence of a mismatch", nats(test.statistic), alarm
     for h in found.accepted:
-        said = ", ".join(f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items())
-        yield name_of(h.effect), f"{percent(h.probability)} probable", said
+        said = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
+        if h.indistinguishable_from:
+            said.append(f"together with its like {percent(_together(found, h))}")
+        yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(said)
     channel = _most_improved(found)
     if channel:
         change, floor = _change(found, channel)

@@ -12,11 +12,16 @@ from pathlib import Path
 
 from estimator import config, effects
 from estimator.recording import versions
+from estimator.salvage import Recording
+from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser
 from tools.diagnose.apply import applied
 from tools.diagnose.engine import diagnose
-from tools.diagnose.load import load, sha256
+from tools.diagnose.drive_rig import RATE as DRIVE_RATE
+from tools.diagnose.drive_rig import DriveRig
+from tools.diagnose.load import drive_series, is_drive, read_all, sha256, signals
 from tools.diagnose.result import Diagnosis
+from tools.diagnose.rig import Rig
 from tools.diagnose.wheel_rig import WheelRig
 
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))  # all runs together up to so long [s]: grid [Hz]
@@ -45,11 +50,8 @@ def of_files(
     files: Sequence[Path], configuration: config.Configuration, seed: int, step: object = None
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
-    rough = load(files, configuration.settings, FIRST)
-    length = sum(float(s.time[-1]) for s in rough)
-    rate = next(hertz for limit, hertz in RATES if length <= limit)
-    signals = load(files, configuration.settings, rate)
-    rig = WheelRig(signals, configuration.settings)
+    recordings = read_all(files)
+    rig, rate = _rig(recordings, configuration.settings)
     if not rig.channels:
         raise CommandError(f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED)
     redo = {
@@ -61,7 +63,17 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None)
-    return found, [f"{s.path}: {line}" for s in signals for line in s.damage]
+    return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
+
+
+def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:
+    """The adapter that fits the recordings, and its grid [Hz]."""
+    if is_drive(recordings):
+        series = [drive_series(r, settings) for r in recordings]
+        return DriveRig(series, [r.run.name or r.path.stem for r in recordings], settings), DRIVE_RATE
+    length = sum(float(signals(r, settings, FIRST).time[-1]) for r in recordings)
+    rate = next(hertz for limit, hertz in RATES if length <= limit)
+    return WheelRig([signals(r, settings, rate) for r in recordings], settings), rate
 
 
 def _parser() -> argparse.ArgumentParser:

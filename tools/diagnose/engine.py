@@ -14,7 +14,7 @@ from tools.diagnose.decide import Decision, decide
 from tools.diagnose.experiment import next_experiment
 from tools.diagnose.fit import Fitted
 from tools.diagnose.heldout import Held
-from tools.diagnose.prepare import Prepared, prepare
+from tools.diagnose.prepare import prepare
 from tools.diagnose.result import Diagnosis, Fit, Hypothesis, Quantity, SoilFit, Test
 from tools.diagnose.rig import Rig
 from tools.diagnose.screen import LEVEL
@@ -33,12 +33,11 @@ def diagnose(rig: Rig, seed: int = 0, redo: Mapping[str, Any] | None = None, ste
     run(search, Model(prepared.base, (), 0.0), step)
     decision = decide(search)
     step("holding out runs and conditions")
-    return _said(rig, search, decision, prepared, redo or {}, seed)
+    return said(rig, search, decision, redo or {}, seed)
 
 
-def _said(
-    rig: Rig, search: Search, decision: Decision, prepared: Prepared, redo: Mapping[str, Any], seed: int
-) -> Diagnosis:
+def said(rig: Rig, search: Search, decision: Decision, redo: Mapping[str, Any], seed: int) -> Diagnosis:
+    """The result object of a search that was decided."""
     stack = search.problem.stack
     base = search.models[0]
     found = search.screens[()]
@@ -84,7 +83,7 @@ def _hypotheses(search: Search, decision: Decision, folds: list[Any], conditions
                 effect=name,
                 probability=probability,
                 heldout_gain_nats=_gain(before, best, (folds, conditions)) if best else 0.0,
-                parameters=parameters(best.fitted, name) if best else {},
+                parameters=parameters(search.problem.stack.rig, best.fitted, name) if best else {},
                 indistinguishable_from=alike,
                 accepted=accepted,
                 sentence=EFFECTS[name].sentence(),
@@ -117,12 +116,13 @@ def _gain(before: list[Held], model: Model, folds: tuple[list[Any], list[Any]]) 
     return min(gains, default=0.0)
 
 
-def parameters(fitted: Fitted, name: str) -> dict[str, Quantity]:
+def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
+    """Fitted values of an effect, in what its units mean for the rig."""
     sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
     return {
-        f.parameter.name: Quantity(f.value(float(x)), float(s) * f.parameter.sigma, f.parameter.unit)
+        p.name: Quantity(f.value(float(x)) * rig.stated(p.unit), float(s) * p.sigma * rig.stated(p.unit), p.unit)
         for f, x, s in zip(fitted.free, fitted.x, sigma, strict=False)
-        if f.name == name
+        if f.name == name and (p := f.parameter)
     }
 
 

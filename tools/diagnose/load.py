@@ -17,12 +17,16 @@ from estimator.recording import RunInfo
 from estimator.salvage import Recording, read
 from estimator.settings import Calibration, Channel, Settings
 from estimator.terramechanics.soil import Array
+from tools.diagnose.rig import Index
 from tools.command import DAMAGED, USAGE, CommandError
 
 NS = 1e-9
 LEAST = 0.3  # share of the usual number of readings below which an interval is not used
 OUTLIER = 6.0  # [σ] from the interval's mean: one such reading is left out
 REACH = 1  # intervals to either side over which an encoder's slope is fitted
+
+
+Series = tuple[Array, Array]  # times [s] in order, and values
 
 
 @dataclass(frozen=True)
@@ -42,9 +46,23 @@ class Signals:
     damage: tuple[str, ...]
 
 
-def load(paths: Sequence[Path], settings: Settings, rate: float) -> list[Signals]:
-    """Each recording on a grid of `rate` [Hz]. Raises CommandError."""
-    return [signals(_read(path), settings, rate) for path in paths]
+def read_all(paths: Sequence[Path]) -> list[Recording]:
+    """Raises CommandError, one line, for a file that cannot be read."""
+    return [_read(path) for path in paths]
+
+
+def is_drive(recordings: Sequence[Recording]) -> bool:
+    """A motor drive: it turns, and no carriage moves."""
+    return not any(r.counts["/raw/carriage_encoder"] for r in recordings)
+
+
+def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
+    """Position and current of a drive, as read. Raises CommandError."""
+    found = {name: _series(recording, settings.channels[name]) for name in ("wheel_encoder", "motor_shunt")}
+    for name, (time, _) in found.items():
+        if time.size < 100:
+            raise CommandError(f"{recording.path}: found {time.size} readings of {name}; expected a drive's", DAMAGED)
+    return found
 
 
 def sha256(path: Path) -> str:
@@ -96,8 +114,8 @@ _NONE = (np.zeros(0), np.zeros(0))
 
 
 def _analogue(
-    recording: Recording, settings: Settings, series: dict[str, tuple[Array, Array]]
-) -> dict[str, tuple[Array, Array]]:
+    recording: Recording, settings: Settings, series: dict[str, Series]
+) -> dict[str, Series]:
     names = {"sinkage_pot": "sinkage", "motor_shunt": "current", "motor_temperature": "temperature"}
     found = {names[name]: series[name] for name in names if name in series and series[name][0].size}
     wrench = settings.wrench
@@ -115,7 +133,7 @@ def _analogue(
     return found | {name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()}
 
 
-def _series(recording: Recording, channel: Channel) -> tuple[Array, Array]:
+def _series(recording: Recording, channel: Channel) -> Series:
     """Times [s] and physical values of a channel in order of time, readings out of range left out."""
     rows = recording.arrays(f"/raw/{channel.name}")
     if not rows.size:
@@ -131,7 +149,7 @@ def physical(raw: Array, calibration: Calibration) -> Array:
     return np.asarray(raw * calibration.scale.value + calibration.offset.value, dtype=float)
 
 
-def _ordered(time: Array, values: Array) -> tuple[Array, Array]:
+def _ordered(time: Array, values: Array) -> Series:
     order = np.argsort(time, kind="stable")
     return time[order], values[order]
 
@@ -153,7 +171,7 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
     return mean + np.where(np.isfinite(drift), drift * early, 0.0)
 
 
-def _mean(block: Array, values: Array, n: int) -> tuple[Array, Array]:
+def _mean(block: Index, values: Array, n: int) -> tuple[Array, Array]:
     count = np.bincount(block, minlength=n).astype(float)
     return np.bincount(block, weights=values, minlength=n) / np.maximum(count, 1.0), count
 
@@ -164,7 +182,7 @@ def slope(time: Array, values: Array, edges: Array) -> tuple[Array, Array]:
     block = np.searchsorted(edges, time, side="right") - 1
     inside = (block >= 0) & (block < n)
     block, t, y = block[inside], time[inside] - edges[0], values[inside]
-    sums = [_spread(np.bincount(block, weights=w, minlength=n)) for w in (np.ones(t.size), t, t * t, y, t * y)]
+    sums = [_spread(np.bincount(block, weights=w, minlength=n).astype(float)) for w in (np.ones(t.size), t, t * t, y, t * y)]
     s0, s1, s2, y0, y1 = sums
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = (s0 * y1 - s1 * y0) / (s0 * s2 - s1 * s1)

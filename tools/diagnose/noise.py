@@ -16,6 +16,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
+from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from estimator.terramechanics.soil import Array
@@ -83,6 +84,18 @@ def blur(stack: Stack, predicted: Array) -> Array:
     return BLUR * near
 
 
+SPIKE = 6.0  # [σ] from the median of its neighbours: such a value counts as much less certain
+NEIGHBOURS = 5
+
+
+def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) how far a single value stands off its neighbours, where that is beyond SPIKE; else 0."""
+    residual = stack.measured - predicted
+    off = np.abs(residual - median_filter(residual, NEIGHBOURS, mode="nearest"))
+    sigma = np.array([c.sigma for c in colours])[stack.channel]
+    return np.where(off > SPIKE * sigma, off, 0.0)
+
+
 def first_guess(stack: Stack, predicted: Array) -> Noise:
     """White noise from the differences between neighbours, which a slow misfit hardly touches."""
     residual, colours = stack.measured - predicted, []
@@ -91,7 +104,8 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         step = np.diff(residual, prepend=0.0)[inside]
         sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
-    return Noise(stack, tuple(colours), tuple((c,) for c in colours), blur(stack, predicted))
+    loose = np.hypot(blur(stack, predicted), spikes(stack, predicted, colours))
+    return Noise(stack, tuple(colours), tuple((c,) for c in colours), loose)
 
 
 def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np.random.Generator) -> Noise:
@@ -101,7 +115,9 @@ def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np
         _fit_channel(stack, channel, stack.measured - predicted, saturated, steady & stack.of(channel), rng)
         for channel in stack.rig.channels
     ]
-    return Noise(stack, tuple(f[0] for f in found), tuple(f[1:] for f in found), blur(stack, predicted))
+    colours = tuple(f[0] for f in found)
+    loose = np.hypot(blur(stack, predicted), spikes(stack, predicted, colours))
+    return Noise(stack, colours, tuple(f[1:] for f in found), loose)
 
 
 def _fit_channel(

@@ -61,17 +61,38 @@ class Run:
 class Rig(Protocol):
     """The adapter."""
 
-    runs: Sequence[Run]
-    channels: tuple[str, ...]
-    units: Mapping[str, str]  # of channels and covariates
-    constants: tuple[Known, ...]
-    effects: Mapping[str, type[Effect]]  # candidates
-    baseline: tuple[Effect, ...]  # effects of the configuration: the model already has them
-    smooth: tuple[tuple[str, ...], ...]  # covariates, alone or multiplied, on which a smooth misfit may depend
     caveats: list[str]
+
+    @property
+    def runs(self) -> Sequence[Run]: ...
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of channels and covariates."""
+
+    @property
+    def constants(self) -> tuple[Known, ...]: ...
+
+    @property
+    def effects(self) -> Mapping[str, type[Effect]]:
+        """The candidates."""
+
+    @property
+    def baseline(self) -> tuple[Effect, ...]:
+        """Effects of the configuration: the model has them already."""
+
+    @property
+    def smooth(self) -> tuple[tuple[str, ...], ...]:
+        """Covariates, alone or multiplied, on which a smooth misfit may depend."""
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         """Every channel of every run, for constants u (in prior σ) and effects beyond the baseline."""
+
+    def stated(self, unit: str) -> float:
+        """Factor from a parameter of the library in this unit to what it means for this rig."""
 
 
 class Stack:

@@ -18,7 +18,7 @@ from tools.diagnose.evidence import Base, Signature, log_evidence
 from tools.diagnose.noise import Noise, surrogates, whiten
 
 LEVEL = 0.01  # false alarms aimed at, half of what is allowed
-NULLS = 400
+NULLS = 300
 LEAST = 2.0  # [nats] no evidence below this is an alarm, however quiet the nulls
 
 
@@ -36,6 +36,7 @@ class Screen:
 
     evidence: dict[str, float]
     best: dict[str, Whitened]
+    shapes: dict[str, list[dict[str, float]]]  # of each name, the most likely first
     nulls: Array  # (draws,) the largest of all names
 
     @property
@@ -80,7 +81,7 @@ def noise_draws(noise: Noise, size: int, rng: np.random.Generator) -> tuple[Arra
 def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array]) -> Screen:
     """Evidence of each name (averaged over its shapes) and its largest in every null."""
     if not signatures:
-        return Screen({"none": 0.0}, {}, np.zeros(2))
+        return Screen({"none": 0.0}, {}, {}, np.zeros(2))
     columns = np.column_stack([s.columns for s in signatures])
     a, b = base.projected(columns)
     null_b = base.scores(columns, *draws)
@@ -91,9 +92,11 @@ def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array
         both = np.column_stack((b[own], null_b[own]))
         value = log_evidence(a[own, own], both, s.signature.sign)
         found.setdefault(s.signature.name, []).append((float(value[0]), value[1:], s))
-    evidence, best, nulls = {}, {}, []
+    evidence, best, order, nulls = {}, {}, {}, []
     for name, shapes in found.items():
+        shapes.sort(key=lambda item: -item[0])
+        order[name] = [s.signature.shape for _, _, s in shapes]
         evidence[name] = float(logsumexp([v for v, _, _ in shapes]) - np.log(len(shapes)))
-        best[name] = max(shapes, key=lambda item: item[0])[2]
+        best[name] = shapes[0][2]
         nulls.append(logsumexp(np.stack([n for _, n, _ in shapes]), axis=0) - np.log(len(shapes)))
-    return Screen(evidence, best, np.max(nulls, axis=0))
+    return Screen(evidence, best, order, np.max(nulls, axis=0))

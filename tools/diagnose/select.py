@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from estimator.effects.base import Effect
 from estimator.terramechanics.soil import Array
-from tools.diagnose.evidence import Signature
+from tools.diagnose.evidence import Base, Signature
 from tools.diagnose.fit import Fitted, Free, Problem, free_of
 from tools.diagnose.screen import Screen, Whitened, screen, whitened
 from tools.diagnose.signatures import shape_grid, signature, strengths
@@ -19,6 +19,9 @@ MOST = 9  # effects fitted at the first step
 PAIRS = 2  # first effects from which a second step starts
 SECOND = 5  # effects fitted at each further step
 STEPS = 3  # effects at most
+AGAIN = 4  # shapes of an effect that a later screen tries
+QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
+HOPELESS = 12.0  # [nats] behind the best after the first fit
 PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
 
 
@@ -52,11 +55,10 @@ class Search:
         return any(set(m.names) == set(names) for m in self.models)
 
 
-def rescreen(search: Search, model: Model, names: list[str] | None = None) -> Screen:
+def rescreen(search: Search, model: Model) -> Screen:
     """Evidence for one more effect, and for a smooth misfit, on top of a model."""
-    stack, fitted = search.problem.stack, model.fitted
-    signatures = list(_beside(search, model, names))
-    base = fitted.base()
+    base = model.fitted.base()
+    signatures = list(_beside(search, model))
     ready = whitened(search.problem.noise, [*signatures, *search.generics])
     noise, strain = search.draws
     found = screen(base, ready, (noise, _resized(strain, base)))
@@ -64,18 +66,18 @@ def rescreen(search: Search, model: Model, names: list[str] | None = None) -> Sc
     return found
 
 
-def _beside(search: Search, model: Model, names: list[str] | None) -> list[Signature]:
+def _beside(search: Search, model: Model) -> Iterator[Signature]:
+    """Signatures about the model's fit: of all shapes at the first screen, later of those that were likeliest there."""
     stack, fitted = search.problem.stack, model.fitted
-    acting = fitted.acting
-    found = []
+    first = search.screens.get(())
     for name, effect in stack.rig.effects.items():
-        if name in model.names or (names is not None and name not in names):
+        if name in model.names:
             continue
-        for shape in shape_grid(stack.rig, effect):
-            made = signature(stack, fitted.u, fitted.predicted, effect, shape, acting)
+        shapes = list(shape_grid(stack.rig, effect)) if first is None else first.shapes.get(name, [])[:AGAIN]
+        for shape in shapes:
+            made = signature(stack, fitted.u, fitted.predicted, effect, shape, fitted.acting)
             if made is not None:
-                found.append(made)
-    return found
+                yield made
 
 
 def _resized(strain: Array, base: Base) -> Array:
@@ -97,30 +99,32 @@ def likely(found: Screen, names: Sequence[str], most: int) -> list[str]:
 
 
 def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model]:
-    """Fits of the model with one more effect each."""
-    made = []
+    """Fits of the model with one more effect each; those that may win are fitted to the end."""
     effects = search.problem.stack.rig.effects
-    for name in likely(found, list(effects), most):
-        names = (*model.names, name)
-        if not search.has(names):
-            made.append(_fitted(search, model, effects[name], found.best[name]))
+    names = [n for n in likely(found, list(effects), most) if not search.has((*model.names, n))]
+    made = [_fitted(search, model, effects[name], found.best[name]) for name in names]
+    if made:
+        top = max(max(m.evidence for m in made), search.best().evidence)
+        made = [_finished(search.problem, m) if m.evidence > top - HOPELESS else m for m in made]
     search.models += made
     return made
 
 
+def _finished(problem: Problem, model: Model) -> Model:
+    f = model.fitted
+    return replace(model, fitted=problem.descend(f.effects, f.free, f.u, f.x, THOROUGH))
+
+
 def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) -> Model:
     """One more effect, started at its linear estimate."""
-    base = model.fitted.base()
-    a, b = base.projected(best.columns)
+    a, b = model.fitted.base().projected(best.columns)
     amplitude = np.linalg.solve(a + 0.1 * np.eye(len(b)), b)
     amplitude = np.where(np.array(best.signature.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
-    free = (*model.fitted.free, *free_of((effect,)))
-    x = np.concatenate(
-        (model.fitted.x, _start(free[len(model.fitted.free) :], effect, amplitude, best.signature.shape))
-    )
-    fitted = search.problem.descend((*model.fitted.effects, effect), free, model.fitted.u, x)
-    names = (*model.names, effect.name)
-    return Model(fitted, names, model.log_prior + (PAIR_PRIOR if model.names else 0.0))
+    more = free_of((effect,))
+    x = np.concatenate((model.fitted.x, _start(more, effect, amplitude, best.signature.shape)))
+    effects, free = (*model.fitted.effects, effect), (*model.fitted.free, *more)
+    fitted = search.problem.descend(effects, free, model.fitted.u, x, QUICK)
+    return Model(fitted, (*model.names, effect.name), model.log_prior + (PAIR_PRIOR if model.names else 0.0))
 
 
 def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: dict[str, float]) -> Array:
@@ -143,7 +147,7 @@ def run(search: Search, first: Model, step: Callable[[str], None] = lambda _: No
     extend(search, first, found, MOST)
     for size in range(1, STEPS):
         here = sorted((m for m in search.models if len(m.names) == size), key=lambda m: -m.evidence)
-        here = [m for m in here[:PAIRS] if m.evidence > search.best().evidence - 20.0]
+        here = [m for m in here[:PAIRS] if m.evidence > search.best().evidence - HOPELESS]
         if not here:
             return
         for model in here:

@@ -14,6 +14,7 @@ from tools.diagnose.rig import Rig, Stack
 
 HIGHEST_ORDER = 200.0  # ripples a turn
 NYQUIST = 0.35  # of the grid's rate: faster ripples are damped too much by the averaging
+TURNS = 1.5  # ripples a run must hold to be told from a trend
 ORDERS = 120  # at most
 RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
 
@@ -91,5 +92,7 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
     highest = NYQUIST * rate * 2.0 * np.pi / max(float(np.quantile(turning, 0.8)), 1e-6)
     top = min(parameter.high, HIGHEST_ORDER, highest)
-    whole = np.arange(np.ceil(parameter.low), np.floor(top) + 1.0)
-    return whole[:: max(1, -(-len(whole) // ORDERS))].tolist() or [parameter.low]
+    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
+    least = max(parameter.low, TURNS / max(turned, 1e-6))
+    whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
+    return whole[:: max(1, -(-len(whole) // ORDERS))].tolist()

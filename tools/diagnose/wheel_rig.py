@@ -20,6 +20,7 @@ from tools.diagnose.rig import Bools, Known, Run
 from tools.diagnose.weights import weights_of
 
 ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
+EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
 CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
 SETTLING = 0.5  # [s] after the wheel starts, before the comparison counts
@@ -141,6 +142,9 @@ class WheelRig:
     def _constant(self) -> float:
         return self.settings.drive.torque_constant.value
 
+    def stated(self, unit: str) -> float:
+        return 1.0
+
     def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
         """Channels under a proposed experiment (see proposals.py), for constants and effects as fitted."""
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
@@ -178,6 +182,7 @@ class WheelRig:
         driving, resting, lifted = _states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
         known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
+        known[:EDGE] = known[-EDGE:] = False
         used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
         return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
 

@@ -1,0 +1,228 @@
+"""`python -m tools.diagnose.trials`: the diagnosis on fresh cases of our own simulator, scored against their truth.
+
+Strengths are three to five (strangers: eight to fifteen) times the detection limit: the strength whose whitened signature, soil and calibration
+projected out, has a squared length of 16 (four standard deviations) in the drawn campaign. An effect whose limit lies
+beyond three times its expected size cannot be seen in that campaign; another campaign is drawn for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from config import packaged
+from estimator import config, effects
+from estimator.effects import EFFECTS
+from estimator.effects.base import Effect
+from tools.diagnose import heldout
+from tools.diagnose.cases import Plan, draw, record, scaled
+from tools.diagnose.decide import decide
+from tools.diagnose.engine import said
+from tools.diagnose.fit import free_of
+from tools.diagnose.prepare import Prepared, prepare
+from tools.diagnose.result import Diagnosis
+from tools.diagnose.score import table
+from tools.diagnose.select import Model, Search, run
+from tools.diagnose.strangers import STRANGERS
+from tools.diagnose.wheel_rig import WheelRig
+
+LIMIT = 16.0  # squared length of a signature at the detection limit
+STRONG, STRANGE = (3.0, 5.0), (8.0, 15.0)  # times the limit; a stranger that a listed effect mimics must show as well
+LARGEST = 3.0  # expected sizes
+DRAWS = 6  # campaigns tried for an effect
+PAIRS = (("coulomb_friction", "slip_sinkage"), ("bulldozing", "viscous_friction"), ("rear_contact", "current_offset"))
+LISTED = tuple(n for n, e in EFFECTS.items() if not e.filter_only and n != "empirical_law")
+
+
+@dataclass(frozen=True)
+class Case:
+    stratum: str  # none, effect, pair, unlisted
+    truth: tuple[str, ...]
+    seed: int
+
+
+def cases(count: int, seed: int, only: Sequence[str] = ()) -> Iterator[Case]:
+    """A quarter without effect, then the effects in turn, pairs and strangers."""
+    rng = np.random.default_rng(seed)
+    for number in range(count):
+        stratum = ("none", "effect", "effect", "effect", "unlisted", "effect", "none", "pair")[number % 8]
+        truth: tuple[str, ...] = ()
+        if stratum == "effect":
+            truth = (LISTED[int(rng.integers(len(LISTED)))],)
+        elif stratum == "unlisted":
+            truth = (STRANGERS[int(rng.integers(len(STRANGERS)))].__name__,)
+        elif stratum == "pair":
+            truth = PAIRS[int(rng.integers(len(PAIRS)))]
+        if only and stratum not in only and not set(only) & set(truth):
+            continue
+        yield Case(stratum, truth, int(rng.integers(1 << 31)))
+
+
+def trial(case: Case) -> dict[str, Any]:
+    """One case, from drawing to score; an error is a result too."""
+    warnings.simplefilter("ignore", RuntimeWarning)
+    began = time.perf_counter()
+    try:
+        scored = _trial(case)
+    except Exception as error:
+        scored = {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
+    return {"stratum": case.stratum, "truth": list(case.truth), "seed": case.seed, **scored} | {
+        "seconds": time.perf_counter() - began
+    }
+
+
+def _trial(case: Case) -> dict[str, Any]:
+    rng = np.random.default_rng(case.seed)
+    settings = config.load(packaged(), effects.units).settings
+    types = [EFFECTS.get(n) or next(s for s in STRANGERS if s.__name__ == n) for n in case.truth]
+    drawn = _drawn(settings, types, rng)
+    if drawn is None:
+        return {"skipped": True}
+    plan, acting = drawn
+    rig = WheelRig(record(plan, acting), plan.settings)
+    prepared = prepare(rig, np.random.default_rng(0))
+    search = Search(prepared.problem, prepared.generics, prepared.draws)
+    run(search, Model(prepared.base, (), 0.0))
+    found = said(rig, search, decide(search), {}, 0)
+    return _scored(case, plan, acting, found) | _oracle(case, types, acting, search, found)
+
+
+def _drawn(settings: Any, types: list[type[Effect]], rng: np.random.Generator) -> tuple[Plan, list[Effect]] | None:
+    for _ in range(DRAWS):
+        plan = draw(settings, rng)
+        if not types:
+            return plan, []
+        prepared = prepare(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
+        span = STRANGE if types[0] in STRANGERS else STRONG
+        acting = [_strong(prepared, t, span, rng) for t in types]
+        if all(a is not None for a in acting):
+            return plan, [a for a in acting if a is not None]
+    return None
+
+
+def _strong(
+    prepared: Prepared, effect: type[Effect], span: tuple[float, float], rng: np.random.Generator
+) -> Effect | None:
+    """The effect at three to five times its detection limit in this campaign."""
+    trial = scaled(effect, 0.5, rng)
+    limit = _limit(prepared, trial)
+    if limit is None:
+        return None
+    size = limit * rng.uniform(*span)
+    if size > LARGEST:
+        return None
+    values = {
+        p.name: float(np.clip(p.off + (getattr(trial, p.name) - p.off) * size / 0.5, p.low, p.high))
+        for p in effect.parameters()
+        if p.role == "strength"
+    }
+    return replace(trial, **values)
+
+
+def _limit(prepared: Prepared, at: Effect) -> float | None:
+    """Size, in expected strengths, at which the projected signature has a squared length of LIMIT."""
+    stack, base = prepared.problem.stack, prepared.base
+    change = stack.predict(base.u, (at,)) - base.predicted
+    if not np.isfinite(change).all() or not np.abs(change).any():
+        return None
+    column = prepared.problem.noise.whitener @ change[:, None]
+    squared = float(base.base().projected(column)[0][0, 0])
+    return 0.5 * float(np.sqrt(LIMIT / squared)) if squared > 1e-9 else None
+
+
+def _scored(case: Case, plan: Plan, acting: Sequence[Effect], found: Diagnosis) -> dict[str, Any]:
+    true = {"c": float(np.mean(plan.soil.cohesion)), "tan_phi": float(np.mean(plan.soil.tan_phi))}
+    soil = found.soil
+    assert soil is not None
+    return {
+        "acting": [str(a) for a in acting],
+        "verdict": found.verdict,
+        "first": found.hypotheses[0].effect if found.hypotheses else None,
+        "accepted": [h.effect for h in found.accepted],
+        "groups": {h.effect: list(h.indistinguishable_from) for h in found.hypotheses},
+        "ranking": [h.effect for h in found.hypotheses],
+        "probability": {h.effect: h.probability for h in found.hypotheses},
+        "p": found.test.p,
+        "alarm": found.test.name,
+        "statistic": found.test.statistic,
+        "threshold": found.test.threshold,
+        "soil": {
+            n: [true[n], soil.before[n].value, soil.before[n].sigma, soil.after[n].value, soil.after[n].sigma]
+            for n in true
+        },
+        "prior_sigma": {n: soil.prior[n].sigma for n in true},
+        "channels": list(found.fit.unit),
+        "slow": [plan.slow, plan.slow_time],
+        "summary": found.summary,
+        "remaining": found.remaining,
+        "law": found.law.expression if found.law else None,
+    }
+
+
+def _oracle(
+    case: Case, types: list[type[Effect]], acting: Sequence[Effect], search: Search, found: Diagnosis
+) -> dict[str, Any]:
+    """Held-out error over that of a fit that knows which effects are at work, mean over channels."""
+    if not types:
+        return {}
+    free = free_of(types)
+    truth = {a.name: a for a in acting} | {type(a).__name__: a for a in acting}
+    x = np.array([(getattr(truth[f.name], f.parameter.name, f.parameter.centre) - f.parameter.centre) / f.parameter.sigma
+                  for f in free]) if case.stratum != "unlisted" else np.zeros(0)  # fmt: skip
+    if case.stratum == "unlisted":
+        return {}
+    fitted = search.problem.descend(tuple(types), free, search.models[0].fitted.u, x)
+    stack = search.problem.stack
+    best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
+    gained = search.models[0].fitted.log_evidence
+    return {
+        "oracle": float(np.mean([found.fit.after[c] / best[c] for c in best])),
+        "before": float(np.mean([found.fit.before[c] / best[c] for c in best])),
+        "truth_gain": fitted.log_evidence - gained,
+        "best_gain": search.best().fitted.log_evidence - gained,
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tools.diagnose.trials", description=__doc__)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", nargs="*", default=[], help="strata or effects")
+    parser.add_argument("--out", type=Path, help="one JSON line a case")
+    arguments = parser.parse_args(argv)
+    chosen = list(cases(arguments.cases, arguments.seed, arguments.only))
+    results = []
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        for number, result in enumerate(pool.map(trial, chosen), 1):
+            results.append(result)
+            if arguments.out is not None:
+                with arguments.out.open("a", encoding="utf-8") as stream:
+                    stream.write(json.dumps(result) + "\n")
+            print(f"{number}/{len(chosen)} {_line(result)}", file=sys.stderr, flush=True)
+    print(table(results))
+    return 0
+
+
+def _line(result: dict[str, Any]) -> str:
+    if "verdict" not in result:
+        return f"{result['stratum']} {result['truth']}: {result.get('error', 'cannot be seen')}"
+    return (
+        f"{result['stratum']} {'+'.join(result['truth'])}: {result['verdict']} {result['accepted'] or result['first']}"
+        f" {[round(v, 2) for v in list(result['probability'].values())[:3]]} p {result['p']:.3f} {result['seconds']:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

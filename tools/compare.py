@@ -15,7 +15,7 @@ from estimator.terramechanics.soil import Array
 from tools.command import DONE, FAILED, CommandError, Parser
 from tools.diagnose import noise
 from tools.diagnose.fit import Fitted
-from tools.diagnose.load import load, sha256
+from tools.diagnose.load import read_all, sha256, signals
 from tools.diagnose.prepare import prepare
 from tools.diagnose.result import Quantity, SoilFit, Trace
 from tools.diagnose.rig import Stack
@@ -59,7 +59,7 @@ def compare(
 ) -> Comparison:
     """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing can be compared."""
     settings = configuration.settings
-    rig = WheelRig(load(paths, settings, RATE), settings)
+    rig = WheelRig([signals(recording, settings, RATE) for recording in read_all(paths)], settings)
     stack = Stack(rig)
     if stack.size == 0:
         raise CommandError(

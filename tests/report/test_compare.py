@@ -13,6 +13,7 @@ from tools import simulate
 from tools.command import CommandError
 from tools.compare import compare, main
 
+ODD = "<i>&$x_{"
 SCHEDULE = """
 ramp: 300 ms
 segments:
@@ -32,9 +33,9 @@ def run(folder: Path, name: str, load: float, *options: str) -> Path:
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Two runs in the configured soil."""
+    """Two runs in the configured soil, one of them with a name that tries to be markup and mathematics."""
     folder = tmp_path_factory.mktemp("plain")
-    return [run(folder, f"at {load:g} N", load, "--seed", f"{load:g}") for load in (45.0, 90.0)]
+    return [run(folder, name, load, "--seed", f"{load:g}") for name, load in (("at 45 N", 45.0), (ODD, 90.0))]
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def testbed() -> config.Configuration:
 
 def test_what_the_model_knows_is_off_by_noise_alone(plain: list[Path], testbed: config.Configuration) -> None:
     found = compare(plain, testbed, fitted=False)
-    assert found.runs == ["at 45 N", "at 90 N"] and found.soil is None
+    assert found.runs == ["at 45 N", ODD] and found.soil is None
     for channel, most in (("torque", 0.01), ("drawbar_pull", 0.3), ("sinkage", 1e-4)):
         for of in (None, *found.runs):
             assert 0.0 < found.rms(channel, of, "before") < most, (channel, of)
@@ -76,7 +77,8 @@ def test_command_prints_and_draws(plain: list[Path], tmp_path: Path, capsys: pyt
     assert lines[0].split()[:2] == ["run", "torque"] and "[mm]" in lines[0] and "all runs" in lines[3]
     assert any(line.startswith("cohesion c") and "1000 ± 300 Pa" in line for line in lines)
     root = ElementTree.fromstring(page.read_text(encoding="utf-8").removeprefix("<!DOCTYPE html>"))
-    assert "gritd compare" in "".join(root.itertext()) and len(list(root.iter("figure"))) >= 4
+    assert "gritd compare" in "".join(root.itertext()) and ODD in "".join(root.itertext())
+    assert len(list(root.iter("figure"))) >= 4
     assert sheet.read_bytes().startswith(b"\x89PNG")
 
 

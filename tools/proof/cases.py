@@ -15,6 +15,8 @@ from tools.proof.plant.respond import World
 from tools.proof.strata import LEVELS, Assignment
 
 ATTEMPTS = 25  # campaigns tried until one shows the effect as strongly as wanted
+COMPARED = ("single", "absorbed", "confounded")
+CHANNELS = {"sinkage": "sinkage", "current": "torque", "pull": "drawbar_pull", "load": "load", "torque": "axle_torque"}
 HEAVIEST = 400.0  # [N]
 WRONG_NOISE = {True: 0.5, False: 0.3}  # share of cases without and with an effect whose stated noise is off by two
 
@@ -33,6 +35,7 @@ class Case:
     detectability: float  # D of all concealed effects together
     single: tuple[float, ...]  # D of each
     inseparable: dict[str, float]  # rivals that this campaign cannot tell from the (only) effect, with what D is left
+    oracle_variance: dict[str, float]  # what fitting adds to a held-out error, by the diagnosis' channels [SI²]
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -52,6 +55,7 @@ class Case:
             "detectability_single": list(self.single),
             "detection_limit": detect.LIMIT,
             "inseparable": self.inseparable,
+            "oracle_variance": self.oracle_variance,
             "concealed": [{"name": e.name, **asdict(e), "coinciding": e.coinciding()} for e in self.effects],
             "soil_family": self.family,
             "soil": {name: float(value) for name, value in asdict(ground).items()},
@@ -75,7 +79,7 @@ def drawn(number: int, seed: int, assignment: Assignment) -> Case:
         if min(best.single, default=wanted) > 0.9 * wanted:
             break
     assert best is not None
-    return _compared(best, rng) if len(best.effects) == 1 and assignment.stratum != "unlisted" else best
+    return _judged(best, rng)
 
 
 def _attempt(number: int, seed: int, assignment: Assignment, wanted: float, rng: np.random.Generator) -> Case:
@@ -84,7 +88,7 @@ def _attempt(number: int, seed: int, assignment: Assignment, wanted: float, rng:
     detector = Detector(trial)
     facts = detector.facts()
     made = [(LISTED | UNLISTED)[name].drawn(rng, facts) for name in assignment.effects]
-    fitted = [detect.scaled(detector, effect, wanted) for effect in made]
+    fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
     effects = tuple(effect for effect, _ in fitted)
     return Case(
         number=number,
@@ -97,6 +101,7 @@ def _attempt(number: int, seed: int, assignment: Assignment, wanted: float, rng:
         detectability=detector.detectability(effects) if effects else 0.0,
         single=tuple(found for _, found in fitted),
         inseparable={},
+        oracle_variance={},
     )
 
 
@@ -131,13 +136,21 @@ def _noise_factor(nothing: bool, rng: np.random.Generator) -> float:
     return float(rng.choice((0.5, 2.0))) if rng.random() < WRONG_NOISE[nothing] else 1.0
 
 
-def _compared(case: Case, rng: np.random.Generator) -> Case:
-    """With the rivals that this campaign cannot tell from the concealed effect."""
+def _judged(case: Case, rng: np.random.Generator) -> Case:
+    """With the oracle's error, and the rivals that this campaign cannot tell from a single listed effect."""
     detector = Detector(case.trial)
+    added = detector.refit_variance(case.effects)
+    unit = {"current": case.trial.known.torque_constant.value**2}
+    variance = {CHANNELS[name]: unit.get(name, 1.0) * value for name, value in added.items()}
+    rivals = _rivals(case, detector, rng) if case.assignment.stratum in COMPARED else {}
+    return replace(case, oracle_variance=variance, inseparable=rivals)
+
+
+def _rivals(case: Case, detector: Detector, rng: np.random.Generator) -> dict[str, float]:
     change = detector.change(case.effects)
     left = {
         name: detector.beside(change, detector.rivals(rival, rng))
         for name, rival in LISTED.items()
         if name != case.effects[0].name
     }
-    return replace(case, inseparable={name: d for name, d in left.items() if d < detect.NEAR})
+    return {name: d for name, d in left.items() if d < detect.NEAR}

@@ -48,6 +48,9 @@ class Trial:
         return self.chain.wrench is not None
 
 
+Signals = list[dict[str, Array]]  # a dict of channels for every run, SI
+
+
 class Detector:
     """What one campaign can see."""
 
@@ -57,9 +60,9 @@ class Detector:
         bare = replace(trial.world, effects=())
         self._bare = [respond(bare, motion, damped=False) for motion in self._motions]
         self._roots = [_roots(trial, felt) for felt in self._bare]
-        columns = np.stack([*self._soil_columns(), *self._calibration_columns()], axis=1)
-        self._columns = columns
-        self._factor = np.linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]))
+        self._nuisance = [*self._soil(), *self._weights(), *self._calibration()]
+        self._columns = np.stack([self._whitened(column) for column in self._nuisance], axis=1)
+        self._factor = np.linalg.cholesky(self._columns.T @ self._columns + np.eye(self._columns.shape[1]))
 
     def facts(self) -> Facts:
         """Typical figures of the campaign."""
@@ -86,12 +89,7 @@ class Detector:
 
     def change(self, effects: Sequence[Effect]) -> Array:
         """What the effects change in all channels and runs, whitened (m,)."""
-        world = replace(self._trial.world, effects=tuple(effects))
-        parts = []
-        for motion, bare, roots in zip(self._motions, self._bare, self._roots, strict=True):
-            felt = respond(world, motion, damped=False)
-            parts.append(self._whitened(self._misfit(felt, bare), roots))
-        return np.concatenate(parts)
+        return self._whitened(self._changes(effects))
 
     def beside(self, change: Array, rivals: Array) -> float:
         """D that is left of a change when rivals (m, k) may imitate it at any strength."""
@@ -107,9 +105,49 @@ class Detector:
         drawn = [effect.drawn(rng, facts) for _ in range(count)]
         return np.stack([self.change([replace(e, strength=0.1 * e.strength)]) for e in drawn], axis=1)
 
+    def refit_variance(self, effects: Sequence[Effect]) -> dict[str, float]:
+        """What fitting adds to the error of a held-out run [SI²], by channel, expected, to first order.
+
+        The oracle knows the form of the effects. It fits their strengths, soil, weights and calibration to the other
+        runs (to the other two thirds of a single one) within what is stated of them.
+        """
+        columns = [*self._nuisance, *(self._strength(effects, place) for place in range(len(effects)))]
+        held = _held_out([motion.time.size for motion in self._motions])
+        sums: dict[str, list[Array]] = {}
+        for run, inside in held:
+            covariance = self._covariance(columns, run, inside)
+            for channel in self._roots[run]:
+                rows = np.stack([column[run][channel] for column in columns], axis=1)[inside]
+                sums.setdefault(channel, []).append(((rows @ covariance) * rows).sum(axis=1))
+        return {channel: float(np.concatenate(parts).mean()) for channel, parts in sums.items()}
+
+    # ---- parts -------------------------------------------------------------------------------------------------------
+
+    def _covariance(self, columns: Sequence[Signals], run: int, inside: Array) -> Array:
+        """Of the columns' amplitudes after a fit to everything but these samples of a run, unit priors."""
+        kept = []
+        for column in columns:
+            rest = [dict(signals) for signals in column]
+            rest[run] = {name: np.where(inside, 0.0, values) for name, values in column[run].items()}
+            kept.append(self._whitened(rest))
+        known = np.stack(kept, axis=1)
+        return np.asarray(np.linalg.inv(known.T @ known + np.eye(known.shape[1])), dtype=float)
+
+    def _strength(self, effects: Sequence[Effect], place: int) -> Signals:
+        """Change for a strength as much larger as it is large: its prior is as wide as itself."""
+        step = 0.05
+        moved = list(effects)
+        moved[place] = replace(effects[place], strength=effects[place].strength * (1.0 + step))
+        return _scaled(_less(self._changes(moved), self._changes(effects)), 1.0 / step)
+
     def _left(self, change: Array) -> float:
         shadow = self._columns.T @ change
         return float(change @ change - shadow @ cho_solve((self._factor, True), shadow))
+
+    def _changes(self, effects: Sequence[Effect]) -> Signals:
+        world = replace(self._trial.world, effects=tuple(effects))
+        felt = (respond(world, motion, damped=False) for motion in self._motions)
+        return [self._misfit(with_, bare) for with_, bare in zip(felt, self._bare, strict=True)]
 
     def _misfit(self, felt: Felt, bare: Felt) -> dict[str, Array]:
         """Read with the effect, less predicted without it from the motion and load that were read."""
@@ -122,51 +160,86 @@ class Detector:
             expected["load"] = bare.load  # the weights, not the load that was read
         return {name: read[name] - expected[name] for name in read}
 
-    @staticmethod
-    def _whitened(misfit: dict[str, Array], roots: dict[str, Array]) -> Array:
-        return np.concatenate([solve_triangular(roots[name], values, lower=True) for name, values in misfit.items()])
+    def _whitened(self, signals: Signals) -> Array:
+        return np.concatenate(
+            [
+                solve_triangular(roots[name], values, lower=True)
+                for run, roots in zip(signals, self._roots, strict=True)
+                for name, values in run.items()
+            ]
+        )
 
-    def _soil_columns(self) -> list[Array]:
-        ground, known = self._trial.world.ground, self._trial.known
-        moved = []
-        for name, stated in known.soil.items():
-            value = float(getattr(ground, name))
-            moved.append(self._column(replace(ground, **{name: value + SMALL * stated.sigma}), 0.0, 0.0) / SMALL)
-        share = known.weight_sigma / max(run.weight for run in self._trial.runs)
-        return [*moved, self._column(ground, SMALL * share, 0.0) / SMALL, self._column(ground, 0.0, 1e-4) / 0.2]
+    def _soil(self) -> list[Signals]:
+        """One sigma of each soil parameter."""
+        ground = self._trial.world.ground
+        moved = [
+            replace(ground, **{name: float(getattr(ground, name)) + SMALL * stated.sigma})
+            for name, stated in self._trial.known.soil.items()
+        ]
+        return [_scaled(self._moved(ground=other), 1.0 / SMALL) for other in moved]
 
-    def _column(self, ground: Ground, heavier: float, faster: float) -> Array:
-        """Change by another soil, heavier weights or a faster carriage (relative)."""
-        world = replace(self._trial.world, ground=ground, effects=())
-        parts = []
-        for motion, bare, roots in zip(self._motions, self._bare, self._roots, strict=True):
-            moved = replace(motion, weight=motion.weight * (1.0 + heavier), speed=motion.speed * (1.0 + faster))
-            felt, wrench = respond(world, moved, damped=False), self._trial.wrench
-            read, expected = channels(felt, wrench), channels(bare, wrench)
-            parts.append(self._whitened({name: read[name] - expected[name] for name in read}, roots))
-        return np.concatenate(parts)
+    def _weights(self) -> list[Signals]:
+        """One sigma of the weights, half of it alike in all runs, half each run's own; and of the carriage's travel."""
+        half = self._trial.known.weight_sigma / np.sqrt(2.0)
+        alike = _scaled(self._moved(heavier=SMALL * half), 1.0 / SMALL)
+        carriage = self._trial.known.instruments["carriage_encoder"].scale
+        faster = SMALL * carriage.sigma / carriage.value
+        return [alike, *_one_by_one(alike), _scaled(self._moved(faster=faster), 1.0 / SMALL)]
 
-    def _calibration_columns(self) -> list[Array]:
-        """Offset and gain of each channel, and the torque constant, at one sigma each."""
+    def _moved(self, ground: Ground | None = None, heavier: float = 0.0, faster: float = 0.0) -> Signals:
+        """Change by another soil, heavier weights [N] or a carriage that is faster by a share."""
+        trial = self._trial
+        world = replace(trial.world, ground=ground or trial.world.ground, effects=())
+        found = []
+        for motion in self._motions:
+            weight = motion.weight + heavier * (motion.weight > 1.0)
+            felt = respond(world, replace(motion, weight=weight, speed=motion.speed * (1.0 + faster)), damped=False)
+            found.append(channels(felt, trial.wrench))
+        return _less(found, [channels(bare, trial.wrench) for bare in self._bare])
+
+    def _calibration(self) -> list[Signals]:
+        """One sigma of offset and of gain of each channel, the torque constant's in the current's."""
         known, columns = self._trial.known, []
         for name in channels(self._bare[0], self._trial.wrench):
             said = known.instruments[INSTRUMENT[name]]
             gain = said.scale.sigma / abs(said.scale.value)
             if name == "current":
                 gain = float(np.hypot(gain, known.torque_constant.sigma / known.torque_constant.value))
-            columns.append(self._only(name, said.offset.sigma, 0.0))
-            columns.append(self._only(name, 0.0, gain))
+            columns += [self._only(name, said.offset.sigma, 0.0), self._only(name, 0.0, gain)]
         return columns
 
-    def _only(self, channel: str, offset: float, gain: float) -> Array:
+    def _only(self, channel: str, offset: float, gain: float) -> Signals:
         """Change of one channel's calibration alone."""
-        parts = []
-        for bare, roots in zip(self._bare, self._roots, strict=True):
-            read = channels(bare, self._trial.wrench)
-            moved = {name: np.zeros(values.size) for name, values in read.items()}
-            moved[channel] = offset + gain * read[channel]
-            parts.append(self._whitened(moved, roots))
-        return np.concatenate(parts)
+        read = [channels(bare, self._trial.wrench) for bare in self._bare]
+        return [
+            {name: offset + gain * values if name == channel else np.zeros(values.size) for name, values in run.items()}
+            for run in read
+        ]
+
+
+def _less(one: Signals, other: Signals) -> Signals:
+    return [{name: a[name] - b[name] for name in a} for a, b in zip(one, other, strict=True)]
+
+
+def _scaled(signals: Signals, factor: float) -> Signals:
+    return [{name: factor * values for name, values in run.items()} for run in signals]
+
+
+def _one_by_one(signals: Signals) -> list[Signals]:
+    """The change in one run alone, for every run."""
+    return [_scaled_by(signals, [float(n == place) for n in range(len(signals))]) for place in range(len(signals))]
+
+
+def _scaled_by(signals: Signals, factors: Sequence[float]) -> Signals:
+    return [_scaled([run], factor)[0] for run, factor in zip(signals, factors, strict=True)]
+
+
+def _held_out(sizes: Sequence[int]) -> list[tuple[int, Array]]:
+    """What is held out in turn: a run and a mask (n,) of its samples. Whole runs, or thirds of a single one."""
+    if len(sizes) > 1:
+        return [(run, np.ones(size, dtype=bool)) for run, size in enumerate(sizes)]
+    third = np.arange(sizes[0]) * 3 // sizes[0]
+    return [(0, third == part) for part in range(3)]
 
 
 INSTRUMENT = {
@@ -228,7 +301,7 @@ def _mean_square(time: float) -> float:
     return float(2.0 * (x - 1.0 + np.exp(-x)) / x**2)
 
 
-def scaled(detector: Detector, effect: Effect, wanted: float) -> tuple[Effect, float]:
+def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Effect, float]:
     """The effect at the strength where its D is as wanted, and that D; at the largest strength where D stays below."""
     found = detector.detectability([effect])
     if found <= wanted:

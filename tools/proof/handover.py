@@ -64,13 +64,19 @@ def begins(case: Case, number: int) -> int:
 def driven(case: Case, number: int) -> Felt:
     """One run of the concealed truth, without noise."""
     trial, run = case.trial, case.trial.runs[number]
-    weights = np.random.default_rng((case.seed, 2, round(run.weight * 1e3)))  # the same weights weigh the same
-    error = trial.known.weight_sigma * float(np.clip(weights.standard_normal(), -2.5, 2.5))
     orders = campaign.orders(run, trial.known.radius)
+    error = _weight_error(case, run.weight)
     heavier = np.where(
         orders.weight > 0.5 * run.weight, orders.weight + error * orders.weight / run.weight, orders.weight
     )
     return drive(trial.world, campaign.with_weight(orders, heavier))
+
+
+def _weight_error(case: Case, weight: float) -> float:
+    """Error of the weights [N], within their sigma: half the carriage's, half the plates'; a plate keeps its own."""
+    sources = ((case.seed, 2), (case.seed, 3, round(weight * 1e3)))
+    drawn = [float(np.clip(np.random.default_rng(source).standard_normal(), -2.5, 2.5)) for source in sources]
+    return case.trial.known.weight_sigma * sum(drawn) / float(np.sqrt(2.0))
 
 
 def truth(case: Case, number: int) -> dict[str, Array]:

@@ -87,7 +87,7 @@ def rig_drawn(rng: np.random.Generator) -> Rig:
     width = float(np.round(radius * rng.uniform(0.6, 1.2), 3))
     wheel = Servo(8e-4, float(rng.uniform(60.0, 200.0)), float(rng.uniform(0.03, 0.1)))
     carriage = Servo(5.0, float(rng.uniform(1e4, 4e4)), float(rng.uniform(0.05, 0.15)))
-    return Rig(radius, width, 2.0, wheel, carriage, float(rng.uniform(0.05, 0.2)))
+    return Rig(radius, width, 2.0, wheel, carriage, float(rng.uniform(0.005, 0.025)))
 
 
 def knowledge_drawn(rig: Rig, ground: Ground, heaviest: float, wrench: bool, rng: np.random.Generator) -> Knowledge:

@@ -172,7 +172,7 @@ def _heldout_groups(rows: Sequence[Row], detectable: Sequence[Row]) -> dict[str,
 
 
 def _heldout(rows: Sequence[Row]) -> dict[str, Any]:
-    return {"over oracle": _quantiles([row.excess for row in rows])}
+    return {f"over {oracle}": _quantiles([row.excess(oracle) for row in rows]) for oracle in ("fitted", "truth")}
 
 
 def confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:

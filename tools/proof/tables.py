@@ -46,9 +46,10 @@ def _headline(score: Mapping[str, Any]) -> str:
         ("  given a listed name above 0.5", said(unlisted["listed name above one half"])),
         ("two effects: one named / both", f"{said(score['two']['one named'])} / {said(score['two']['both named'])}"),
         ("parameters within two sigma", said(score["parameters"]["within two sigma"])),
-        ("held-out error over oracle, median", number(heldout["detectable"]["over oracle"]["median"])),
-        ("  where nothing is concealed", number(heldout["none"]["over oracle"]["median"])),
-        ("  where the name is right", number(heldout["named right"]["over oracle"]["median"])),
+        ("held-out error over oracle, median", number(heldout["detectable"]["over fitted"]["median"])),
+        ("  where nothing is concealed", number(heldout["none"]["over fitted"]["median"])),
+        ("  where the name is right", number(heldout["named right"]["over fitted"]["median"])),
+        ("  … over the noiseless truth", number(heldout["named right"]["over truth"]["median"])),
         ("Brier score, by name / stated group", " / ".join(_brier(score, by) for by in ("name", "engine"))),
         ("a diagnosis takes, median", f"{number(score['seconds']['median'], '.0f')} s"),
     ]

@@ -48,7 +48,8 @@ class Row:
     note: str
     soil: Mapping[str, Mapping[str, float]]  # c, tan_phi: relative error before and after, z after
     parameters: Mapping[str, float]  # where parameterisations coincide: error over stated sigma
-    heldout: Mapping[str, tuple[float, float, float]]  # channel: before, after, oracle [unit of the channel]
+    heldout: Mapping[str, tuple[float, float, float]]  # channel: before, after, noiseless truth [the channel's unit]
+    refit: Mapping[str, float]  # channel: variance that an oracle adds which must fit all but the form of the effect
 
     @property
     def alarmed(self) -> bool:
@@ -90,10 +91,13 @@ class Row:
             return max((s.probability for s in self.hypotheses if s.group & set(self.truth)), default=0.0)
         return min(sum(said.probability for said in self.hypotheses if self.right(said.effect, by)), 1.0)
 
-    @property
-    def excess(self) -> float:
-        """Held-out error over the oracle's, geometric mean over the channels."""
-        ratios = [after / oracle for _, after, oracle in self.heldout.values() if oracle > 0.0 and after > 0.0]
+    def excess(self, oracle: str) -> float:
+        """Held-out error over the oracle's, geometric mean over the channels. `fitted` or `truth`."""
+        ratios = []
+        for channel, (_, after, truth) in self.heldout.items():
+            best = math.sqrt(truth**2 + (self.refit.get(channel, 0.0) if oracle == "fitted" else 0.0))
+            if best > 0.0 and after > 0.0:
+                ratios.append(after / best)
         return float(np.exp(np.mean(np.log(ratios)))) if ratios else math.nan
 
 
@@ -117,7 +121,8 @@ def row(spec: Spec) -> Row:
         note=trouble or str(result.get("summary", "")),
         soil=_soil(result, answers),
         parameters=_parameters(result, answers),
-        heldout=_heldout(result, spec),
+        heldout=_heldout(result, answers, spec),
+        refit=answers["oracle_variance"],
     )
 
 
@@ -181,15 +186,18 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
 # ---- held-out error against the oracle -----------------------------------------------------------------------------
 
 
-def _heldout(result: Mapping[str, Any], spec: Spec) -> dict[str, tuple[float, float, float]]:
+def _heldout(
+    result: Mapping[str, Any], answers: Mapping[str, Any], spec: Spec
+) -> dict[str, tuple[float, float, float]]:
     """Root mean square errors on the diagnosis' own held-out samples, beside those of the noiseless truth on them."""
     sums: dict[str, list[np.ndarray[Any, Any]]] = {}
+    begins = {f"run-{number}": run["begins"] for number, run in enumerate(answers["runs"], start=1)}
     for trace in result.get("traces") or ():
         path = spec.answers.with_name(f"{spec.name}.{trace['run']}.npz")
         if path.exists():
             with np.load(path) as truth:
                 if trace["channel"] in truth:
-                    errors = _errors(trace, truth["time"], truth[trace["channel"]])
+                    errors = _errors(trace, begins[trace["run"]] + truth["time"], truth[trace["channel"]])
                     sums.setdefault(trace["channel"], []).append(errors)
     return {channel: _roots(np.concatenate(parts, axis=1)) for channel, parts in sums.items()}
 

@@ -27,6 +27,7 @@ COMMANDS = {
     "recover": ("tools.recover", "salvage an unclosed or damaged recording"),
     "import": ("tools.import_rig", "other rigs' public data to recordings"),
     "reproduce": ("tools.reproduce", "the paper's numbers beside ours"),
+    "prove": ("tools.proof.command", "blind trials of diagnose against an independent plant"),
     "bench": ("tools.bench", "what a tick, a replay, a force, an update and a message cost here"),
 }
 

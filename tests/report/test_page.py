@@ -219,3 +219,10 @@ def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
 def test_keys_of_effects_and_channels_are_said_in_words() -> None:
     found = replace(cases.explained(), summary="coulomb_friction explains drawbar_pull")
     assert "Coulomb friction explains drawbar pull" in words(diagnosis.render(found))
+
+
+def test_one_error_where_nothing_was_explained() -> None:
+    same = replace(cases.consistent().fit, after=cases.consistent().fit.before)
+    root = parsed(diagnosis.render(replace(cases.consistent(), fit=same)))
+    heads = [[th.text for th in table.findall("thead/tr/th")] for table in root.iter("table")]
+    assert ["channel", "error", "noise floor", "error ÷ floor"] in heads

@@ -59,7 +59,7 @@ def render(found: Diagnosis) -> str:
         _soil(found),
         tables.parameters(found),
         tables.location(found),
-        tables.errors(found),
+        tables.held_out(found),
         tables.law(found),
         _caveats(found),
         _next(found),

@@ -21,6 +21,10 @@ from tools.report.words import (
     with_unit,
 )
 
+UNSEEN = (
+    "Root mean square errors on data the fit did not see: the noise, what is still left out, and what the soil's remaining "
+    "uncertainty makes of a run that was not fitted."
+)
 STRAYED = 2.0  # [σ]
 
 
@@ -60,20 +64,22 @@ def _words(found: Diagnosis, place: Location) -> str:
     return f"{where} Changes at {listed(changes)}."
 
 
-def errors(found: Diagnosis) -> Markup | None:
+def held_out(found: Diagnosis) -> Markup | None:
     fit = found.fit
     if not fit.before:
         return None
     innovations = fit.innovation_before is not None or fit.innovation_after is not None
-    head = ["channel", "without", "with", "noise floor", "with ÷ floor", *(["innovations"] if innovations else [])]
+    sides = ["without", "with"] if fit.before != fit.after else ["error"]
+    head = ["channel", *sides, "noise floor", f"{sides[-1]} ÷ floor", *(["innovations"] if innovations else [])]
     rows = []
     for channel, before in fit.before.items():
         after, floor = fit.after.get(channel), fit.noise_floor.get(channel)
-        values = (with_unit(v, fit.unit.get(channel, "")) for v in (before, after, floor))
+        errors = (before, after) if len(sides) == 2 else (after,)
+        values = (with_unit(v, fit.unit.get(channel, "")) for v in (*errors, floor))
         ratio = after / floor if after is not None and floor else None
         innovation = [_innovation(found, channel)] if innovations else []
         rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
-    notes = [tag("p", "Root mean square errors on data the fit did not see.")]
+    notes = [tag("p", UNSEEN)]
     if innovations:
         notes.append(tag("p", "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
     if found.remaining:

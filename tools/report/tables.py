@@ -22,8 +22,8 @@ from tools.report.words import (
 )
 
 UNSEEN = (
-    "Root mean square errors on data the fit did not see: the noise, what is still left out, and what the soil's remaining "
-    "uncertainty makes of a run that was not fitted."
+    "Root mean square errors on data the fit did not see: the noise, what is still left out, and what the soil's "
+    "remaining uncertainty makes of a run that was not fitted."
 )
 STRAYED = 2.0  # [σ]
 

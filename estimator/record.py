@@ -16,7 +16,7 @@ class Status(IntEnum):
 
     STARTING = 0  # not every required channel has filled a window yet
     TRACKING = 1  # the filter is updated
-    STALE = 2  # a required channel is silent
+    STALE = 2  # a required channel is silent, or sends nothing usable
     STUCK = 3  # a channel stands still while the others move
     IN_AIR = 4  # no load, or no sinkage: nothing touches the soil
     STANDSTILL = 5  # neither wheel nor carriage moves

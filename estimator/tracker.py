@@ -39,10 +39,12 @@ SLIP_VARIES = 0.05  # … by this standard deviation
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
 CONSISTENCY_MEMORY = 2.0  # [s]
-# Mean normalised innovation squared above which the filter is reset: with 20 independent windows of one component the
-# chance of a false reset is 3e-11 a window, 1 in 900 simulated hours (chi-square, 20 degrees of freedom).
-INCONSISTENT = 5.0
-MISMATCH = 2.5  # … and above which model and measurement are said to disagree
+# Mean normalised innovation squared above which the filter is reset. A wrong calibration, of the size the configuration
+# states, gives innovations of variance S that keep their sign for the whole run, so their mean square does not settle
+# at 1: it exceeds 12 in 1 rig of 1,900 and 6 in 1 of 70 (chi-square, 1 degree of freedom).
+INCONSISTENT = 12.0
+MISMATCH = 6.0  # … and above which model and measurement are said to disagree
+OUTLIER = 25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
 PATIENCE = 5.0  # [s] after a reset before the next
 
 ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {"filterpy": FilterpyEngine, "plain": PlainEngine}
@@ -95,6 +97,7 @@ class TrackState(NamedTuple):
     last_reset: int = -1
     updates: int = 0
     resets: int = 0
+    started: bool = False  # every required channel has filled a window once
 
     @property
     def consistency(self) -> float:
@@ -136,7 +139,7 @@ class Tracker:
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
-        status = classify(self.settings, snapshot, now, state.before, self._required)
+        status = classify(self.settings, snapshot, now, state.before, self._required, state.started)
         aids: tuple[Aid, ...] = ()
         if state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window:
             state = self._closed(state, snapshot, now, elapsed)
@@ -155,6 +158,7 @@ class Tracker:
             began=snapshot.evaluated if state.began < 0 else state.began,
             before=now if snapshot.ready else None,
             recall=recall,
+            started=state.started or snapshot.ready,
         )
 
     def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
@@ -234,7 +238,7 @@ class Tracker:
     def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
         """Keep the running consistency figure; back to the prior's covariance when it is out of all measure."""
         keep = exp(-elapsed / CONSISTENCY_MEMORY)
-        surprise = keep * state.surprise + sum([aid.innovation**2 / aid.s for aid in aids])
+        surprise = keep * state.surprise + sum([min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids])
         state = state._replace(surprise=surprise, components=keep * state.components + len(aids))
         rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
         if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):

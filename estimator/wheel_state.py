@@ -103,16 +103,27 @@ def _torque(settings: Settings, snapshot: Snapshot) -> Measured:
 
 
 def classify(
-    settings: Settings, snapshot: Snapshot, now: WheelState, before: WheelState | None, required: int = REQUIRED_BITS
+    settings: Settings,
+    snapshot: Snapshot,
+    now: WheelState,
+    before: WheelState | None,
+    required: int = REQUIRED_BITS,
+    started: bool = True,
 ) -> Status:
-    """TRACKING, or the first reason that applies why the window is not used. required: CHANNEL_BITS."""
-    if snapshot.stale & required:
-        return Status.STALE if snapshot.ready else Status.STARTING
-    if not snapshot.ready:
-        return Status.STARTING
+    """TRACKING, or the first reason that applies why the window is not used.
+
+    required: CHANNEL_BITS; started: whether every required channel has filled a window once.
+    """
+    if snapshot.stale & required or not snapshot.ready or _unread(settings, now):
+        return Status.STALE if started else Status.STARTING
     if snapshot.stuck:
         return Status.STUCK
     return _contact(settings, now) or _travel(settings, now) or _steadiness(now, before)
+
+
+def _unread(settings: Settings, now: WheelState) -> bool:
+    """Whether the wrench, where there is one, sends nothing usable of what is needed of it."""
+    return isnan(now.torque.value) or (settings.wrench is not None and bool(now.flags & Flag.LOAD_ASSUMED))
 
 
 def _contact(settings: Settings, now: WheelState) -> Status | None:

@@ -192,3 +192,76 @@ def test_a_wrong_prior_is_noticed_and_the_filter_reset():
     _, ticks = run(replace(RIG, soil=soil), TRUTH, THREE_LOADS[:3])
     first = next(k for k, tick in enumerate(ticks) if tick["resets"])
     assert first <= 25  # 2 s, and the first window
+
+
+def altered(settings, schedule, change, seed=2):
+    """The ticks of a run whose readings between 5 and 8 s are changed."""
+    pipeline = Pipeline(settings, "plain")
+    state, ticks = pipeline.start(), []
+    for number, (t, batch) in enumerate(readings(settings, TRUTH, schedule, seed=seed)):
+        batch = [change(r) for r in batch] if 50 <= number < 80 else batch
+        state, tick = pipeline.step(state, [r for r in batch if r is not None], t)
+        ticks.append(dict(zip(TICK_NAMES, tick, strict=True)))
+    return ticks
+
+
+def test_a_spike_is_no_reason_to_forget_the_soil():
+    pipeline = Pipeline(RIG, "plain")
+    state, sigmas = pipeline.start(), []
+    for number, (t, batch) in enumerate(readings(RIG, TRUTH, THREE_LOADS, seed=2)):
+        if number == 420:
+            batch = [r._replace(value=r.value + 0.5) if r.channel == "motor_shunt" else r for r in batch]
+        state, tick = pipeline.step(state, batch, t)
+        sigmas.append(dict(zip(TICK_NAMES, tick, strict=True))["cohesion_sigma"])
+    assert state.track.resets == 0 and sigmas[425] < 1.1 * sigmas[415]
+
+
+@pytest.mark.parametrize("sigmas", [-3.0, 3.0])
+def test_a_calibration_as_wrong_as_it_may_be_does_not_reset_the_filter(sigmas):
+    """Its innovations keep one sign for the whole run: they are not twenty independent ones."""
+    shunt = SLOW["motor_shunt"]
+    offset = Uncertain(shunt.calibration.offset.value, 0.05)
+    stated = replace(shunt, calibration=replace(shunt.calibration, offset=offset))
+    wrong = replace(stated, calibration=replace(stated.calibration, offset=Uncertain(offset.value + sigmas * 0.05)))
+    pipeline = Pipeline(replace(RIG, channels={**SLOW, "motor_shunt": stated}), "plain")
+    state = pipeline.start()
+    for t, batch in readings(replace(RIG, channels={**SLOW, "motor_shunt": wrong}), TRUTH, THREE_LOADS, seed=3):
+        state, _ = pipeline.step(state, batch, t)
+    assert state.track.resets == 0
+
+
+NAN = float("nan")
+LOST = {
+    "a silent encoder": ("wheel_encoder", None),
+    "a potentiometer out of range": ("sinkage_pot", 1e3),
+    "a saturated wrench": ("wrench", (0.0, 0.0, 1e9, 0.0, 0.0, 0.0)),
+    "a wrench of NaN": ("wrench", (NAN,) * 6),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_a_channel_that_says_nothing_usable_is_stale_until_it_does(name):
+    channel, value = LOST[name]
+
+    def change(reading):
+        if reading.channel != channel:
+            return reading
+        return None if value is None else reading._replace(value=value)
+
+    ticks = altered(RIG, [(12.0, 100.0, 0.3)], change)
+    lost = ticks[56:80]
+    assert {tick["status"] for tick in lost} == {Status.STALE}
+    assert len({tick["cohesion"] for tick in lost}) == 1
+    assert ticks[-1]["status"] == Status.TRACKING and ticks[-1]["resets"] == 0
+    assert not any(tick["flags"] & Flag.GATED for tick in ticks[80:])
+
+
+def test_a_wrench_without_torque_is_stale_where_the_torque_is_its():
+    settings = replace(RIG, drive=replace(RIG.drive, torque_source="wrench"))
+
+    def mute(reading):
+        return reading._replace(value=(*reading.value[:4], NAN, 0.0)) if reading.channel == "wrench" else reading
+
+    ticks = altered(settings, [(12.0, 100.0, 0.3)], mute)
+    assert {tick["status"] for tick in ticks[56:80]} == {Status.STALE}
+    assert np.isfinite(ticks[-1]["consistency"])

@@ -137,7 +137,7 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
 def _timing() -> dict[str, Key]:
     return {
         "latency": Key(Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"),
-        "stale_after": Key(Quantity("s", above=0, high=10), "silence after which the channel is stale", "50 ms"),
+        "stale_after": Key(Quantity("s", above=0, high=10), "silence after which the channel is stale", "40 ms"),
     }
 
 

@@ -49,6 +49,7 @@ SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from
 PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
+STOP = 1.8  # [s] for everything to end: half of it for the readers, a quarter for the loop
 MIN_PART = 1.0  # [s] a part is at least this long
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
 
@@ -73,7 +74,7 @@ class ReaderThread(Protocol):
 
     def start(self) -> None: ...
 
-    def stop(self) -> bool: ...
+    def stop(self, timeout: float) -> bool: ...
 
 
 class LogSink:
@@ -164,11 +165,12 @@ class Daemon:
                 self._check(loop)
                 self._rotate()
                 watch(self)
+            end = time.monotonic() + STOP
             for reader in self.readers:
-                reader.stop()
+                reader.stop(max(end - STOP / 2 - time.monotonic(), 0.0))
             self._loop_stop.set()
-            loop.join(1.0)
-        return self._close()
+            loop.join(max(end - STOP / 4 - time.monotonic(), 0.0))
+        return self._close(end)
 
     def fail(self, reason: str) -> None:
         """Stop, with a reason; the first one given is the one told."""
@@ -204,10 +206,10 @@ class Daemon:
             self.loop.ask(Change(self.configuration.text))
             self._part_began = time.monotonic()
 
-    def _close(self) -> WriterStatus:
+    def _close(self, end: float) -> WriterStatus:
         if self._failure:
             self.say(ERROR, self._failure)
-        status = self.writer.stop(1.0 if self._failure else 2.0)
+        status = self.writer.stop(max(end - time.monotonic(), 0.0))
         if self._failure:
             raise DaemonError(self._failure)
         return status

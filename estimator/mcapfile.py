@@ -174,10 +174,14 @@ class McapFile:
     def close(self) -> None:
         """Write index and summary and close. Whatever fails, the file is closed and stays a valid prefix."""
         try:
-            self._append(self._ending())
+            self.finish()
             self.sync()
         finally:
             self._file.close()
+
+    def finish(self) -> None:
+        """Write index and summary; nothing may be added then. The medium may not have them yet."""
+        self._append(self._ending())
 
     def abandon(self) -> None:
         """Close without an index; what was written stays readable."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import platform
 import struct
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -214,6 +214,15 @@ class RunWriter:
             self._file.abandon()
             raise
         self._file.close()
+
+    def finish(self, sync: Callable[[int], None]) -> None:
+        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor and may keep a copy."""
+        try:
+            self.write_out()
+            self._file.finish()
+            sync(self._file.fileno())
+        finally:
+            self._file.abandon()
 
     def abandon(self) -> None:
         """Close the file as it is, without an index. Nothing already written is lost."""

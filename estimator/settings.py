@@ -54,7 +54,7 @@ class Channel:
     low: float  # valid raw range; outside is quarantined
     high: float
     latency: float = 0.0  # [s] the sample is older than its stamp by this much
-    stale_after: float = 0.05  # [s] silence after which the channel is STALE
+    stale_after: float = 0.04  # [s] silence after which the channel is STALE
     bits: int = 32  # width of an encoder's counter on the wire
     max_rate: float = float("inf")  # fastest believable change [raw/s]; a faster one is a counter jump
 
@@ -73,7 +73,7 @@ class Wrench:
     max_force: float = 1e4  # [N]
     max_torque: float = 1e3  # [N·m]
     latency: float = 0.0
-    stale_after: float = 0.05
+    stale_after: float = 0.04
 
 
 @dataclass(frozen=True)

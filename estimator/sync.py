@@ -21,7 +21,7 @@ from estimator.record import CHANNEL_BITS
 from estimator.settings import Channel, Settings
 
 NS = 1_000_000_000
-STUCK_AFTER = int(0.35 * NS)  # [ns] a live sensor shows noise or motion sooner than this
+STUCK_AFTER = int(0.34 * NS)  # [ns] a live sensor shows noise or motion sooner than this
 
 
 class Sample(NamedTuple):

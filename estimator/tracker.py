@@ -46,6 +46,8 @@ INCONSISTENT = 12.0
 MISMATCH = 6.0  # … and above which model and measurement are said to disagree
 OUTLIER = 25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
 PATIENCE = 5.0  # [s] after a reset before the next
+RELAPSE = 20.0  # [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time …
+WIDEST = 6  # … so often
 
 ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {"filterpy": FilterpyEngine, "plain": PlainEngine}
 
@@ -97,6 +99,7 @@ class TrackState(NamedTuple):
     last_reset: int = -1
     updates: int = 0
     resets: int = 0
+    streak: int = 0  # resets in a row, after the first
     started: bool = False  # every required channel has filled a window once
 
     @property
@@ -128,9 +131,9 @@ class Tracker:
         estimate = self._unsure((soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value)))
         return TrackState(estimate, Memory(estimate), self.measurement.chain.fresh_memory())
 
-    def _unsure(self, x: Vector) -> Estimate:
-        """The state x with the prior's covariance."""
-        sigma = self._prior_sigma
+    def _unsure(self, x: Vector, factor: float = 1.0) -> Estimate:
+        """The state x with the prior's standard deviations, times a factor."""
+        sigma = tuple([factor * s for s in self._prior_sigma])
         P = tuple(tuple(sigma[i] ** 2 if i == j else 0.0 for j in range(STATES)) for i in range(STATES))
         return Estimate(x, P, ((0.0,) * len(self.measurement.variances),) * STATES)
 
@@ -236,14 +239,17 @@ class Tracker:
         return self.engine.update(estimate, merged, not self.estimates_k(state))
 
     def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
-        """Keep the running consistency figure; back to the prior's covariance when it is out of all measure."""
+        """Keep the running consistency figure; back to the prior's covariance, or a wider one, when it is out of all
+        measure."""
         keep = exp(-elapsed / CONSISTENCY_MEMORY)
         surprise = keep * state.surprise + sum([min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids])
         state = state._replace(surprise=surprise, components=keep * state.components + len(aids))
         rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
         if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):
             return state
-        estimate = self._unsure(state.estimate.x)
+        again = state.last_reset >= 0 and state.window_end - state.last_reset < RELAPSE * NS
+        streak = state.streak + 1 if again else 0
+        estimate = self._unsure(state.estimate.x, 2.0 ** min(streak, WIDEST))
         return state._replace(
             estimate=estimate,
             memory=Memory(estimate),
@@ -252,6 +258,7 @@ class Tracker:
             components=0.0,
             last_reset=state.window_end,
             resets=state.resets + 1,
+            streak=streak,
         )
 
     def _experienced(self, state: TrackState) -> bool:

@@ -79,8 +79,8 @@ class WriterThread:
         retry: float = RETRY,
     ) -> None:
         self._queue = _Queue(capacity)
-        self._parts = _Parts(Path(path), tuple(topics), config_yaml, run, compression)
         self._sync = _Syncer()
+        self._parts = _Parts(Path(path), tuple(topics), config_yaml, run, compression, self._sync.request)
         self._interval = flush_interval
         self._retry = retry
         self._batch: list[Item] = []  # taken from the queue, not yet encoded
@@ -118,13 +118,17 @@ class WriterThread:
     def stop(self, timeout: float = 2.0) -> WriterStatus:
         """Write what is queued, close the file with its index, and return the final counters.
 
-        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed".
+        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or an error says that the
+        medium has not confirmed what it was given.
         """
+        end = time.monotonic() + timeout
         self._stopping.set()
         if self._thread.ident is None:  # never started
             self._attempt(self._finish)
         else:
             self._thread.join(timeout)
+        if not self._sync.stop(max(end - time.monotonic(), 0.0)) and self._state == "closed":
+            self._error = f"{self._parts.files[-1]}: the medium has not confirmed the last of it"
         return self.status()
 
     def _run(self) -> None:
@@ -203,8 +207,7 @@ class WriterThread:
             self._write_out()
         finally:
             self._queue.drop_all()
-            self._sync.stop()
-            self._parts.writer.close()
+            self._parts.writer.finish(self._sync.request)
         self._state = "closed"
 
 
@@ -282,8 +285,16 @@ class _Queue:
 class _Parts:
     """The file being written, and how to make the one that continues it."""
 
-    def __init__(self, path: Path, topics: tuple[Topic, ...], config_yaml: str, run: RunInfo, compression: str) -> None:
-        self._run = run
+    def __init__(
+        self,
+        path: Path,
+        topics: tuple[Topic, ...],
+        config_yaml: str,
+        run: RunInfo,
+        compression: str,
+        sync: Callable[[int], None],
+    ) -> None:
+        self._run, self._sync = run, sync
         self._config = config_yaml
         self._make = partial(RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize)  # see _flush
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
@@ -301,7 +312,7 @@ class _Parts:
         self._config = config_yaml or self._config
         new.adopt(self.writer)
         with suppress(RecordingError):  # without an index it is readable still
-            self.writer.close()
+            self.writer.finish(self._sync)
         self.writer = new
         self.files.append(path)
 
@@ -312,7 +323,7 @@ class _Syncer:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._wake = threading.Event()
-        self._file: int | None = None
+        self._files: dict[tuple[int, int], int] = {}  # device and inode -> a descriptor of our own
         self._error: OSError | None = None
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name="writer-sync", daemon=True)
@@ -324,15 +335,21 @@ class _Syncer:
     def start(self) -> None:
         self._thread.start()
 
-    def stop(self) -> None:
-        """Not waited for: a disk that hangs would hang us."""
+    def stop(self, timeout: float) -> bool:
+        """Sync what is asked for and end; False if that has not happened after `timeout` [s]: a disk may hang."""
         self._stopped = True
         self._wake.set()
+        if self._thread.ident is None:
+            self._sync()
+        else:
+            self._thread.join(timeout)
+        return not self.alive
 
     def request(self, fileno: int) -> None:
+        found = os.fstat(fileno)
         with self._lock:
-            if self._file is None:
-                self._file = os.dup(fileno)  # the writer may close its own while we wait
+            if (found.st_dev, found.st_ino) not in self._files:
+                self._files[found.st_dev, found.st_ino] = os.dup(fileno)  # the writer may close its own while we wait
         self._wake.set()
 
     def raise_error(self, path: Path) -> None:
@@ -349,12 +366,11 @@ class _Syncer:
 
     def _sync(self) -> None:
         with self._lock:
-            file, self._file = self._file, None
-        if file is None:
-            return
-        try:
-            sync(file)
-        except OSError as error:
-            self._error = error
-        finally:
-            os.close(file)
+            files, self._files = self._files, {}
+        for file in files.values():
+            try:
+                sync(file)
+            except OSError as error:
+                self._error = error
+            finally:
+                os.close(file)

@@ -74,6 +74,7 @@ class Plug:
     def plug_in(self) -> None:
         self._master, slave = pty.openpty()
         tty.setraw(slave)
+        os.set_blocking(self._master, False)
         self.path.symlink_to(os.ttyname(slave))
         os.close(slave)
 

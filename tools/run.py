@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -64,12 +65,19 @@ def _serve(configuration: Configuration, folder: Path, run: RunInfo, socket: Pat
     if notice:
         print(notice, file=sys.stderr, flush=True)
         daemon.say(WARNING, notice)
+    threading.excepthook = _say_in_a_line
     with closing(publisher):
         publisher.start()
         last = daemon.serve(watcher)
     watcher.report(daemon)
     print(closing_line(last), flush=True)
     return DONE if last.state == "closed" else FAILED
+
+
+def _say_in_a_line(died: threading.ExceptHookArgs) -> None:
+    """What kills a thread, without a traceback; the daemon notices and ends with a reason."""
+    name = died.thread.name if died.thread else "a thread"
+    print(f"{name}: {died.exc_type.__name__}: {died.exc_value}", file=sys.stderr, flush=True)
 
 
 def _socket_path(folder: Path, given: str | None) -> Path:

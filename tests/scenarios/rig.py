@@ -1,0 +1,320 @@
+"""The real daemon process on real wires: pseudo-terminals and a loopback CAN bus, driven by the simulated testbed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from threading import Event, Thread
+
+import numpy as np
+import yaml
+
+from config import packaged
+from drivers.wire import CanWire, SerialWire
+from estimator import config
+from estimator.daemon import TOPICS
+from estimator.recording import parts
+from estimator.salvage import read
+from tests.drivers_rig import Plug
+from tools import replay, rig_config
+from tools.command import CommandError
+from tools.status import connected, reports
+from tools.testbed import experiment, in_transit, play
+from tools.wires import Rig, has_multicast, messages, slcan_line
+
+ROOT = Path(__file__).parents[2]
+TESTBED = config.load(packaged())
+BUS = "udp_multicast" if has_multicast() else "slcan"
+BECOMING = """
+import os, can.interfaces.slcan, can.interfaces.udp_multicast, tools.run
+from drivers.build import build_readers
+build_readers(tools.run.load({config!r}).settings, lambda: 0, None)
+os.setgroups([]); os.setgid({user}); os.setuid({user})
+"""
+LIMIT = 30.0  # [s] ends a scenario that has failed
+WIRES = "daemon process on a pseudo-terminal and a loopback CAN bus"
+
+
+@lru_cache(maxsize=4)
+def driven(seconds, seed, skip=0.0):
+    """Readings of a simulated run, stamps and arrivals from zero [ns]; `skip` [s] of them left out at the start."""
+    readings = in_transit(experiment(TESTBED, seconds, "linear", seed).run.readings, seed)
+    start = int(skip * 1e9)
+    return [r._replace(stamp=r.stamp - start, received=r.received - start) for r in readings if r.received >= start]
+
+
+class PluggedDevice:
+    """A serial device behind a fixed path, that can be unplugged; a FarEnd of tools.wires."""
+
+    def __init__(self, device, folder):
+        self.plug = Plug(folder / device.name)
+        self.device = replace(device, port=str(self.plug.path))
+        self.wire = SerialWire(device)
+        self.lost = 0
+
+    def send(self, key, values, device_us):
+        try:
+            self.plug.send(self.wire.encode(key, values, device_us))
+        except OSError:
+            self.lost += 1
+
+    def close(self):
+        self.plug.close()
+
+
+class PluggedBus:
+    """A serial CAN adapter (slcan) that can be unplugged."""
+
+    def __init__(self, device, folder):
+        self.plug = Plug(folder / device.name)
+        self.device = replace(device, interface="slcan", channel=str(self.plug.path), options={})
+        self.wire = CanWire(device)
+        self.lost = 0
+
+    def send(self, key, values, device_us):
+        try:
+            with suppress(BlockingIOError):
+                os.read(self.plug._master, 4096)  # what the daemon tells the adapter
+            for message in messages(self.wire, key, values, device_us):
+                self.plug.send(slcan_line(message))
+        except OSError:
+            self.lost += 1
+
+    def close(self):
+        self.plug.close()
+
+
+class Wires(Rig):
+    """The testbed's wires with the encoders on a plug, the configuration for a daemon on them, and a player."""
+
+    def __init__(self, folder, bus=BUS, **changes):
+        super().__init__(TESTBED.settings, bus)
+        self._ends["encoders"].close()
+        self.encoders = self._ends["encoders"] = PluggedDevice(TESTBED.settings.devices["encoders"], folder)
+        if bus == "slcan":
+            self._ends["bus"].close()
+            self._ends["bus"] = PluggedBus(TESTBED.settings.devices["bus"], folder)
+        self.bus = self._ends["bus"]
+        self.folder = folder
+        self.config = rig_config.write(TESTBED, self.devices, "linear", folder)
+        self.configure(**changes)
+        self._stop = Event()
+        self._player = None
+
+    def configure(self, **sections):
+        """Change keys of the configuration file: section=dict(key=value)."""
+        document = yaml.safe_load(self.config.read_text())
+        for section, values in sections.items():
+            document[section].update(values)
+        self.config.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True))
+
+    def play(self, readings):
+        """Send the readings in real time, from another thread."""
+        self._player = Thread(target=play, args=(readings, self, self._stop.is_set), daemon=True)
+        self._player.start()
+
+    def finish(self):
+        """Wait for the end of what is played."""
+        self._player.join(LIMIT)
+
+    def __exit__(self, *error):
+        self._stop.set()
+        if self._player is not None:
+            self._player.join(5.0)
+        super().__exit__(*error)
+
+
+class DaemonProcess:
+    """`gritd run` as a service manager sees it: its messages, its signals, its exit.
+
+    prelude: Python that is run in the daemon's process before the command, to bring a fault about from inside.
+    user: the user it becomes once Python has loaded the code, which may lie where only its owner can read it.
+    """
+
+    def __init__(self, config, *arguments, prelude="", watchdog=0.0, user=None):
+        self._box = tempfile.TemporaryDirectory(prefix="gritd")
+        self.folder = config.parent
+        self.socket = str(Path(self._box.name) / "gritd.sock")
+        self._notices = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._notices.bind(str(Path(self._box.name) / "notify"))
+        os.chmod(self._box.name, 0o777)
+        os.chmod(Path(self._box.name) / "notify", 0o777)
+        environment = {**os.environ, "NOTIFY_SOCKET": str(Path(self._box.name) / "notify"), "PYTHONPATH": str(ROOT)}
+        if watchdog:
+            environment["WATCHDOG_USEC"] = str(int(watchdog * 1e6))
+        becoming = "" if user is None else BECOMING.format(user=user, config=str(config))
+        code = f"{becoming}\n{prelude}\nimport sys, tools.run, tools.cli\nprint('loaded', flush=True)\n"
+        code += "sys.exit(tools.cli.main(sys.argv[1:]))"
+        command = ["--config", str(config), "--socket", self.socket, "--status", "0"]
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", code, "run", *command, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment,
+            cwd=ROOT,
+        )
+        self.said = []
+        self._listener = Thread(target=self._listen, daemon=True)
+        self._listener.start()
+        self.pid = self.process.pid
+
+    def _listen(self):
+        for line in self.process.stdout:
+            self.said.append((time.monotonic(), line.rstrip()))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        if self.process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGCONT)
+            self.process.kill()
+        self.process.wait()
+        self._listener.join(5.0)
+        self._notices.close()
+        self._box.cleanup()
+
+    def ready(self):
+        """Wait for READY=1 and for both devices to be open."""
+        self.notified("READY=1")
+        until(lambda: len(self.lines(" OPEN")) >= 2, lambda: f"devices did not open: {self.text}")
+        return self
+
+    def notified(self, message, limit=LIMIT):
+        """Wait for a message to the service manager that contains this; when it came."""
+        end = time.monotonic() + limit
+        while (left := end - time.monotonic()) > 0:
+            self._notices.settimeout(left)
+            try:
+                if message in self._notices.recv(65536).decode():
+                    return time.monotonic()
+            except TimeoutError:
+                break
+        raise AssertionError(f"no {message} within {limit:g} s: {self.text}")
+
+    def strokes(self, seconds):
+        """How often the watchdog is stroked in a time."""
+        end, count = time.monotonic() + seconds, 0
+        while (left := end - time.monotonic()) > 0:
+            self._notices.settimeout(left)
+            with suppress(TimeoutError):
+                count += "WATCHDOG=1" in self._notices.recv(65536).decode()
+        return count
+
+    @property
+    def text(self):
+        return "\n".join(line for _, line in self.said)
+
+    def lines(self, words):
+        return [(when, line) for when, line in list(self.said) if words in line]
+
+    def heard(self, words, count=1, limit=LIMIT):
+        """Wait until it has said this so often; when it did for that time."""
+        until(lambda: len(self.lines(words)) >= count, lambda: f"did not say {words!r}: {self.text}", limit)
+        return self.lines(words)[count - 1][0]
+
+    def status(self):
+        with connected(self.socket) as connection:
+            return next(reports(connection))
+
+    def wait_status(self, condition, limit=LIMIT):
+        """Poll the status until it fulfils the condition; the report that did."""
+        with connected(self.socket) as connection:
+            end = time.monotonic() + limit
+            for report in reports(connection):
+                if condition(report):
+                    return report
+                assert time.monotonic() < end, f"status never as expected: {report}"
+
+    def signal(self, number):
+        os.kill(self.pid, number)
+        return time.monotonic()
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.pid}/fd"))
+
+    def threads(self):
+        return len(os.listdir(f"/proc/{self.pid}/task"))
+
+    def exit_code(self, limit=LIMIT):
+        code = self.process.wait(limit)
+        self._listener.join(5.0)
+        return code
+
+    def stop(self):
+        """SIGTERM; how long it took [s]. Asserts exit code 0."""
+        start = self.signal(signal.SIGTERM)
+        assert self.exit_code() == 0, self.text
+        return time.monotonic() - start
+
+    def path(self):
+        """The first part of its recording."""
+        (line,) = [line for _, line in self.said if line.startswith("logging to ")][:1]
+        return Path(line.removeprefix("logging to "))
+
+    def account(self):
+        """accepted, written, dropped and queued of its last line."""
+        (line,) = [line for _, line in self.said if line.startswith("log closed")]
+        return [int(word) for word in line.replace(";", " ").split() if word.isdigit()][:4]
+
+
+def until(condition, complaint=lambda: "waited in vain", limit=LIMIT):
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, complaint()
+        time.sleep(0.002)
+
+
+def recordings(path):
+    return [read(part, TOPICS) for part in parts(path)]
+
+
+def rows(path, topic):
+    """All messages of a topic, over all parts."""
+    return np.concatenate([recording.arrays(topic) for recording in recordings(path)])
+
+
+def log_lines(path):
+    """The texts of /log."""
+    return [m[2][3] for recording in recordings(path) for m in recording.messages() if m[0] == "/log"]
+
+
+def verified(path):
+    """Whether the replay of the run is identical bit for bit."""
+    with silence():
+        try:
+            return replay.main([str(path), "--verify"]) == 0
+        except CommandError as error:
+            raise AssertionError(str(error)) from None
+
+
+@contextmanager
+def silence():
+    """Standard output into nothing."""
+    before = sys.stdout
+    with open(os.devnull, "w", encoding="utf-8") as sys.stdout:
+        try:
+            yield
+        finally:
+            sys.stdout = before
+
+
+@contextmanager
+def service(folder, readings=None, prelude="", watchdog=0.0, **changes):
+    """Wires and a ready daemon on them, playing the readings."""
+    with Wires(folder, **changes) as wires, DaemonProcess(wires.config, prelude=prelude, watchdog=watchdog) as daemon:
+        daemon.ready()
+        if readings is not None:
+            wires.play(readings)
+        yield wires, daemon

@@ -1,0 +1,169 @@
+"""A CAN bus that fails, lies or floods, on real sockets of the loopback."""
+
+from __future__ import annotations
+
+import random
+import socket
+import time
+
+import can
+import pytest
+
+from drivers.build import build_decoder
+from drivers.can_link import CanLink
+from drivers.errors import DeviceError
+from estimator.settings import Device
+from tests.drivers_rig import Ticking
+from tests.scenarios.rig import TESTBED, WIRES, driven, rows, service, verified
+from tools.wires import has_multicast
+
+FAILING = "CAN error frame or failing bus"
+HOSTILE = "hostile CAN or UDP datagram"
+FLOOD = "bus flood"
+UNWANTED = 0x7F0
+
+multicast = pytest.mark.skipif(not has_multicast(), reason="no interface takes multicast")
+
+
+def test_a_bus_that_goes_away_and_comes_back(tmp_path, seed, figure):
+    """A serial CAN adapter (slcan) that is pulled out and put back."""
+    rng = random.Random(seed)
+    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="slcan") as (wires, daemon):
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        time.sleep(rng.uniform(0.0, 0.3))
+        wires.bus.plug.unplug()
+        daemon.heard("device bus WAITING")
+        time.sleep(rng.uniform(0.0, 0.5))
+        wires.bus.plug.plug_in()
+        back = time.monotonic()
+        daemon.heard("device bus OPEN", 2)
+        figure(FAILING, WIRES, "back after the adapter was put back", time.monotonic() - back, "s", 5.5)
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        daemon.stop()
+    assert verified(daemon.path())
+
+
+def daemon_ids():
+    """The ids the daemon asks the bus for."""
+    framing = build_decoder(TESTBED.settings, TESTBED.settings.devices["bus"]).framing
+    return [int(given["can_id"]) for given in framing.filters()]
+
+
+@multicast
+def test_error_frames_are_counted_and_survived(tmp_path, seed, figure):
+    """python-can filters this bus itself and takes an error frame for a message: so they carry a wanted id."""
+    frames, wanted = 50, daemon_ids()[0]
+    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        for _ in range(frames):
+            wires.bus._bus.send(can.Message(is_error_frame=True, arbitration_id=wanted, is_extended_id=False))
+            time.sleep(0.005)
+        daemon.wait_status(lambda report: report["devices"]["bus"]["errors"] >= frames)
+        report = daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        figure(FAILING, WIRES, "error frames not counted", frames - report["devices"]["bus"]["errors"], "", 0)
+        daemon.stop()
+    assert verified(daemon.path())
+
+
+@multicast
+def test_hostile_datagrams(tmp_path, seed, figure):
+    """33,400 datagrams a seed, 1e5 in all: random bytes, and damaged copies of a real message."""
+    rng = random.Random(seed)
+    cases = 33_400
+    with service(tmp_path, bus="udp_multicast") as (wires, daemon):
+        address = (wires.bus.device.channel, wires.bus.device.options["port"])
+        threads = daemon.threads()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+            for number in range(cases):
+                out.sendto(hostile(rng), address)
+                if number % 20 == 0:
+                    time.sleep(0.003)
+        wires.play(driven(30.0, seed, skip=2.0))
+        report = daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        counted = report["devices"]["bus"]["bad"] + report["devices"]["bus"]["unknown"]
+        figure(HOSTILE, WIRES, "datagrams sent", cases, "")
+        figure(HOSTILE, WIRES, "threads lost", threads - daemon.threads(), "", 0)
+        figure(HOSTILE, WIRES, "times the bus had to be reopened", report["devices"]["bus"]["reopened"], "", 0)
+        assert counted > 0.9 * cases, f"{counted} of {cases} counted"
+        daemon.stop()
+    assert verified(daemon.path())
+
+
+def hostile(rng):
+    """Random bytes; or msgpack of a message with wrong parts."""
+    if rng.random() < 0.5:
+        return rng.randbytes(rng.randrange(1, 200))
+    good = bytearray(GOOD)
+    for _ in range(rng.randrange(1, 6)):
+        good[rng.randrange(len(good))] = rng.randrange(256)
+    return bytes(good)
+
+
+def good_datagram():
+    from can.interfaces.udp_multicast.utils import pack_message
+
+    return bytes(pack_message(can.Message(arbitration_id=0x101, data=bytes(8), is_extended_id=False)))
+
+
+GOOD = good_datagram()
+
+
+@multicast
+@pytest.mark.parametrize(("rate", "seconds"), [(5_000, 3.0), (12_000, 1.0)])
+def test_bus_flood(tmp_path, seed, rate, seconds, figure):
+    """Unwanted frames between the wanted ones: paced, none of those is lost; in a burst every loss is counted."""
+    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        flood(wires.bus._bus, rate, seconds)
+        time.sleep(0.5)
+        report = daemon.status()
+        stats = report["devices"]["bus"]
+        daemon.stop()
+    gaps = missing_samples(rows(daemon.path(), "/raw/sinkage_pot")["stamp"])
+    name = f"wanted frames lost at {rate / 1000:g} k unwanted frames/s"
+    figure(FLOOD, WIRES, name, stats["lost"], "", 0 if rate <= 5000 else None)
+    assert gaps <= stats["lost"], f"{gaps} samples missing, {stats['lost']} frames counted as lost"
+    assert verified(daemon.path())
+
+
+def flood(bus, rate, seconds):
+    """Frames of an id that nobody wants, in packets of 5 ms."""
+    message = can.Message(arbitration_id=UNWANTED, data=bytes(8), is_extended_id=False)
+    start, sent = time.monotonic(), 0
+    while (elapsed := time.monotonic() - start) < seconds:
+        while sent < elapsed * rate:
+            bus.send(message)
+            sent += 1
+        time.sleep(0.005)
+
+
+def missing_samples(stamps):
+    """Samples of a 250 Hz channel that are not there, between the first and the last."""
+    return max(0, round((stamps[-1] - stamps[0]) * 1e-9 * 250) + 1 - len(stamps))
+
+
+class Raising:
+    """A bus whose recv raises."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def recv(self, timeout):
+        raise self.error
+
+    def shutdown(self):
+        raise can.CanError("gone")
+
+
+FAILURES = [OSError(100, "Network is down"), can.CanOperationError("bus off"), RuntimeError("x")]
+
+
+@pytest.mark.parametrize("error", FAILURES)
+def test_a_bus_whose_recv_raises_is_one_device_error(error, figure):
+    link = CanLink(Device("bus", "can"), [], Ticking())
+    link._bus = Raising(error)
+    with pytest.raises(DeviceError, match=r"^bus: cannot read can0"):
+        link.read()
+    link.close()
+    figure(FAILING, "CAN link, bus-off simulated by a bus that raises", "exceptions that reach the reader", 0, "", 0)

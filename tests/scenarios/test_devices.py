@@ -1,0 +1,103 @@
+"""Devices that vanish, and wires that carry garbage."""
+
+from __future__ import annotations
+
+import random
+import re
+import time
+
+import numpy as np
+import pytest
+
+from estimator.record import CHANNEL_BITS, Status
+from tests.scenarios.rig import WIRES, driven, rows, service, verified
+from tests.test_framing_serial import damage
+
+ENCODERS = CHANNEL_BITS["wheel_encoder"] | CHANNEL_BITS["carriage_encoder"]
+UNPLUGGED = "device unplugged and back"
+GARBAGE = "serial garbage, bad CRC, truncated frame"
+
+
+def unplug_and_back(wires, daemon, rng, cycles):
+    """Pull the encoders' plug again and again; when it was pulled and put back [ns since the epoch]."""
+    pulled, back = [], []
+    for cycle in range(cycles):
+        time.sleep(rng.uniform(0.25, 0.4))
+        pulled.append(time.time_ns())
+        wires.encoders.plug.unplug()
+        daemon.heard("device encoders WAITING", cycle + 1)
+        time.sleep(rng.uniform(0.0, 0.1))
+        wires.encoders.plug.plug_in()
+        back.append(time.time_ns())
+        daemon.heard("device encoders OPEN", cycle + 2)
+    time.sleep(0.3)
+    return np.array(pulled), np.array(back)
+
+
+def delays(ticks, moments, condition):
+    """From each moment [ns] to the first tick after it that fulfils the condition, by the daemon's own clock [s]."""
+    stamps = ticks["stamp"][condition]
+    return [(stamps[np.searchsorted(stamps, moment)] - moment) * 1e-9 for moment in moments]
+
+
+def cycled(tmp_path, seed, cycles):
+    rng = np.random.default_rng(seed)
+    with service(tmp_path, driven(60.0, seed, skip=2.0)) as (wires, daemon):
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        before = daemon.descriptors()
+        pulled, back = unplug_and_back(wires, daemon, rng, cycles)
+        leaked = max(daemon.descriptors() - before, 0)
+        daemon.stop()
+    ticks = rows(daemon.path(), "/tick")
+    stale = (ticks["stale"] & ENCODERS) > 0
+    return daemon, ticks, delays(ticks, pulled, stale), delays(ticks, back, ~stale), leaked
+
+
+def test_unplugged_and_back(tmp_path, seed, figure):
+    daemon, ticks, noticed, back, leaked = cycled(tmp_path, seed, 4)
+    frozen = ticks[ticks["status"] == Status.STALE]
+    assert len(frozen) and not np.any(frozen["torque_accepted"])
+    for name in ("cohesion", "tan_phi", "cohesion_sigma"):
+        held = ticks[name][np.flatnonzero(ticks["status"] == Status.STALE)]
+        before = ticks[name][np.flatnonzero(ticks["status"] == Status.STALE) - 1]
+        assert np.array_equal(held, before), f"{name} moved while stale"
+    figure(UNPLUGGED, WIRES, "noticed after silence began", max(noticed) * 1e3, "ms", 50)
+    figure(UNPLUGGED, WIRES, "back", max(back), "s", 5.5)
+    figure(UNPLUGGED, WIRES, "descriptors leaked", leaked, "", 0)
+    assert verified(daemon.path())
+
+
+@pytest.mark.slow
+def test_a_hundred_cycles(tmp_path, figure):
+    daemon, _, noticed, back, leaked = cycled(tmp_path, 1, 100)
+    figure(UNPLUGGED, WIRES, "noticed, worst of 100 cycles", max(noticed) * 1e3, "ms", 50)
+    figure(UNPLUGGED, WIRES, "back, worst of 100 cycles", max(back), "s", 5.5)
+    figure(UNPLUGGED, WIRES, "descriptors leaked over 100 cycles", leaked, "", 0)
+    assert verified(daemon.path())
+
+
+def test_garbage_bad_checksum_and_truncated_frames(tmp_path, seed, figure):
+    rng = random.Random(seed)
+    frames, faults = 2500, 0
+    with service(tmp_path) as (wires, daemon):
+        encoders = wires.encoders
+        for number in range(frames):
+            piece = encoders.wire.encode("wheel_encoder", [number], number * 4000)
+            if number < frames - 2 and rng.random() < 0.1:
+                piece = damage(rng, piece, rng.randrange(len(piece)))
+                faults += 1
+            encoders.plug.send(piece)
+            if number % 4 == 0:
+                time.sleep(0.002)
+        time.sleep(0.2)
+        daemon.stop()
+    good, bad, garbage = counted(daemon, "frames", "bad", "garbage bytes")
+    assert bad + garbage > 0
+    figure(GARBAGE, WIRES, "intact frames lost per fault", max(0, frames - faults - good) / faults, "", 1)
+    assert verified(daemon.path())
+
+
+def counted(daemon, *names):
+    """Counters of the encoders' device, from the daemon's own account."""
+    (line,) = [line for _, line in daemon.said if line.startswith("device encoders: ")]
+    return [int(re.search(rf"(\d+) {name}", line).group(1)) for name in names]

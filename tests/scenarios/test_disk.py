@@ -1,0 +1,308 @@
+"""The disk fills, goes read-only, or the process dies while it writes."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.mcapfile import RecordingError
+from estimator.salvage import read
+from tests.scenarios.rig import (
+    ROOT,
+    WIRES,
+    DaemonProcess,
+    Wires,
+    driven,
+    log_lines,
+    recordings,
+    rows,
+    service,
+    verified,
+)
+from tests.scenarios.test_loop import as_root, folder_of_nobody, hand_over
+
+__all__ = ["folder_of_nobody"]
+
+FULL = "disk full"
+READ_ONLY = "log folder read-only"
+KILLED = "kill -9 while logging"
+POWER = "power cut while logging"
+TERM = "SIGTERM"
+KILLS = 500
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A tmpfs of 1 MB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"cannot mount a small tmpfs: {mounted.stderr.strip()}")
+    yield disk
+    subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def test_disk_full(tmp_path, small_disk, seed, figure):
+    """Full for 3 s, then room again: what queued in the meantime is written and no tick is lost."""
+    rng = random.Random(seed)
+    wiring = tmp_path / "wires"
+    wiring.mkdir()
+    with service(wiring, driven(40.0, seed, skip=1.0), logging={"directory": str(small_disk)}) as (_, daemon):
+        time.sleep(rng.uniform(0.5, 1.0))
+        ballast = fill(small_disk)
+        daemon.heard("log degraded")
+        time.sleep(rng.uniform(1.0, 2.0))
+        before = daemon.status()["loop"]
+        ballast.unlink()
+        room = time.monotonic()
+        back = daemon.heard("log writing") - room
+        after = daemon.status()
+        daemon.stop()
+        kept = copied(daemon, tmp_path)
+    assert after["loop"]["ticks"] > before["ticks"]
+    stamps, missed = rows(kept, "/tick")["stamp"], rows(kept, "/loop")["missed"]
+    gone = round((stamps[-1] - stamps[0]) / 4e6) + 1 - len(stamps) - (int(missed[-1]) - int(missed[0]))
+    figure(FULL, f"{WIRES}, on a tmpfs of 1 MB", "logging back after there is room", back, "s", 5.0)
+    figure(FULL, f"{WIRES}, on a tmpfs of 1 MB", "ticks lost", gone, "", 0)
+    assert verified(kept)
+
+
+SMALL_QUEUE = """
+import estimator.writer as m
+m.WriterThread.__init__.__kwdefaults__["capacity"] = 3000
+"""
+
+
+def test_disk_full_for_longer_than_the_queue_holds(tmp_path, small_disk, figure):
+    """The oldest messages are dropped and counted; a new part goes on, and is verified from its checkpoint on."""
+    wiring = tmp_path / "wires"
+    wiring.mkdir()
+    changes = {"logging": {"directory": str(small_disk)}, "prelude": SMALL_QUEUE}
+    with service(wiring, driven(40.0, 1, skip=1.0), **changes) as (_, daemon):
+        time.sleep(0.5)
+        ballast = fill(small_disk)
+        daemon.wait_status(lambda report: report["log"]["dropped"] > 2000)
+        ballast.unlink()
+        daemon.heard("log writing")
+        time.sleep(1.5)
+        daemon.stop()
+        accepted, written, dropped, queued = daemon.account()
+        kept = copied(daemon, tmp_path)
+    first, second = recordings(kept)
+    assert first.run.lost_before == 0 and second.run.lost_before == dropped
+    level = f"{WIRES}, on a tmpfs of 1 MB, a queue of 3000 messages"
+    figure(FULL, level, "messages not accounted for", accepted - written - dropped - queued, "", 0)
+    assert verified(kept)
+
+
+def fill(disk):
+    ballast = disk / "ballast"
+    with open(ballast, "wb", buffering=0) as out:
+        try:
+            while True:
+                out.write(bytes(4096))
+        except OSError:
+            return ballast
+
+
+def copied(daemon, folder):
+    """The recording, off the disk that is unmounted in the end."""
+    first = daemon.path()
+    for part in first.parent.glob("*.mcap"):
+        shutil.copy(part, folder)
+    return folder / first.name
+
+
+@as_root
+def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
+    nobody = pwd.getpwnam("nobody").pw_uid
+    with Wires(folder_of_nobody, logging={"directory": str(folder_of_nobody / "logs")}) as wires:
+        (folder_of_nobody / "logs").mkdir(mode=0o555)
+        with DaemonProcess(wires.config, user=nobody) as daemon:
+            code = daemon.exit_code()
+            took = time.monotonic() - daemon.heard("loaded")
+            refusal = f"gritd: {folder_of_nobody}/logs: cannot keep logs here: Permission denied"
+            assert code == 1 and daemon.text == f"loaded\n{refusal}"
+    figure(READ_ONLY, f"{WIRES}, as nobody", "at start: error and exit, once Python has loaded", took, "s", 1.0)
+
+
+@as_root
+def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
+    """Its permissions are taken away: the open part goes on, a new one cannot begin; said, and repaired when back."""
+    nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
+    logs.mkdir()
+    changes = {"directory": str(logs), "part_time": "2 s"}
+    with Wires(folder_of_nobody, logging=changes) as wires:
+        hand_over(folder_of_nobody, wires, nobody)
+        with DaemonProcess(wires.config, user=nobody) as daemon:
+            daemon.ready()
+            wires.play(driven(40.0, seed, skip=1.0))
+            logs.chmod(0o555)
+            degraded = daemon.heard("log degraded")
+            assert "Permission denied" in daemon.text
+            time.sleep(0.5)
+            assert daemon.status()["loop"]["ticks"] > 100
+            logs.chmod(0o755)
+            back = daemon.heard("log writing") - degraded
+            daemon.stop()
+            assert daemon.account()[2] == 0
+    figure(READ_ONLY, f"{WIRES}, as nobody", "during a run: logging back after 0.5 s without rights", back, "s", 2.5)
+    assert verified(daemon.path())
+
+
+# --- the process dies -------------------------------------------------------------------------------------------------
+
+
+def test_killed_while_logging(tmp_path, seed, figure):
+    rng = random.Random(seed)
+    with service(tmp_path, driven(40.0, seed, skip=1.0)) as (_, daemon):
+        time.sleep(rng.uniform(1.0, 2.0))
+        killed = time.time_ns()
+        daemon.signal(signal.SIGKILL)
+        daemon.exit_code()
+    recording = read(daemon.path())
+    assert not recording.closed and not recording.lost
+    lost = (killed - rows(daemon.path(), "/tick")["stamp"][-1]) * 1e-9
+    figure(KILLED, WIRES, "data lost", lost, "s", 0.25)
+    assert verified(daemon.path())
+
+
+WRITER = """
+import os, sys, time
+from estimator.cdr import Topic
+from estimator.readings import Reading
+from estimator.recording import RunInfo
+from estimator.writer import WriterThread
+for number in range(int(sys.argv[2])):
+    child = os.fork()
+    if not child:
+        writer = WriterThread(f"{sys.argv[1]}/{number}.mcap", [], "a: 1", RunInfo())
+        writer.start()
+        while True:
+            now = time.time_ns()
+            writer.put([Reading(now, "wheel_encoder", number, now)] * 5)
+            time.sleep(0.004)
+    print(child, flush=True)
+    os.waitpid(child, 0)
+"""
+
+
+@pytest.mark.slow
+def test_five_hundred_kills(tmp_path, figure):
+    """The writer in a process of its own, killed at a random time, again and again."""
+    rng = random.Random(1)
+    parent = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(tmp_path), str(KILLS)], stdout=subprocess.PIPE, cwd=ROOT
+    )
+    killed = []
+    for line in parent.stdout:
+        time.sleep(rng.uniform(0.25, 0.7))
+        killed.append(time.time_ns())
+        os.kill(int(line), signal.SIGKILL)
+    assert parent.wait() == 0 and len(killed) == KILLS
+    level = "writer thread in a process of its own"
+    lost = []
+    for number, moment in enumerate(killed):
+        stamps = read(tmp_path / f"{number}.mcap").arrays("/raw/wheel_encoder")["stamp"]
+        lost.append((moment - stamps[-1]) * 1e-9 if len(stamps) else np.inf)
+    readable = sum(np.isfinite(lost))
+    figure(KILLED, level, f"of {KILLS} files not readable", KILLS - readable, "", 0)
+    figure(KILLED, level, "data lost, worst", max(lost), "s", 0.3)
+    figure(KILLED, level, "data lost, 99 %", float(np.quantile(lost, 0.99)), "s", 0.25)
+
+
+def test_power_cut(tmp_path, seed, figure):
+    """Cut at 300 random bytes; what is read is always the beginning of what was written."""
+    check_cuts(tmp_path, seed, figure, lambda size: sorted(random.Random(seed).sample(range(size), 300)))
+
+
+@pytest.mark.slow
+def test_power_cut_at_every_byte(tmp_path, figure):
+    check_cuts(tmp_path, 1, figure, range)
+
+
+def check_cuts(folder, seed, figure, places):
+    whole = short_recording(folder, seed)
+    messages = list(map(repr, read(whole).messages()))
+    data, cut = whole.read_bytes(), folder / "cut.mcap"
+    wrong, unreadable = 0, 0
+    offsets = places(len(data))
+    for size in offsets:
+        cut.write_bytes(data[:size])
+        try:
+            found = list(map(repr, read(cut).messages()))
+        except RecordingError:
+            unreadable += size > 64  # without its header it is no MCAP file
+            continue
+        wrong += found != messages[: len(found)]
+    level = "a daemon's recording, the cut simulated"
+    figure(
+        POWER,
+        level,
+        f"wrong results, cut at {'every byte' if len(offsets) == len(data) else '300 bytes'}",
+        wrong,
+        "",
+        0,
+    )
+    figure(POWER, level, "cuts after the header that cannot be read", unreadable, "", 0)
+
+
+def short_recording(folder, seed):
+    """Of 0.3 s of a daemon without sensors: a few chunks."""
+    with service(folder, logging={"flush_interval": "50 ms"}) as (_, daemon):
+        time.sleep(0.1 * seed)
+        daemon.stop()
+    return daemon.path()
+
+
+# --- SIGTERM ----------------------------------------------------------------------------------------------------------
+
+
+def test_sigterm_under_load(tmp_path, seed, figure):
+    rng = random.Random(seed)
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    try:
+        with service(tmp_path, driven(40.0, seed, skip=1.0)) as (_, daemon):
+            time.sleep(rng.uniform(1.0, 2.0))
+            took = daemon.stop()
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    accepted, written, dropped, queued = daemon.account()
+    (queue,) = [line for _, line in daemon.said if line.startswith("queue:")]
+    assert dropped == queued == 0 and accepted == written and queue.endswith("dropped 0 + queued 0")
+    recording = read(daemon.path())
+    assert recording.complete
+    figure(TERM, f"{WIRES}, two busy processes", "to exit 0 with everything written", took, "s", 2.0)
+    assert verified(daemon.path()) and not any("hanging" in line for line in log_lines(daemon.path()))
+
+
+def test_the_open_part_is_never_deleted(tmp_path, figure):
+    """Parts of a second under a cap of 1 MB: the oldest go first, what remains is verified part by part."""
+    old = tmp_path / "old.mcap"
+    old.write_bytes(bytes(990_000))
+    os.utime(old, (0, 0))
+    with service(tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "disk_cap": "1 MB"}) as (_, daemon):
+        daemon.heard("old.mcap: deleted, over logging.disk_cap")
+        time.sleep(0.5)
+        daemon.stop()
+    parts = sorted(tmp_path.glob("run-*.mcap"), key=lambda path: path.stat().st_mtime)
+    assert len(parts) >= 4 and sum(part.stat().st_size for part in parts) <= 1.2e6
+    assert verified(daemon.path())
+    assert all(verified(part) for part in parts[1:])
+    figure("disk cap and rotation", WIRES, "parts written and verified one by one", len(parts), "")
+    assert Path(daemon.path()).exists()

@@ -1,0 +1,425 @@
+"""The process under pressure: clock steps, stalls, starvation, dead threads, a second instance, another user."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import random
+import signal
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+from threading import Event, Thread
+
+import numpy as np
+import pytest
+
+import estimator.clock
+from drivers.queue import ReadingQueue
+from estimator.clock import Clock
+from estimator.daemon import TICK_TOPIC
+from estimator.loop import Loop
+from estimator.pipeline import Pipeline
+from estimator.salvage import read
+from tests.scenarios.rig import (
+    TESTBED,
+    WIRES,
+    DaemonProcess,
+    Wires,
+    driven,
+    log_lines,
+    rows,
+    service,
+    verified,
+)
+from tools.command import CommandError
+
+CLOCK = "loop over a simulated monotonic clock"
+STARVED = "CPU starvation"
+DIES = "a thread dies"
+
+
+# --- wall clock ------------------------------------------------------------------------------------------------------
+
+
+class SimulatedTime:
+    """Stands for the module `time`: monotonic time moves when somebody sleeps, the wall can be set."""
+
+    def __init__(self, steps):
+        self.monotonic, self.wall = 10**12, 1_700_000_000 * 10**9
+        self.steps = dict(steps)  # monotonic seconds from the start -> step of the wall [s]
+        self.began = self.monotonic
+
+    def monotonic_ns(self):
+        return self.monotonic
+
+    def time_ns(self):
+        return self.wall
+
+    def sleep(self, seconds):
+        self.monotonic += round(seconds * 1e9)
+        self.wall += round(seconds * 1e9)
+        for at in [at for at in self.steps if self.monotonic - self.began >= at * 1e9]:
+            self.wall += round(self.steps.pop(at) * 1e9)
+
+
+class Kept:
+    """A sink that keeps the ticks as they would be logged."""
+
+    def __init__(self, stop, ticks):
+        self.ticks, self.offsets, self._stop, self._wanted = [], [], stop, ticks
+
+    def put(self, readings, tick, loop):
+        self.ticks.append(TICK_TOPIC.codec.encode(tick))
+        self.offsets.append(loop.wall_offset)
+        if len(self.ticks) >= self._wanted:
+            self._stop.set()
+
+    def counts(self):
+        return 0, 0
+
+    def checkpoint(self, *what):
+        raise AssertionError("nobody asked")
+
+
+class Due:
+    """A source that gives readings when the clock says that they have arrived."""
+
+    def __init__(self, readings, clock):
+        start = clock.now()
+        self._clock, self._next = clock, 0
+        self._readings = [r._replace(stamp=r.stamp + start, received=r.received + start) for r in readings]
+
+    def drain(self):
+        first, now = self._next, self._clock.now()
+        while self._next < len(self._readings) and self._readings[self._next].received <= now:
+            self._next += 1
+        return self._readings[first : self._next]
+
+    def dropped(self):
+        return 0
+
+
+def ticks_under(steps, readings, monkeypatch):
+    monkeypatch.setattr(estimator.clock, "time", SimulatedTime(steps))
+    clock, stop = Clock(), Event()
+    sink = Kept(stop, 1000)
+    Loop(Pipeline(TESTBED.settings, "plain"), Due(readings, clock), sink, clock).run(stop)
+    return sink
+
+
+def test_wall_clock_step(seed, monkeypatch, figure):
+    rng = random.Random(seed)
+    readings = driven(6.0, seed)
+    straight = ticks_under({}, readings, monkeypatch)
+    sizes = [sign * 10.0**power for power in (2, 4, 6, 8) for sign in (-1, 1)]
+    steps = {rng.uniform(0.5, 3.5): size for size in sizes}
+    stepped = ticks_under(steps, readings, monkeypatch)
+    different = sum(a != b for a, b in zip(straight.ticks, stepped.ticks, strict=True))
+    assert max(map(abs, stepped.offsets)) > 0.9e2
+    figure(
+        "wall-clock step", CLOCK, "ticks that differ by a bit, of 1000 with steps of ±1e2 … ±1e8 s", different, "", 0
+    )
+
+
+STEPPING = """
+import time, estimator.clock
+class Stepping:
+    monotonic_ns, sleep, began = time.monotonic_ns, time.sleep, time.monotonic()
+    @classmethod
+    def time_ns(cls): return time.time_ns() + (10**8 * 10**9 if time.monotonic() - cls.began > 4.0 else 0)
+estimator.clock.time = Stepping
+"""
+
+
+def test_a_step_in_the_running_daemon_is_annotated(tmp_path, figure):
+    with service(tmp_path, driven(20.0, 1, skip=1.0), prelude=STEPPING) as (_, daemon):
+        daemon.wait_status(lambda report: report["loop"]["wall_offset"] > 1.0)
+        time.sleep(0.5)
+        daemon.stop()
+    stamps = rows(daemon.path(), "/tick")["stamp"]
+    assert any("wall clock stepped by +100000000" in line for line in log_lines(daemon.path()))
+    row = "wall-clock step"
+    jump = np.max(np.diff(stamps)) * 1e-9
+    figure(row, f"{WIRES}, the step simulated in its time.time_ns", "largest gap between ticks", jump, "s", 1.0)
+    assert verified(daemon.path())
+
+
+# --- queue -----------------------------------------------------------------------------------------------------------
+
+
+class Stalled:
+    """A queue's consumer that stalls."""
+
+    def __init__(self, queue, rng):
+        self.queue, self.rng, self.taken = queue, rng, 0
+
+    def run(self, stop):
+        while not stop.is_set():
+            self.taken += len(self.queue.drain())
+            time.sleep(self.rng.uniform(0.0, 0.1))
+
+
+def test_queue_overflow(seed, figure):
+    """Three producers, a consumer that stalls, a small queue: the account is exact at every moment."""
+    rng = random.Random(seed)
+    queue, stop = ReadingQueue(capacity=64), Event()
+    consumer = Stalled(queue, rng)
+    readings = driven(6.0, seed)[:9000]
+    producers = [Thread(target=feed, args=(queue, readings[n::3])) for n in range(3)]
+    consuming = Thread(target=consumer.run, args=(stop,))
+    for thread in (*producers, consuming):
+        thread.start()
+    wrong = 0
+    while any(thread.is_alive() for thread in producers):
+        c = queue.counts()
+        wrong += c.received != c.processed + c.dropped + c.queued
+    stop.set()
+    consuming.join()
+    counts = queue.counts()
+    assert counts.dropped > 0 and counts.processed == consumer.taken
+    assert counts.received == len(readings) == counts.processed + counts.dropped + counts.queued
+    figure(
+        "queue overflow", "reading queue and threads, the stall simulated", "moments of inexact account", wrong, "", 0
+    )
+
+
+def feed(queue, readings):
+    for start in range(0, len(readings), 10):
+        queue.put(readings[start : start + 10])
+        time.sleep(0.001)
+
+
+STALLING = """
+import time
+from estimator.pipeline import Pipeline
+step, calls = Pipeline.step, [0]
+def stalling(self, *arguments):
+    calls[0] += 1
+    if calls[0] == 1000: time.sleep(3.0)
+    return step(self, *arguments)
+Pipeline.step = stalling
+import drivers.queue
+drivers.queue.ReadingQueue.__init__.__defaults__ = (2000,)
+"""
+
+
+def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, figure):
+    with service(tmp_path, driven(20.0, 1, skip=1.0), prelude=STALLING) as (_, daemon):
+        report = daemon.wait_status(lambda report: report["queue"]["dropped"] > 0)
+        report = daemon.wait_status(lambda report: report["loop"]["missed"] > 500 and report["status"] == "TRACKING")
+        counts = report["queue"]
+        daemon.stop()
+    assert any("hanging: loop" in line for line in log_lines(daemon.path()))
+    excess = counts["received"] - counts["processed"] - counts["dropped"] - counts["queued"]
+    figure("queue overflow", f"{WIRES}, the loop made to stall 3 s", "readings not accounted for", abs(excess), "", 0)
+    assert verified(daemon.path())
+
+
+# --- starvation ------------------------------------------------------------------------------------------------------
+
+
+def unreported(path):
+    """Ticks that are neither there nor counted as missed."""
+    stamps, missed = rows(path, "/tick")["stamp"], rows(path, "/loop")["missed"]
+    gone = np.round(np.diff(stamps) / 4e6).astype(int) - 1
+    return int(np.max(np.abs(np.cumsum(gone) - (missed[1:].astype(int) - int(missed[0])))))
+
+
+def test_starved_by_four_busy_processes(tmp_path, seed, figure):
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
+    try:
+        with service(tmp_path, driven(20.0, seed, skip=1.0)) as (_, daemon):
+            time.sleep(3.0)
+            daemon.stop()
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    loop = rows(daemon.path(), "/loop")
+    figure(STARVED, WIRES, "ticks missed and not reported", unreported(daemon.path()), "", 0)
+    figure(STARVED, f"{WIRES}, four busy processes", "lateness, 99 %", np.quantile(loop["lateness"], 0.99) * 1e3, "ms")
+    figure(STARVED, f"{WIRES}, four busy processes", "ticks missed", int(loop["missed"][-1]), "")
+    assert verified(daemon.path())
+
+
+def test_stopped_for_a_while(tmp_path, seed, figure):
+    rng = random.Random(seed)
+    pauses = [0.1, rng.uniform(0.3, 1.0), 5.0 if seed == 1 else rng.uniform(1.0, 2.0)]
+    with service(tmp_path, driven(40.0, seed, skip=1.0)) as (_, daemon):
+        for pause in pauses:
+            time.sleep(0.5)
+            daemon.signal(signal.SIGSTOP)
+            time.sleep(pause)
+            daemon.signal(signal.SIGCONT)
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        assert not daemon.lines("hanging"), daemon.text
+        daemon.stop()
+    missed = int(rows(daemon.path(), "/loop")["missed"][-1])
+    assert missed >= 0.8 * sum(pauses) * 250
+    figure(STARVED, f"{WIRES}, SIGSTOP 0.1 … 5 s", "ticks missed and not reported", unreported(daemon.path()), "", 0)
+    assert verified(daemon.path())
+
+
+# --- threads ---------------------------------------------------------------------------------------------------------
+
+DYING = """
+import time
+moment, told = time.monotonic() + 4.0, []
+def dying(method):
+    def call(*arguments, **options):
+        if time.monotonic() > moment:
+            told or print("fault injected", flush=True)
+            told.append(1)
+            raise ZeroDivisionError("injected")
+        return method(*arguments, **options)
+    return call
+"""
+VICTIMS = {
+    "reader": "import drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
+    "loop": "import estimator.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
+    "writer": "import estimator.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
+    "writer-sync": "import estimator.writer as m; m._Syncer._sync = dying(m._Syncer._sync)",
+    "publisher": "import estimator.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
+}
+
+
+@pytest.mark.parametrize("victim", VICTIMS)
+def test_a_thread_dies(tmp_path, victim, figure):
+    with service(tmp_path, driven(20.0, 1, skip=1.0), prelude=DYING + VICTIMS[victim]) as (_, daemon):
+        while not daemon.lines("fault injected"):
+            if victim == "publisher":
+                poke(daemon)
+            time.sleep(0.02)
+        code = daemon.exit_code()
+        took = time.monotonic() - daemon.heard("fault injected")
+    assert code == 1, daemon.text
+    ((_, line),) = daemon.lines("gritd: ")
+    assert victim.partition("-")[0] in line, line
+    assert "Traceback" not in daemon.text
+    figure(DIES, f"{WIRES}, an exception raised inside", f"{victim}: from the fault to the exit", took, "s", 1.0)
+    read(daemon.path())
+
+
+def poke(daemon):
+    with suppress(CommandError):
+        daemon.status()
+
+
+HANGING = """
+import time, threading
+import drivers.serial_link as m
+moment, read = time.monotonic() + 4.0, m.SerialLink.read
+def hanging(self):
+    if time.monotonic() > moment: time.sleep(3600)
+    return read(self)
+m.SerialLink.read = hanging
+"""
+
+
+@pytest.mark.slow
+def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, figure):
+    with service(tmp_path, driven(30.0, 1, skip=1.0), prelude=HANGING, watchdog=0.6) as (_, daemon):
+        assert daemon.strokes(2.0) >= 5
+        daemon.heard("hanging: reader encoders; the watchdog is not stroked")
+        strokes = daemon.strokes(2.0)
+        figure(DIES, f"{WIRES}, a read that never returns", "watchdog strokes while a reader hangs", strokes, "", 0)
+        assert not daemon.status()["healthy"]
+
+
+# --- garbage collection ----------------------------------------------------------------------------------------------
+
+COLLECTING = """
+import gc, threading, time
+def collect():
+    time.sleep(4.0)
+    heap = [[n] for n in range(1_000_000)]
+    start = time.monotonic()
+    gc.collect()
+    print(f"collected in {time.monotonic() - start:.3f} s", flush=True)
+threading.Thread(target=collect, daemon=True).start()
+"""
+
+
+def test_garbage_collector_pause(tmp_path, seed, figure):
+    with service(tmp_path, driven(20.0, seed, skip=1.0), prelude=COLLECTING) as (_, daemon):
+        daemon.heard("collected in ")
+        time.sleep(0.5)
+        report = daemon.status()
+        daemon.stop()
+    lost = sum(device["lost"] for device in report["devices"].values()) + report["queue"]["dropped"]
+    late = np.max(rows(daemon.path(), "/loop")["lateness"])
+    level = f"{WIRES}, 1e6 objects collected inside"
+    figure("garbage-collector pause", level, "samples lost", lost, "", 0)
+    figure("garbage-collector pause", level, "largest lateness", late * 1e3, "ms")
+    assert unreported(daemon.path()) == 0 and verified(daemon.path())
+
+
+# --- who runs it -----------------------------------------------------------------------------------------------------
+
+
+def test_second_instance(tmp_path, seed, figure):
+    with service(tmp_path, driven(20.0, seed, skip=1.0)) as (wires, daemon):
+        with DaemonProcess(wires.config) as second:
+            code = second.exit_code()
+            took = time.monotonic() - second.heard("loaded")
+        assert code == 1 and "another gritd is logging here" in second.text
+        time.sleep(0.3)
+        daemon.stop()
+    assert len(list(tmp_path.glob("*.mcap"))) == 1 and verified(daemon.path())
+    figure("second instance", "two daemon processes", "refused, once Python has loaded", took, "s", 0.5)
+
+
+as_root = pytest.mark.skipif(
+    os.geteuid() != 0, reason="only root can become nobody; these tests run unprivileged already"
+)
+
+
+@as_root
+def test_unprivileged_user(folder_of_nobody, seed, figure):
+    nobody = pwd.getpwnam("nobody").pw_uid
+    with Wires(folder_of_nobody) as wires:
+        hand_over(folder_of_nobody, wires, nobody)
+        with DaemonProcess(wires.config, user=nobody) as daemon:
+            daemon.ready()
+            wires.play(driven(20.0, seed, skip=1.0))
+            daemon.wait_status(lambda report: report["status"] == "TRACKING")
+            assert stat.S_IMODE(os.stat(daemon.socket).st_mode) == 0o660
+            daemon.stop()
+    assert verified(daemon.path())
+    figure("unprivileged user", f"{WIRES}, as nobody", "exit code after SIGTERM", 0, "", 0)
+
+
+@as_root
+def test_a_device_it_may_not_open_is_a_clear_error(folder_of_nobody, figure):
+    nobody = pwd.getpwnam("nobody").pw_uid
+    with Wires(folder_of_nobody) as wires:
+        hand_over(folder_of_nobody, wires, nobody)
+        port = os.path.realpath(wires.encoders.plug.path)
+        os.chown(port, 0, 0)
+        os.chmod(port, 0o600)
+        with DaemonProcess(wires.config, user=nobody) as daemon:
+            daemon.heard("device encoders WAITING")
+            assert "Permission denied (is the user in the port's group, often dialout?)" in daemon.text
+            os.chmod(port, 0o666)
+            daemon.heard("device encoders OPEN")
+            daemon.stop()
+    figure("unprivileged user", f"{WIRES}, as nobody", "lines that say why a port cannot be opened", 1, "")
+
+
+@pytest.fixture
+def folder_of_nobody():
+    """Below /tmp: pytest's own folders are closed to others."""
+    with tempfile.TemporaryDirectory() as name:
+        os.chmod(name, 0o755)
+        yield Path(name)
+
+
+def hand_over(folder, wires, uid):
+    """Folder, files and the terminal's slave to another user."""
+    for path in (folder, *folder.iterdir()):
+        os.chown(path, uid, uid)

@@ -1,0 +1,181 @@
+"""Readings that are wrong: what reaches the filter, through the drivers' decoders and the pipeline."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.build import build_decoder
+from drivers.can_link import packed
+from drivers.wire import CanWire, SerialWire
+from estimator.daemon import TICK_TOPIC
+from estimator.pipeline import Pipeline
+from estimator.readings import Reading
+from estimator.record import CHANNEL_BITS, TICK_NAMES, Status
+from estimator.sync import Sync
+from tests.scenarios.rig import TESTBED, driven
+
+SETTINGS = TESTBED.settings
+START = 1_700_000_000_000_000_000
+TICK = 4_000_000  # [ns]
+PIPELINE = "pipeline, readings simulated"
+DRIVERS = "drivers' decoders and pipeline, bytes simulated"
+ESTIMATE = ("cohesion", "cohesion_sigma", "tan_phi", "tan_phi_sigma", "shear_modulus", "shear_modulus_sigma")
+
+
+def shifted(readings):
+    return [r._replace(stamp=r.stamp + START, received=r.received + START) for r in readings]
+
+
+def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
+    """Every tick over readings in order of arrival, as a structured array, or as the bytes that are logged."""
+    pipeline = Pipeline(settings, "plain")
+    state, records, due = pipeline.start(), [], 0
+    end = max(r.received for r in readings)
+    for t in range(START + TICK, end, TICK):
+        batch = []
+        while due < len(readings) and readings[due].received <= t:
+            batch.append(readings[due])
+            due += 1
+        state, record = pipeline.step(state, batch, t)
+        records.append(record)
+    if encoded:
+        return [TICK_TOPIC.codec.encode(record) for record in records]
+    return {name: np.array([record[i] for record in records]) for i, name in enumerate(TICK_NAMES)}
+
+
+# --- encoder rollover ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_encoder_rollover(seed, bits, direction, figure):
+    """The same motion far from the edge and across it, as bytes through the real framing: the same speed to the bit."""
+    rng = random.Random(seed)
+    steps = [rng.randrange(30) for _ in range(250)]
+    far, near = ((1 << bits) // 2, (1 << bits) - 1500 if direction > 0 else 1500)
+    speeds = [speed_through_wire(start, steps, direction, bits) for start in (far, near)]
+    error = np.max(np.abs(np.array(speeds[0]) - np.array(speeds[1])))
+    figure("encoder rollover", DRIVERS, f"velocity error across 2^{bits}, either direction", error, "rad/s", 0)
+
+
+def speed_through_wire(start, steps, direction, bits):
+    settings = with_bits(bits)
+    device = settings.devices["encoders"]
+    wire, decoder, sync = SerialWire(device), build_decoder(settings, device), Sync(settings)
+    count, speeds = start, []
+    for number, step in enumerate(steps):
+        t = START + number * TICK
+        count += direction * step
+        data = wire.encode("wheel_encoder", [count % (1 << bits)], number * 4000)
+        for reading in decoder.decode(t, data):
+            sync.push(reading)
+        speeds.append(sync.snapshot(t).wheel_speed.value)
+    return speeds[60:]
+
+
+def with_bits(bits):
+    channels = dict(SETTINGS.channels)
+    channels["wheel_encoder"] = replace(channels["wheel_encoder"], bits=bits)
+    return replace(SETTINGS, channels=channels)
+
+
+# --- jumps, stuck, impossible values ---------------------------------------------------------------------------------
+
+
+def test_encoder_counter_jump(seed, figure):
+    rng = random.Random(seed)
+    clean = shifted(driven(8.0, seed))
+    at, offset = clean[len(clean) // 2].stamp, rng.choice([-1, 1]) * rng.randrange(5000, 2**31)
+    jumped = [
+        r._replace(value=r.value + offset) if r.channel == "wheel_encoder" and r.stamp >= at else r for r in clean
+    ]
+    before, after = ticks_of(clean), ticks_of(jumped)
+    assert after["jumps"][-1] == 1
+    spike = np.nanmax(np.abs(after["wheel_speed"] - before["wheel_speed"])) / np.nanmax(np.abs(before["wheel_speed"]))
+    moved = abs(after["cohesion"][-1] - before["cohesion"][-1]) / before["cohesion_sigma"][-1]
+    figure("encoder counter jump", PIPELINE, "largest change of wheel speed", spike * 100, "%", 1)
+    figure("encoder counter jump", PIPELINE, "change of c at the end", moved, "σ", 0.1)
+
+
+@pytest.mark.parametrize("channel", ["wheel_encoder", "sinkage_pot", "motor_shunt"])
+def test_stuck_sensor(seed, channel, figure):
+    rng = random.Random(seed)
+    readings = shifted(driven(8.0, seed))
+    since = START + int(rng.uniform(3.0, 5.0) * 1e9)
+    held = next(r.value for r in reversed(readings) if r.channel == channel and r.stamp < since)
+    frozen = [r._replace(value=held) if r.channel == channel and r.stamp >= since else r for r in readings]
+    ticks = ticks_of(frozen)
+    stuck = (ticks["stuck"] & CHANNEL_BITS[channel]) > 0
+    assert not np.any(stuck[ticks["stamp"] < since])
+    noticed = (ticks["stamp"][stuck][0] - since) * 1e-9
+    assert set(ticks["status"][stuck]) <= {Status.STUCK, Status.STANDSTILL}
+    figure("stuck sensor", PIPELINE, "noticed after it froze, tick's own delay of 0.05 s included", noticed, "s", 0.4)
+
+
+def test_no_false_alarm_of_a_stuck_sensor(seed, figure):
+    """A minute at rest and a minute of driving with its stops."""
+    rest = [r for r in shifted(driven(8.0, seed)) if r.stamp < START + 1.4e9]
+    alarms = np.sum(ticks_of(rest)["stuck"] > 0) + np.sum(ticks_of(shifted(driven(20.0, seed)))["stuck"] > 0)
+    figure("stuck sensor", PIPELINE, "ticks of false alarm at rest and driving", int(alarms), "", 0)
+
+
+BAD = (math.nan, math.inf, -math.inf, 1e300, -1e300)
+
+
+def test_not_a_number_infinity_and_out_of_range(seed, figure):
+    """Every analogue field in turn with every impossible value, as bytes on the wire, among good ones."""
+    rng = random.Random(seed)
+    device = SETTINGS.devices["bus"]
+    wire, decoder = CanWire(device), build_decoder(SETTINGS, device)
+    signals = {"sinkage_pot": "SinkagePot.Volts", "motor_shunt": "MotorShunt.Volts"}
+    readings, refused = [], 0
+    for r in shifted(driven(5.0, seed)):
+        readings.append(r)
+        if r.channel in signals and rng.random() < 0.1:
+            bad = rng.choice(BAD[:3])
+            message = wire.encode(signals[r.channel], [bad], r.stamp // 1000)
+            decoded = decoder.decode(r.received, packed(message))
+            refused += not decoded
+            readings += decoded
+            readings.append(Reading(r.stamp + 1, r.channel, rng.choice(BAD), r.received))
+        elif r.channel == "wrench" and rng.random() < 0.1:
+            readings.append(Reading(r.stamp + 1, "wrench", wild_wrench(rng), r.received))
+    ticks = ticks_of(readings)
+    unfit = sum(int(np.sum(~np.isfinite(ticks[name]))) for name in ESTIMATE)
+    assert refused > 50 and ticks["invalid"][-1] > 100
+    assert np.sum(ticks["status"] == Status.TRACKING) > 300
+    figure("NaN, Inf, out of range", DRIVERS, "non-finite estimates", unfit, "", 0)
+
+
+def wild_wrench(rng):
+    values = [rng.uniform(-1, 1) for _ in range(6)]
+    values[rng.choice((0, 1, 2, 4))] = rng.choice(BAD[1:])
+    return tuple(values)
+
+
+# --- order -----------------------------------------------------------------------------------------------------------
+
+
+def test_duplicate_late_and_reordered_stamps(seed, figure):
+    """Delays of up to 40 ms, one reading in ten twice: inside the horizon the same bits as the sorted run."""
+    rng = random.Random(seed)
+    clean = shifted(driven(8.0, seed))
+    delayed = [r._replace(received=r.stamp + rng.randrange(40_000_000)) for r in clean]
+    twice = [r._replace(received=r.received + rng.randrange(5_000_000)) for r in delayed if rng.random() < 0.1]
+    permuted = sorted([*delayed, *twice], key=lambda r: r.received)
+    straight = sorted((r._replace(received=r.stamp) for r in clean), key=lambda r: r.stamp)
+    same, other = ticks_of(straight), ticks_of(permuted)
+    length = min(len(same["stamp"]), len(other["stamp"]))
+    compared = [name for name in TICK_NAMES if name not in ("consumed", "duplicates", "stale", "status", "flags")]
+    different = sum(
+        not np.array_equal(same[name][50:length], other[name][50:length], equal_nan=True) for name in compared
+    )
+    row = "duplicate, late or reordered stamps"
+    figure(row, PIPELINE, "fields of all ticks that differ from the sorted run", different, "", 0)
+    counted = abs(int(other["duplicates"][-1]) - len(twice)) / len(twice)
+    figure(row, PIPELINE, "duplicates not counted", counted * 100, "%", 1)

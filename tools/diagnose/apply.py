@@ -1,4 +1,4 @@
-"""The configuration that models what was found: effects with value and sigma, for simulator, daemon and the next campaign."""
+"""The configuration that models what was found: effects with value and sigma, for simulator, daemon, next campaign."""
 
 from __future__ import annotations
 

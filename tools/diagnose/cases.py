@@ -175,7 +175,7 @@ def _read(plan: Plan, name: str, values: Array, rng: np.random.Generator, noisy:
 
 
 def scaled(effect: type[Effect], size: float, rng: np.random.Generator) -> Effect:
-    """The effect at `size` times its expected strength; bipolar strengths of either sign, shapes inside their spread."""
+    """The effect at `size` times its expected strength; bipolar strengths of either sign, shapes drawn."""
     values = {}
     for p in effect.parameters():
         if p.role == "strength":
@@ -184,4 +184,3 @@ def scaled(effect: type[Effect], size: float, rng: np.random.Generator) -> Effec
         else:
             values[p.name] = float(np.clip(p.centre + 0.4 * p.sigma * rng.uniform(-1, 1), p.low, p.high))
     return effect(**values)
-

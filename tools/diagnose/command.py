@@ -16,9 +16,9 @@ from estimator.salvage import Recording
 from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser
 from tools.diagnose.apply import applied
-from tools.diagnose.engine import diagnose
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
+from tools.diagnose.engine import diagnose
 from tools.diagnose.load import drive_series, is_drive, read_all, sha256, signals
 from tools.diagnose.result import Diagnosis
 from tools.diagnose.rig import Rig
@@ -79,7 +79,7 @@ def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, floa
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd diagnose",
-        description="Find where model and recordings differ, name the physics left out, model it, show the fit improve.",
+        description="Find where model and recordings differ, name the physics left out, model it, show the fit.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings, one a run")
     parser.add_argument("--config", required=True, help="the testbed and what is known of the soil")

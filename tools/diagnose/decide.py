@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.diagnose.evidence import Base
+from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.screen import Screen, whitened
 from tools.diagnose.select import Model, Search
@@ -21,6 +21,10 @@ from tools.diagnose.select import Model, Search
 TEMPERATURE = 2.0  # of evidence where nothing remains
 LEFTOVER = 0.15  # further temperature per nat left unexplained
 ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off, cannot be told apart
+LISTED = 5.0  # [nats] head start of the library over functions without a name
+SHAPE = 0.05  # and this share of its evidence, since a form's details may differ
+PAIR = 3.0  # [nats] a second function must gain
+FAMILIES = 2  # functions without a name that may act together
 TAKEN = 0.8  # share of the explainable misfit a listed explanation must take
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 
@@ -43,9 +47,11 @@ def decide(search: Search) -> Decision:
         verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
         return Decision(verdict, base, 1.0, 0.0, False, _quiet(found), 0.0, {})
     best, share, left, significant = _explanation(search)
-    listed = bool(best.names) and (not significant or share >= TAKEN)
-    unlisted = _unlisted(share, significant, bool(best.names))
     temperature = TEMPERATURE + LEFTOVER * left
+    gained = best.evidence - base.evidence
+    ahead = nameless(search, found) - gained - LISTED - SHAPE * max(gained, 0.0)
+    unlisted = max(_unlisted(share, significant, bool(best.names)), float(1.0 / (1.0 + np.exp(-ahead / TEMPERATURE))))
+    listed = bool(best.names) and unlisted < 0.5
     probability = {n: p * (1.0 - unlisted) for n, p in probabilities(search.models, temperature).items()}
     return Decision(
         "explained" if listed else "unlisted",
@@ -74,6 +80,25 @@ def remaining(search: Search, model: Model) -> tuple[float, bool]:
     smooth = np.linalg.inv(a + np.eye(len(b)))
     value, nulls = 0.5 * b @ smooth @ b, 0.5 * np.sum(null * (smooth @ null), axis=0)
     return float(max(value - nulls.mean(), 0.0)), bool(value > np.quantile(nulls, 0.98))
+
+
+def nameless(search: Search, found: Screen) -> float:
+    """Evidence for the best one or two smooth functions of covariates, taken up in turn [nats]."""
+    base = search.models[0].fitted.base()
+    ready = whitened(search.problem.noise, search.generics)
+    a, b = base.projected(np.column_stack([w.columns for w in ready]))
+    ends = np.cumsum([w.columns.shape[1] for w in ready])
+    parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
+    total, kept = 0.0, np.zeros(0, dtype=int)
+    for _ in range(FAMILIES):
+        tried = [
+            float(log_bayes(a[np.ix_(i, i)], b[i], (0,) * len(i))) for p in parts if (i := np.union1d(kept, p)).size
+        ]
+        best = int(np.argmax(tried))
+        if tried[best] - PAIR <= total:
+            break
+        total, kept = tried[best] - (PAIR if kept.size else 0.0), np.union1d(kept, parts[best])
+    return total
 
 
 def _unlisted(share: float, significant: bool, any_effect: bool) -> float:

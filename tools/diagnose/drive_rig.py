@@ -1,7 +1,7 @@
 """The adapter for a motor drive without soil: T = J dω/dt + B ω, and whatever of the library acts on a drivetrain.
 
-The same engine, effects and statistics as for a wheel. Sizes: the library's expectations are those of a small wheel, so
-an effect sees torques in units of the drive's own, `unit` newton metres, and speeds in units of its usual speed; what is
+The same engine, effects and statistics as for a wheel. The library's expected sizes are those of a small wheel, so an
+effect sees torques in units of the drive's own, `unit` newton metres, and speeds in units of its usual speed; what is
 said is in newton metres and radians a second again.
 """
 
@@ -26,7 +26,7 @@ RATE = 50.0  # [Hz]
 FINE = 250.0  # [Hz] on which position and current are averaged before they are filtered
 WINDOW = 17  # fine samples of the one filter of position and current: 68 ms
 USUAL = 2.0  # size that the drive's torque has in units of `unit`: that of the wheel the priors were made for
-STILL = 0.25  # share of the usual speed below which friction's direction is open
+STILL = 0.05  # share of the usual speed below which friction's direction is open
 EFFECTS_OF_A_DRIVE = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple", "motor_heating", "current_offset",
     "sensor_latency",
@@ -61,7 +61,9 @@ class DriveRig:
 
     def _guess(self, name: str) -> tuple[float, float]:
         """A constant that is not known: nothing, give or take what would take all of the torque."""
-        size = np.sqrt(np.mean(np.concatenate([m["velocity" if name == "speed" else name] for m in self._motions]) ** 2))
+        size = np.sqrt(
+            np.mean(np.concatenate([m["velocity" if name == "speed" else name] for m in self._motions]) ** 2)
+        )
         return 0.0, float(10.0 * USUAL * self.unit / size)
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
@@ -107,7 +109,9 @@ def _motion(series: Mapping[str, Series], constant: float) -> dict[str, Array]:
     """Position, its derivatives and the torque on the grid, all through one filter, so that none lags another."""
     time, angle = series["wheel_encoder"]
     current_time, current = series["motor_shunt"]
-    fine = np.arange(max(time[0], current_time[0]) + 1.0 / FINE, min(time[-1], current_time[-1]) - 1.0 / FINE, 1.0 / FINE)
+    fine = np.arange(
+        max(time[0], current_time[0]) + 1.0 / FINE, min(time[-1], current_time[-1]) - 1.0 / FINE, 1.0 / FINE
+    )
     angle, current = _averaged(fine, time, angle), _averaged(fine, current_time, current)
 
     smooth = savgol_filter(angle, WINDOW, 3)

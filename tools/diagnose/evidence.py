@@ -1,13 +1,13 @@
-"""Evidence for an effect by linear algebra: how much better the recordings are expected with its signature than without.
+"""Evidence for an effect by linear algebra: how much likelier the recordings are with its signature than without.
 
 Unknowns of the base model (soil, calibration, tolerance) have unit normal priors, so stacking [whitened J; I] under
-[whitened residual; −u] turns the fit with priors into plain least squares, in which the strain of a parameter against its
-prior is a residual like any other. An effect of signature S and strength a ~ N(0, s²) then has the log Bayes factor
+[whitened residual; −u] turns the fit with priors into plain least squares, in which the strain of a parameter against
+its prior is a residual like any other. An effect of signature S and strength a ~ N(0, s²) then has the log Bayes factor
 
     ln B(s) = ½ bᵀ(A + s⁻²I)⁻¹ b − ½ ln det(I + s²A),   A = SᵀMS,  b = SᵀMr,  M the projection off the base model,
 
 averaged over a few s about the expected size, so that no single size is preferred. Strengths bounded to one side count
-only that side. The formula is that of Bayesian linear regression (Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14).
+only that side. Source: Bayesian linear regression (Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SCALES = np.array([0.1, 0.3, 1.0, 3.0])  # sizes of a strength tried, in units o
 
 @dataclass(frozen=True)
 class Signature:
-    """Whitened derivative of all values by each strength, in units of its expected size (N, p); sign: +1 one-sided, 0."""
+    """Derivative of all values by each strength, per expected size (N, p); sign: 1 where bounded to one side."""
 
     name: str
     columns: Array

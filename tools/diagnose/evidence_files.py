@@ -9,6 +9,7 @@ import numpy as np
 from estimator.terramechanics.soil import Array
 from tools.diagnose.heldout import Held
 from tools.diagnose.result import Location, Scatter, Trace
+from tools.diagnose.rig import Bools
 from tools.diagnose.select import Search
 
 PICTURES = 4  # scatters at most
@@ -33,7 +34,7 @@ def traces(search: Search, before: Held, after: Held) -> tuple[Trace, ...]:
     return tuple(out)
 
 
-def _spread(values: Array, used: Array) -> list[float]:
+def _spread(values: Array, used: Bools) -> list[float]:
     """Values at the used places, NaN elsewhere."""
     out = np.full(used.size, np.nan)
     out[used] = values

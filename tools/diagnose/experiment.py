@@ -1,6 +1,6 @@
 """What to do next: the feasible experiment that best tells the remaining rivals apart.
 
-Driven experiments are foreseen: each rival, at its fit, is simulated under the proposed motion, and the expected gain is
+Driven experiments are foreseen: each rival, at its fit, is simulated under the proposed motion; the expected gain is
 half the squared distance of the predictions in units of noise (the Kullback-Leibler divergence of two equal Gaussians).
 An instrument's reading is worth half the squared parameter over a fifth of its expected size.
 """
@@ -44,11 +44,9 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
 
 
 def _rivals(search: Search, decision: Decision) -> list[Model]:
-    best = decision.best
-    close = [
-        m for m in search.models
-        if len(m.names) == len(best.names) and any(set(m.names) - set(best.names) <= set(r) for r in decision.groups.values())
-    ]  # fmt: skip
+    best, groups = decision.best, decision.groups.values()
+    same = [m for m in search.models if len(m.names) == len(best.names)]
+    close = [m for m in same if any(set(m.names) - set(best.names) <= set(g) for g in groups)]
     return sorted(close, key=lambda m: -m.evidence)[:3] if best.names else []
 
 

@@ -65,7 +65,7 @@ class Fitted:
 
     def covariance(self) -> Array:
         gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
-        return np.linalg.inv(gram)
+        return np.asarray(np.linalg.inv(gram))
 
     @property
     def log_evidence(self) -> float:
@@ -126,7 +126,7 @@ class Problem:
         for share in (1.0, 0.4, 0.1):
             tried = self._bounded(free, centre + share * step, q)
             predicted, residual = self._at(effects, free, tried, q)
-            slack, objective = self._slack(residual, tried, penalty)
+            _, objective = self._slack(residual, tried, penalty)
             if objective < best.objective:
                 return self._state(effects, free, tried, q, (predicted, residual), penalty)
         return None
@@ -147,7 +147,7 @@ class Problem:
         """Best tolerance for a residual, and the objective with it."""
         t = self.tolerance
         gram = t.T @ t + np.eye(t.shape[1])
-        slack = np.linalg.solve(gram, t.T @ residual) if t.shape[1] else np.zeros(0)
+        slack = np.asarray(np.linalg.solve(gram, t.T @ residual)) if t.shape[1] else np.zeros(0)
         left = residual - t @ slack
         return slack, float(left @ left + slack @ slack + np.sum((penalty[: len(centre)] * centre) ** 2))
 

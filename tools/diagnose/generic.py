@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Signature
-from tools.diagnose.rig import Stack
+from tools.diagnose.rig import Bools, Stack
 
 SIZE = 0.03  # of the channel's size: the expected size of a misfit; a third and three times of it are tried too
 WAVES = 4  # cosines along time or place
@@ -34,7 +34,7 @@ def signatures(stack: Stack) -> list[Signature]:
 
 
 def tolerance(stack: Stack, share: float) -> Array:
-    """Smooth columns (N, t), each one standard deviation of what the model itself may be off by: a share of the channel."""
+    """Smooth columns (N, t), each one standard deviation of what the model may be off by: a share of the channel."""
     columns = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
@@ -78,15 +78,15 @@ def _waves(values: Array) -> Array | None:
     return np.column_stack([np.cos(np.pi * k * along) for k in range(1, WAVES + 1)])
 
 
-def _standard(values: Array, where: Array) -> Array | None:
+def _standard(values: Array, where: Bools) -> Array | None:
     inside = values[where]
     spread = float(np.std(inside)) if inside.size else 0.0
     if spread <= LEVELS * max(float(np.abs(values).max()), 1e-12):
         return None
-    return np.clip((values - inside.mean()) / spread, -4.0, 4.0)
+    return np.asarray(np.clip((values - inside.mean()) / spread, -4.0, 4.0))
 
 
-def _scaled(columns: Array, own: Array, size: float) -> Array:
+def _scaled(columns: Array, own: Bools, size: float) -> Array:
     """Columns of root mean square `size` on the channel; those that vanish there are left out."""
     rms = np.sqrt(np.mean(columns[own] ** 2, axis=0)) if own.any() else np.zeros(columns.shape[1])
     kept = rms > 1e-9

@@ -13,14 +13,14 @@ import numpy as np
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose.fit import Fitted
-from tools.diagnose.rig import Bools, Stack
+from tools.diagnose.rig import Bools, Index, Stack
 
 BANDS = 3  # slip and load bands
 
 
 @dataclass(frozen=True)
 class Held:
-    """log_density: of each fold's values given the others [nats]; predicted: (N,) with the value's own fold held out."""
+    """log_density: of each fold given the others [nats]; predicted: (N,) with the value's own fold held out."""
 
     log_density: Array
     predicted: Array
@@ -47,13 +47,13 @@ def condition_folds(stack: Stack) -> list[Bools]:
     return [f for f in folds if f.any() and not f.all()]
 
 
-def _bands(values: Array) -> Array:
+def _bands(values: Array) -> Index:
     edges = np.quantile(values, np.arange(1, BANDS) / BANDS)
-    return np.searchsorted(edges, values, side="right")
+    return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.intp)
 
 
-def _thirds(time: Array, run: Array) -> Array:
-    out = np.zeros(time.size, dtype=int)
+def _thirds(time: Array, run: Index) -> Index:
+    out = np.zeros(time.size, dtype=np.intp)
     for r in np.unique(run):
         own = run == r
         span = max(float(np.ptp(time[own])), 1e-9)

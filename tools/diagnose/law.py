@@ -1,7 +1,7 @@
-"""A law for what has no name: few terms of the slip, the sinkage and the speed, fitted with the soil, in one channel.
+"""A law for what has no name: few terms of slip, sinkage and speed, fitted with the soil, in one channel.
 
-The terms are those of effect `empirical_law`, so that simulator and filter can use what was found. They are taken up one
-at a time while their evidence pays for them.
+The terms are those of effect `empirical_law`, so that simulator and filter can use what was found. They are taken up
+one at a time while their evidence pays for them.
 """
 
 from __future__ import annotations

@@ -12,18 +12,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from estimator.recording import RunInfo
 from estimator.salvage import Recording, read
 from estimator.settings import Calibration, Channel, Settings
 from estimator.terramechanics.soil import Array
-from tools.diagnose.rig import Index
 from tools.command import DAMAGED, USAGE, CommandError
+from tools.diagnose.rig import Index
 
 NS = 1e-9
 LEAST = 0.3  # share of the usual number of readings below which an interval is not used
 OUTLIER = 6.0  # [σ] from the interval's mean: one such reading is left out
-REACH = 1  # intervals to either side over which an encoder's slope is fitted
+QUICK, STEADY = 1, 4  # intervals to either side over which an encoder's slope is fitted
+CALM = 4.0  # [σ] within which the two slopes are the same
 
 
 Series = tuple[Array, Array]  # times [s] in order, and values
@@ -113,9 +115,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
 _NONE = (np.zeros(0), np.zeros(0))
 
 
-def _analogue(
-    recording: Recording, settings: Settings, series: dict[str, Series]
-) -> dict[str, Series]:
+def _analogue(recording: Recording, settings: Settings, series: dict[str, Series]) -> dict[str, Series]:
     names = {"sinkage_pot": "sinkage", "motor_shunt": "current", "motor_temperature": "temperature"}
     found = {names[name]: series[name] for name in names if name in series and series[name][0].size}
     wrench = settings.wrench
@@ -155,20 +155,31 @@ def _ordered(time: Array, values: Array) -> Series:
 
 
 def block_mean(time: Array, values: Array, edges: Array) -> Array:
-    """Mean of the readings in each interval (n,), moved to its middle; single readings far off the rest are left out."""
+    """Mean of the readings in each interval (n,), moved to its middle; single readings far off are left out."""
+    n = edges.size - 1
     block = np.searchsorted(edges, time, side="right") - 1
-    inside = (block >= 0) & (block < edges.size - 1)
+    inside = (block >= 0) & (block < n)
     block, time, values = block[inside], time[inside], values[inside]
-    mean, count = _mean(block, values, edges.size - 1)
-    deviation = values - mean[block]
+    deviation = values - _median(block, values, n)[block]
     scale = 1.4826 * np.median(np.abs(deviation)) if deviation.size else 0.0
     kept = np.abs(deviation) <= OUTLIER * scale if scale > 0.0 else np.ones(block.size, bool)
-    mean, count = _mean(block[kept], values[kept], edges.size - 1)
+    mean, count = _mean(block[kept], values[kept], n)
+    at = _mean(block[kept], time[kept], n)[0]
     usual = np.median(count[count > 0]) if (count > 0).any() else 1.0
-    early = 0.5 * (edges[1:] + edges[:-1]) - _mean(block[kept], time[kept], edges.size - 1)[0]
-    mean = np.where(count >= LEAST * usual, mean, np.nan)
-    drift = np.gradient(mean, edges[1] - edges[0]) if mean.size > 1 else 0.0 * mean
-    return mean + np.where(np.isfinite(drift), drift * early, 0.0)
+    enough = count >= LEAST * usual
+    out = np.full(n, np.nan)
+    if np.count_nonzero(enough) > 1:
+        rate = np.gradient(mean[enough], at[enough])
+        out[enough] = mean[enough] + rate * (0.5 * (edges[1:] + edges[:-1]) - at)[enough]
+    return out
+
+
+def _median(block: Index, values: Array, n: int) -> Array:
+    """Median of each interval (n,); 0 where it is empty."""
+    order = np.lexsort((values, block))
+    count = np.bincount(block, minlength=n)
+    middle = np.cumsum(count) - count + count // 2
+    return np.where(count > 0, values[order[np.minimum(middle, max(values.size - 1, 0))]], 0.0)
 
 
 def _mean(block: Index, values: Array, n: int) -> tuple[Array, Array]:
@@ -177,24 +188,39 @@ def _mean(block: Index, values: Array, n: int) -> tuple[Array, Array]:
 
 
 def slope(time: Array, values: Array, edges: Array) -> tuple[Array, Array]:
-    """Value and slope of an encoder at the middle of each interval, by a line fitted over it and its neighbours."""
-    n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1])
+    """Value and slope of an encoder at the middle of each interval.
+
+    By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is steady within its own
+    noise, STEADY to either side: at creeping speed one count is much of the slip.
+    """
+    at, quick = _line(time, values, edges, QUICK)
+    far, steady = _line(time, values, edges, STEADY)
+    off = np.abs(np.nan_to_num(quick - steady))
+    calm = minimum_filter(off <= CALM * 1.4826 * np.median(off), 2 * STEADY + 1, mode="nearest")
+    calm &= np.isfinite(steady)
+    return np.where(calm, far, at), np.where(calm, steady, quick)
+
+
+def _line(time: Array, values: Array, edges: Array, reach: int) -> Series:
+    """Value and slope (n,) of lines fitted over each interval and `reach` more on either side."""
+    n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     block = np.searchsorted(edges, time, side="right") - 1
     inside = (block >= 0) & (block < n)
     block, t, y = block[inside], time[inside] - edges[0], values[inside]
-    sums = [_spread(np.bincount(block, weights=w, minlength=n).astype(float)) for w in (np.ones(t.size), t, t * t, y, t * y)]
-    s0, s1, s2, y0, y1 = sums
+    y = y - (first := y[0] if y.size else 0.0)
+    weights = (np.ones(t.size), t, t * t, y, t * y)
+    s0, s1, s2, y0, y1 = (_spread(np.bincount(block, weights=w, minlength=n).astype(float), reach) for w in weights)
     with np.errstate(invalid="ignore", divide="ignore"):
         rate = (s0 * y1 - s1 * y0) / (s0 * s2 - s1 * s1)
-        at = y0 / s0 + rate * (middle - edges[0] - s1 / s0)
+        at = first + y0 / s0 + rate * (middle - s1 / s0)
     enough = s0 >= LEAST * np.median(s0)
     return np.where(enough, at, np.nan), np.where(enough, rate, np.nan)
 
 
-def _spread(sums: Array) -> Array:
-    """Sums over an interval and REACH neighbours on either side; fewer at the ends."""
+def _spread(sums: Array, most: int) -> Array:
+    """Sums over an interval and `most` neighbours on either side; fewer at the ends."""
     total = np.concatenate(([0.0], np.cumsum(sums)))
     at = np.arange(sums.size)
-    reach = np.minimum(np.minimum(at, at[::-1]), REACH)
+    reach = np.minimum(np.minimum(at, at[::-1]), most)
     joined: Array = total[at + reach + 1] - total[at - reach]
     return joined

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose.decide import whitened
 from tools.diagnose.result import Location
 from tools.diagnose.rig import Stack
+from tools.diagnose.screen import whitened
 from tools.diagnose.select import Model, Search
 
 DISCOVERY = 0.05  # false-discovery rate of the list
@@ -84,5 +84,6 @@ def sentence(stack: Stack, model: Model, channel: str, covariate: str) -> str:
         return f"{channel}: varies with {covariate.replace('·', ' and ')}, {size}"
     x = stack.covariate(name)[own]
     low, high = np.quantile(x, (0.15, 0.85))
-    ends = f"{residual[x <= low].mean():+.3g} {unit} at {low:.3g} to {residual[x >= high].mean():+.3g} {unit} at {high:.3g}"
+    first, last = residual[x <= low].mean(), residual[x >= high].mean()
+    ends = f"{first:+.3g} {unit} at {low:.3g} to {last:+.3g} {unit} at {high:.3g}"
     return f"{channel}: measured less predicted goes from {ends} of {WORDS.get(name, name)}"

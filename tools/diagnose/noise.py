@@ -36,7 +36,7 @@ COLUMNS = 40  # of the saturated mean, at most
 
 @dataclass(frozen=True)
 class Colour:
-    """Noise of one channel: σ of a grid value; correlation time [s] and variance share of the slow part; share of the fast."""
+    """Noise of one channel: σ of a grid value; correlation time [s] and share of the slow part; share of the fast."""
 
     sigma: float
     time: float
@@ -57,7 +57,7 @@ class Noise:
     def loose(self) -> Array:
         """(N,) by how much a value's noise exceeds its channel's."""
         sigma = np.array([c.sigma for c in self.colours])[self.stack.channel]
-        return np.sqrt(1.0 + (self.blur / sigma) ** 2)
+        return np.asarray(np.sqrt(1.0 + (self.blur / sigma) ** 2))
 
     @cached_property
     def whitener(self) -> sparse.csr_matrix:
@@ -135,10 +135,11 @@ def _fit_channel(
 
 
 def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
-    """The colour whose slow power stands at quantile CAREFUL of the posterior: how slow noise is, little data can tell."""
+    """The colour whose slow power is at quantile CAREFUL of the posterior: few data cannot tell slow noise."""
     power = np.array([c.sigma**2 * (1.0 - c.slow + 2.0 * c.slow * c.time / step) for c in colours])
     order = np.argsort(power)
-    return colours[order[int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))]]
+    at = int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))
+    return colours[int(order[min(at, len(colours) - 1)])]
 
 
 def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
@@ -218,8 +219,7 @@ def _step(gaps: Array) -> float:
 
 def whiten(noise: Noise, columns: Array) -> Array:
     """Columns (N, m) or (N,) in units of independent unit noise."""
-    out: Array = noise.whitener @ columns
-    return out
+    return np.asarray(noise.whitener @ columns)
 
 
 def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
@@ -230,7 +230,7 @@ def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
         own = stack.of(channel)
         for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
             out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
-    return out * noise.loose[:, None]
+    return np.asarray(out * noise.loose[:, None])
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:
@@ -244,7 +244,7 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
 
 
 def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
-    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then at the places that are used."""
+    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then where it is used."""
     step = _step(gaps)
     apart = 5 * (1 + round(time / step))  # grid places between runs: enough to forget
     place = np.cumsum(np.maximum(np.rint(np.where(np.isfinite(gaps), gaps / step, apart)), 1.0)).astype(int)

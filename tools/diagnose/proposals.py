@@ -51,4 +51,5 @@ def _middle(values: Sequence[Array | float]) -> float:
 
 def _stepped(levels: Sequence[float], time: Array) -> Array:
     index = np.minimum((time / SECONDS * len(levels)).astype(int), len(levels) - 1)
-    return np.asarray(levels, dtype=float)[index]
+    values: Array = np.asarray(levels, dtype=np.float64)
+    return np.asarray(values[index], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""What the engine needs of a rig: runs on a time grid, a prediction of the channels, and what is known of its constants.
+"""What the engine needs of a rig: runs on a time grid, a prediction of the channels, what is known of its constants.
 
 A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil. All else in this
 package works on the arrays defined here and knows nothing of wheels.

@@ -58,7 +58,7 @@ class Screen:
 
 
 def tail_quantile(values: Array, level: float) -> float:
-    """The value exceeded with probability `level`: exponential tail beyond the 90 % quantile (Davison and Smith 1990)."""
+    """The value exceeded with probability `level`: exponential tail beyond the 90 % quantile (Davison, Smith 1990)."""
     start = float(np.quantile(values, 0.9))
     beyond = values[values > start] - start
     return start + float(beyond.mean()) * np.log(0.1 / level) if beyond.size else start

@@ -1,4 +1,4 @@
-"""From the screen to models: nonlinear fits of the likely effects, one more effect at a time, earlier ones re-tested."""
+"""From the screen to models: nonlinear fits of the likely effects, one more at a time, earlier ones re-tested."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from estimator.effects.base import Effect
 from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base, Signature
-from tools.diagnose.fit import Fitted, Free, Problem, free_of
+from tools.diagnose.fit import Fitted, Free, Maker, Problem, free_of
 from tools.diagnose.screen import Screen, Whitened, screen, whitened
 from tools.diagnose.signatures import shape_grid, signature, strengths
 
@@ -23,6 +23,7 @@ AGAIN = 4  # shapes of an effect that a later screen tries
 QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
 HOPELESS = 12.0  # [nats] behind the best after the first fit
 PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
+FORM = 0.08  # of what the effects so far gained: what a published form other than ours may leave for another effect
 
 
 @dataclass
@@ -118,13 +119,20 @@ def _finished(problem: Problem, model: Model) -> Model:
 def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) -> Model:
     """One more effect, started at its linear estimate."""
     a, b = model.fitted.base().projected(best.columns)
-    amplitude = np.linalg.solve(a + 0.1 * np.eye(len(b)), b)
+    amplitude = np.asarray(np.linalg.solve(a + 0.1 * np.eye(len(b)), b))
     amplitude = np.where(np.array(best.signature.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
     more = free_of((effect,))
     x = np.concatenate((model.fitted.x, _start(more, effect, amplitude, best.signature.shape)))
-    effects, free = (*model.fitted.effects, effect), (*model.fitted.free, *more)
+    effects: tuple[Maker, ...] = (*model.fitted.effects, effect)
+    free = (*model.fitted.free, *more)
     fitted = search.problem.descend(effects, free, model.fitted.u, x, QUICK)
-    return Model(fitted, (*model.names, effect.name), model.log_prior + (PAIR_PRIOR if model.names else 0.0))
+    return Model(fitted, (*model.names, effect.name), model.log_prior + _one_more(search, model))
+
+
+def _one_more(search: Search, model: Model) -> float:
+    """Log prior of one more effect beside those of a model."""
+    gained = model.fitted.log_evidence - search.models[0].fitted.log_evidence
+    return PAIR_PRIOR - FORM * max(gained, 0.0) if model.names else 0.0
 
 
 def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: dict[str, float]) -> Array:
@@ -133,7 +141,7 @@ def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: 
     for f in free:
         p = f.parameter
         values.append(size[p.name] if p.name in size else (shape[p.name] - p.centre) / p.sigma)
-    return np.clip(np.array(values), -20.0, 20.0)
+    return np.asarray(np.clip(np.array(values), -20.0, 20.0))
 
 
 def run(search: Search, first: Model, step: Callable[[str], None] = lambda _: None) -> None:
@@ -172,7 +180,9 @@ def _retest(search: Search) -> None:
             x = np.array([_at(best.fitted, f) for f in free])
             effects = tuple(search.problem.stack.rig.effects[n] for n in kept)
             fitted = search.problem.descend(effects, free, best.fitted.u, x)
-            search.models.append(Model(fitted, kept, PAIR_PRIOR * (len(kept) - 1)))
+            single = max((m for m in search.models if len(m.names) == 1), key=lambda m: m.evidence)
+            prior = _one_more(search, single) * (len(kept) - 1)
+            search.models.append(Model(fitted, kept, prior))
 
 
 def _at(fitted: Fitted, wanted: Free) -> float:

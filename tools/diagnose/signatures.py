@@ -82,7 +82,7 @@ def _places(rig: Rig, parameter: Parameter) -> list[float]:
     span = max(high - low, 1e-3)
     if "length" in parameter.name:
         return [0.12 * span, 0.25 * span, 0.5 * span]
-    return np.linspace(low, high, 13).tolist()
+    return [float(x) for x in np.linspace(low, high, 13)]
 
 
 def orders(rig: Rig, parameter: Parameter) -> list[float]:
@@ -95,4 +95,4 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
     least = max(parameter.low, TURNS / max(turned, 1e-6))
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
-    return whole[:: max(1, -(-len(whole) // ORDERS))].tolist()
+    return [float(x) for x in whole[:: max(1, -(-len(whole) // ORDERS))]]

@@ -1,8 +1,9 @@
 """`python -m tools.diagnose.trials`: the diagnosis on fresh cases of our own simulator, scored against their truth.
 
-Strengths are three to five (strangers: eight to fifteen) times the detection limit: the strength whose whitened signature, soil and calibration
-projected out, has a squared length of 16 (four standard deviations) in the drawn campaign. An effect whose limit lies
-beyond three times its expected size cannot be seen in that campaign; another campaign is drawn for it.
+Strengths are three to five times the detection limit (strangers, which a listed effect must not be able to mimic, eight
+to fifteen times): the strength whose whitened signature, soil and calibration projected out, has a squared length of 16
+(four standard deviations) in the drawn campaign. An effect whose limit lies beyond three times its expected size cannot
+be seen in that campaign; another campaign is drawn for it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from estimator.effects import EFFECTS
 from estimator.effects.base import Effect
 from tools.diagnose import heldout
 from tools.diagnose.cases import Plan, draw, record, scaled
-from tools.diagnose.decide import decide
+from tools.diagnose.cousins import COUSINS
+from tools.diagnose.decide import decide, nameless
 from tools.diagnose.engine import said
 from tools.diagnose.fit import free_of
 from tools.diagnose.prepare import Prepared, prepare
@@ -42,6 +44,7 @@ STRONG, STRANGE = (3.0, 5.0), (8.0, 15.0)  # times the limit; a stranger that a 
 LARGEST = 3.0  # expected sizes
 DRAWS = 6  # campaigns tried for an effect
 PAIRS = (("coulomb_friction", "slip_sinkage"), ("bulldozing", "viscous_friction"), ("rear_contact", "current_offset"))
+ORDER = ("none", "effect", "effect", "cousin", "unlisted", "effect", "none", "pair", "effect", "unlisted")
 LISTED = tuple(n for n, e in EFFECTS.items() if not e.filter_only and n != "empirical_law")
 
 
@@ -53,15 +56,17 @@ class Case:
 
 
 def cases(count: int, seed: int, only: Sequence[str] = ()) -> Iterator[Case]:
-    """A quarter without effect, then the effects in turn, pairs and strangers."""
+    """Strata in turn: a fifth without effect, single effects, other forms, pairs, strangers."""
     rng = np.random.default_rng(seed)
     for number in range(count):
-        stratum = ("none", "effect", "effect", "effect", "unlisted", "effect", "none", "pair")[number % 8]
+        stratum = ORDER[number % len(ORDER)]
         truth: tuple[str, ...] = ()
         if stratum == "effect":
             truth = (LISTED[int(rng.integers(len(LISTED)))],)
         elif stratum == "unlisted":
             truth = (STRANGERS[int(rng.integers(len(STRANGERS)))].__name__,)
+        elif stratum == "cousin":
+            truth = (COUSINS[int(rng.integers(len(COUSINS)))].__name__,)
         elif stratum == "pair":
             truth = PAIRS[int(rng.integers(len(PAIRS)))]
         if only and stratum not in only and not set(only) & set(truth):
@@ -77,7 +82,9 @@ def trial(case: Case) -> dict[str, Any]:
         scored = _trial(case)
     except Exception as error:
         scored = {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
-    return {"stratum": case.stratum, "truth": list(case.truth), "seed": case.seed, **scored} | {
+    names = {c.__name__: c.stands_for for c in COUSINS}
+    truth = [names.get(n, n) for n in case.truth]
+    return {"stratum": case.stratum, "truth": truth, "form": list(case.truth), "seed": case.seed, **scored} | {
         "seconds": time.perf_counter() - began
     }
 
@@ -85,7 +92,8 @@ def trial(case: Case) -> dict[str, Any]:
 def _trial(case: Case) -> dict[str, Any]:
     rng = np.random.default_rng(case.seed)
     settings = config.load(packaged(), effects.units).settings
-    types = [EFFECTS.get(n) or next(s for s in STRANGERS if s.__name__ == n) for n in case.truth]
+    own: dict[str, type[Effect]] = {t.__name__: t for t in (*STRANGERS, *COUSINS)}
+    types = [EFFECTS.get(n) or own[n] for n in case.truth]
     drawn = _drawn(settings, types, rng)
     if drawn is None:
         return {"skipped": True}
@@ -95,7 +103,22 @@ def _trial(case: Case) -> dict[str, Any]:
     search = Search(prepared.problem, prepared.generics, prepared.draws)
     run(search, Model(prepared.base, (), 0.0))
     found = said(rig, search, decide(search), {}, 0)
-    return _scored(case, plan, acting, found) | _oracle(case, types, acting, search, found)
+    return _scored(case, plan, acting, found) | _oracle(case, types, acting, search, found) | _work(search)
+
+
+def _work(search: Search) -> dict[str, Any]:
+    """What the search weighed, to find the reason of a miss."""
+    base, first = search.models[0], search.screens[()]
+    decision = decide(search)
+    models = sorted(search.models, key=lambda m: -m.evidence)[:6]
+    return {
+        "screen": dict(sorted(((n, round(e, 1)) for n, e in first.evidence.items()), key=lambda i: -i[1])[:8]),
+        "models": [["+".join(m.names), round(m.evidence - base.evidence, 1)] for m in models],
+        "nameless": nameless(search, first),
+        "share": decision.share,
+        "left": decision.left,
+        "unlisted": decision.unlisted,
+    }
 
 
 def _drawn(settings: Any, types: list[type[Effect]], rng: np.random.Generator) -> tuple[Plan, list[Effect]] | None:
@@ -174,14 +197,12 @@ def _oracle(
     case: Case, types: list[type[Effect]], acting: Sequence[Effect], search: Search, found: Diagnosis
 ) -> dict[str, Any]:
     """Held-out error over that of a fit that knows which effects are at work, mean over channels."""
-    if not types:
+    if case.stratum not in ("effect", "pair"):
         return {}
     free = free_of(types)
-    truth = {a.name: a for a in acting} | {type(a).__name__: a for a in acting}
-    x = np.array([(getattr(truth[f.name], f.parameter.name, f.parameter.centre) - f.parameter.centre) / f.parameter.sigma
-                  for f in free]) if case.stratum != "unlisted" else np.zeros(0)  # fmt: skip
-    if case.stratum == "unlisted":
-        return {}
+    truth = {a.name: a for a in acting}
+    at = [getattr(truth[f.name], f.parameter.name) for f in free]
+    x = np.array([(v - f.parameter.centre) / f.parameter.sigma for v, f in zip(at, free, strict=True)])
     fitted = search.problem.descend(tuple(types), free, search.models[0].fitted.u, x)
     stack = search.problem.stack
     best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
@@ -220,7 +241,8 @@ def _line(result: dict[str, Any]) -> str:
         return f"{result['stratum']} {result['truth']}: {result.get('error', 'cannot be seen')}"
     return (
         f"{result['stratum']} {'+'.join(result['truth'])}: {result['verdict']} {result['accepted'] or result['first']}"
-        f" {[round(v, 2) for v in list(result['probability'].values())[:3]]} p {result['p']:.3f} {result['seconds']:.0f} s"
+        f" {[round(v, 2) for v in list(result['probability'].values())[:3]]} p {result['p']:.3f}"
+        f" {result['seconds']:.0f} s"
     )
 
 

@@ -33,7 +33,7 @@ FLOORS = {
     "k": 0.03,
     "n": 0.01,
     "K": 0.02,
-}  # least relative sigma of what is "known exactly"
+}  # least relative sigma
 SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-", "speed": "m/s",
@@ -48,7 +48,7 @@ PHYSICS = (
     "K",
     "weights",
     "carriage_scale",
-)  # what needs the forward model; the rest does not
+)  # what needs the forward model
 KEPT = 4  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
 
@@ -187,7 +187,7 @@ class WheelRig:
         return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
 
     def _depth(self, number: int) -> Array:
-        """Sinkage predicted from the prior: the measured one carries the noise of a channel it would be held against."""
+        """Sinkage predicted from the prior: the measured one carries the noise of its channel."""
         motion, prior = self._motions[number], {known.name: known.value for known in self.constants}
         soil = Soil(prior["c"], prior["tan_phi"], prior["k"], prior["n"], prior["K"])
         return simulate_arrays(self.settings.wheel, soil, motion, self.baseline, order=ORDER).sinkage

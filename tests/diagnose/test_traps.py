@@ -1,0 +1,119 @@
+"""The traps of DESIGN 7, each a test, on small campaigns with a known truth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from estimator import config, effects
+from estimator.effects import make
+from tests.diagnose.campaigns import diagnosed, group, plan, settings, soil
+from tools.diagnose import heldout
+from tools.diagnose.apply import applied
+from tools.diagnose.cases import record
+from tools.diagnose.engine import diagnose
+from tools.diagnose.rig import Stack
+from tools.diagnose.strangers import BentRail, CableDrag
+from tools.diagnose.wheel_rig import WheelRig
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def test_a_friction_is_named_and_frees_the_soil() -> None:
+    """Torque lost in the drivetrain passes for cohesion until it is named; held-out errors fall."""
+    found = diagnosed(plan(), (make("coulomb_friction", {"loss": 0.25}),))
+    assert found.verdict == "explained"
+    assert "coulomb_friction" in group(found)
+    assert found.soil is not None
+    before, after, true = found.soil.before["c"], found.soil.after["c"], soil().cohesion
+    assert abs(before.value - true) > 2.0 * before.sigma
+    assert abs(after.value - true) < 2.0 * after.sigma
+    assert found.fit.after["torque"] < 0.5 * found.fit.before["torque"]
+    assert found.location[0].channel == "torque"
+    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["verdict"] == "explained"
+
+
+def test_a_quiet_rig_gives_no_alarm() -> None:
+    assert diagnosed(plan()).verdict == "consistent"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slow_time", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("noise", [0.5, 2.0])
+def test_coloured_noise_of_unknown_size_gives_no_alarm(slow_time: float, noise: float) -> None:
+    """iid tests cry wolf; the configured noise is half or twice the true one."""
+    for seed in (1, 2):
+        found = diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed))
+        assert found.verdict in ("consistent", "insufficient"), found.summary
+
+
+@pytest.mark.slow
+def test_what_the_soil_absorbs_shows_as_strain() -> None:
+    """A rear contact hides in c: named from the strain against the prior, and c comes back."""
+    found = diagnosed(plan(loads=(35.0, 60.0, 80.0, 105.0)), (make("rear_contact", {"ratio": 0.25}),))
+    assert "rear_contact" in group(found), found.summary
+    assert found.soil is not None
+    after = found.soil.after["c"]
+    assert abs(after.value - soil().cohesion) < 2.0 * after.sigma
+
+
+@pytest.mark.slow
+def test_without_standstill_offset_and_friction_are_one_group() -> None:
+    found = diagnosed(plan(standstill=False), (make("coulomb_friction", {"loss": 0.25}),))
+    assert {"coulomb_friction", "current_offset"} <= group(found)
+    assert found.next_experiment is not None
+    assert found.next_experiment.key in ("standstill", "lifted_spin", "reversal")
+
+
+@pytest.mark.slow
+def test_slope_and_crosstalk_are_one_group() -> None:
+    found = diagnosed(plan(), (make("bed_slope", {"angle": 0.03}),))
+    assert {"bed_slope", "force_crosstalk"} <= group(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stranger", [BentRail(size=1e-3), CableDrag(size=8.0)])
+def test_a_stranger_is_not_given_a_listed_name(stranger: BentRail | CableDrag) -> None:
+    found = diagnosed(plan(), (stranger,))
+    assert found.verdict == "unlisted", found.summary
+    assert max(h.probability for h in found.hypotheses) <= 0.5
+
+
+@pytest.mark.slow
+def test_no_force_sensor_degrades_honestly() -> None:
+    """What shows in the drawbar pull alone cannot show; no other name is given."""
+    found = diagnosed(plan(wrench=False), (make("side_wall_rubbing", {"share": 0.04}),))
+    assert found.verdict in ("consistent", "insufficient")
+    assert any("No force sensor" in c for c in found.caveats)
+
+
+def test_repeats_do_not_leak() -> None:
+    """Whole runs, and whole loads and slip bands, are held out."""
+    stack = Stack(WheelRig(record(plan(), ()), settings()))
+    assert [set(stack.run[f]) for f in heldout.run_folds(stack)] == [{0}, {1}, {2}]
+    load = stack.covariate("load")
+    for fold in heldout.condition_folds(stack)[:3]:
+        assert not set(np.round(load[fold])) & set(np.round(load[~fold]))
+
+
+@pytest.mark.slow
+def test_an_applied_effect_is_the_next_baseline() -> None:
+    """After --apply the same testbed is consistent, and something new on top of it is what is named."""
+    friction = make("viscous_friction", {"damping": 0.8})
+    found = diagnosed(plan(), (friction,))
+    document = config.load("config/testbed.yaml", effects.units)
+    text = applied(document, found)
+    calibrated = config.loads(text, "new.yaml", None, effects.units).settings
+    again = plan(seed=5)
+    rig = WheelRig(record(again, (friction,)), calibrated)
+    assert diagnose(rig).verdict == "consistent"
+    new = diagnose(WheelRig(record(again, (friction, make("slip_sinkage", {"growth": 0.1}))), calibrated))
+    assert [h.effect for h in new.accepted] == ["slip_sinkage"]
+    assert "viscous_friction" in new.baseline

@@ -6,10 +6,10 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow lint format type docs wheel clean
+.PHONY: help venv demo test slow lint format type docs scenarios fuzz soak install uninstall wheel clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
 
 venv: $(READY) ## set up .venv (the other targets do it when they need it)
 
@@ -43,6 +43,21 @@ type: $(READY) ## mypy --strict
 
 docs: $(READY) ## the generated parts of the documents
 	@$(BIN)/python -m tools.config_reference
+
+scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
+	@$(BIN)/python -m tools.reliability
+
+fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody meant: the full counts
+	@$(BIN)/python -m tools.fuzz
+
+soak: $(READY) ## 100 simulated hours, then the daemon on wires for an hour under load
+	@$(BIN)/python -m tools.soak
+
+install: ## lay gritd out on this Debian system (DESTDIR=… for a package); see docs/service.md
+	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install install
+
+uninstall: ## take it away again; configuration and recordings stay
+	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install uninstall
 
 wheel: $(READY) ## dist/gritd-….whl
 	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir dist .

@@ -35,7 +35,7 @@ ROOT = Path(__file__).parents[2]
 TESTBED = config.load(packaged())
 BUS = "udp_multicast" if has_multicast() else "slcan"
 BECOMING = """
-import os, can.interfaces.slcan, can.interfaces.udp_multicast, tools.run
+import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast, tools.run
 from drivers.build import build_readers
 build_readers(tools.run.load({config!r}).settings, lambda: 0, None)
 os.setgroups([]); os.setgid({user}); os.setuid({user})

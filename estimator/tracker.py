@@ -41,9 +41,9 @@ MOVED = 0.05  # prior standard deviations after which the memory is linearised a
 CONSISTENCY_MEMORY = 2.0  # [s]
 # Mean normalised innovation squared above which the filter is reset. A wrong calibration, of the size the configuration
 # states, gives innovations of variance S that keep their sign for the whole run, so their mean square does not settle
-# at 1: it exceeds 12 in 1 rig of 1,900 and 6 in 1 of 70 (chi-square, 1 degree of freedom).
+# at 1: it exceeds 12 in 1 rig of 1,900 and 4 in 1 of 22 (chi-square, 1 degree of freedom).
 INCONSISTENT = 12.0
-MISMATCH = 6.0  # … and above which model and measurement are said to disagree
+MISMATCH = 4.0  # … and above which model and measurement are said to disagree
 OUTLIER = 25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
 PATIENCE = 5.0  # [s] after a reset before the next
 RELAPSE = 20.0  # [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time …

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import secrets
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -73,6 +74,7 @@ def resumed(output: Path) -> Batch:
 def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
     """Where trials run, and how many at a time. Raises CommandError where the cluster cannot be had."""
     if scheduler is None:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers: cases run side by side
         with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
             yield pool, jobs
         return
@@ -88,7 +90,7 @@ def _cluster(address: str) -> Iterator[Any]:
         message = "--scheduler needs dask.distributed; expected it installed: pip install 'gritd[cluster]'"
         raise CommandError(message, USAGE) from None
     try:
-        client: Any = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        client: Any = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TimeoutError):
         raise CommandError(f"--scheduler {address}: found no scheduler; expected one that answers", FAILED) from None
     try:

@@ -97,7 +97,7 @@ def _attempt(number: int, seed: int, assignment: Assignment, wanted: float, rng:
         family=family,
         habits=habits,
         trial=replace(trial, world=replace(trial.world, effects=effects)),
-        noise_factor=_noise_factor(not effects, rng),
+        noise_factor=noise_factor(not effects, rng),
         detectability=detector.detectability(effects) if effects else 0.0,
         single=tuple(found for _, found in fitted),
         inseparable={},
@@ -132,7 +132,8 @@ def _error(rng: np.random.Generator) -> float:
     return float(np.clip(rng.standard_normal(), -2.5, 2.5))
 
 
-def _noise_factor(nothing: bool, rng: np.random.Generator) -> float:
+def noise_factor(nothing: bool, rng: np.random.Generator) -> float:
+    """Stated noise over true."""
     return float(rng.choice((0.5, 2.0))) if rng.random() < WRONG_NOISE[nothing] else 1.0
 
 

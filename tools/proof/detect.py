@@ -146,15 +146,18 @@ class Detector:
 
     def _changes(self, effects: Sequence[Effect]) -> Signals:
         world = replace(self._trial.world, effects=tuple(effects))
-        felt = (respond(world, motion, damped=False) for motion in self._motions)
-        return [self._misfit(with_, bare) for with_, bare in zip(felt, self._bare, strict=True)]
+        return [
+            self._misfit(respond(world, motion, False, bare.scene.theta_1), bare)
+            for motion, bare in zip(self._motions, self._bare, strict=True)
+        ]
 
     def _misfit(self, felt: Felt, bare: Felt) -> dict[str, Array]:
         """Read with the effect, less predicted without it from the motion and load that were read."""
         motion, trial = felt.scene.motion, self._trial
         told = _told(felt, motion, trial)
         same = told is motion
-        predicted = bare if same else respond(replace(trial.world, effects=()), told, damped=False)
+        world = replace(trial.world, effects=())
+        predicted = bare if same else respond(world, told, False, bare.scene.theta_1)
         read, expected = channels(felt, trial.wrench), channels(predicted, trial.wrench)
         if trial.wrench:
             expected["load"] = bare.load  # the weights, not the load that was read
@@ -191,9 +194,10 @@ class Detector:
         trial = self._trial
         world = replace(trial.world, ground=ground or trial.world.ground, effects=())
         found = []
-        for motion in self._motions:
+        for motion, bare in zip(self._motions, self._bare, strict=True):
             weight = motion.weight + heavier * (motion.weight > 1.0)
-            felt = respond(world, replace(motion, weight=weight, speed=motion.speed * (1.0 + faster)), damped=False)
+            told = replace(motion, weight=weight, speed=motion.speed * (1.0 + faster))
+            felt = respond(world, told, False, bare.scene.theta_1)
             found.append(channels(felt, trial.wrench))
         return _less(found, [channels(bare, trial.wrench) for bare in self._bare])
 

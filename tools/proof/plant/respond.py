@@ -42,9 +42,14 @@ class Orders:
     start: float  # [m] on the bed
 
 
-def respond(world: World, motion: Motion, damped: bool = True) -> Felt:
-    """What is felt and read when the rig moves like this. Undamped, the axle is in balance at every sample."""
+def respond(world: World, motion: Motion, damped: bool = True, near: Array | None = None) -> Felt:
+    """What is felt and read when the rig moves like this. Undamped, the axle is in balance at every sample.
+
+    `near`: entry angles (n,) of a similar case, where the search for the balance starts.
+    """
     scene = _scene(world, motion)
+    if near is not None:
+        scene = replace(scene, theta_1=near)
     for _ in range(ROUNDS if any(_path_dependent(e) for e in world.effects) else 1):
         scene = _contact(world, scene, damped)
     for effect in world.effects:
@@ -126,7 +131,8 @@ def _balanced(scene: Scene, radius: float, weight: Array) -> Array:
     every = _every(scene.motion.time, COARSE)
     time, width, ratio = scene.motion.time, scene.rig.width, scene.ratio[::every]
     ground, rim = thinned(scene.ground, every), thinned(scene.rim, every)
-    guess = scene.theta_1[::every] if scene.theta_1.size else np.full(ratio.size, 0.6)
+    known = scene.theta_1[::every] if scene.theta_1.size else np.zeros(ratio.size)
+    guess = np.where(known > 0.01, known, 0.4)
     theta_1 = balance(lambda t: reaction(ground, rim, radius, width, ratio, t).load, weight[::every], guess)
     return np.interp(time, time[::every], theta_1)
 

@@ -73,7 +73,8 @@ def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habit
         "wrench": bool(rng.random() < 0.7),
     }
     chosen: dict[str, Any] = {name: value for name, value in drawn.items() if getattr(fixed, name) is None}
-    return replace(fixed, **chosen)
+    habits = replace(fixed, **chosen)
+    return replace(habits, lifted=bool(habits.lifted and habits.wrench))  # nothing else tells that the load is off
 
 
 def campaign(rig: Rig, ground: Ground, habits: Habits, rng: np.random.Generator) -> tuple[Run, ...]:

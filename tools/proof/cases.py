@@ -124,12 +124,8 @@ def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Tria
         ):
             break
     known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
-    rig = replace(rig, torque_constant=known.torque_constant.value + known.torque_constant.sigma * _error(rng))
+    rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
     return family, Trial(World(rig, ground), known, knowledge.chain_drawn(known, rng), runs)
-
-
-def _error(rng: np.random.Generator) -> float:
-    return float(np.clip(rng.standard_normal(), -2.5, 2.5))
 
 
 def noise_factor(nothing: bool, rng: np.random.Generator) -> float:

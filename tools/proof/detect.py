@@ -183,20 +183,19 @@ class Detector:
 
     def _weights(self) -> list[Signals]:
         """One sigma of the weights, half of it alike in all runs, half each run's own; and of the carriage's travel."""
-        half = self._trial.known.weight_sigma / np.sqrt(2.0)
+        half = self._trial.known.weight_share / np.sqrt(2.0)
         alike = _scaled(self._moved(heavier=SMALL * half), 1.0 / SMALL)
         carriage = self._trial.known.instruments["carriage_encoder"].scale
         faster = SMALL * carriage.sigma / carriage.value
         return [alike, *_one_by_one(alike), _scaled(self._moved(faster=faster), 1.0 / SMALL)]
 
     def _moved(self, ground: Ground | None = None, heavier: float = 0.0, faster: float = 0.0) -> Signals:
-        """Change by another soil, heavier weights [N] or a carriage that is faster by a share."""
+        """Change by another soil, heavier weights or a faster carriage, either by a share."""
         trial = self._trial
         world = replace(trial.world, ground=ground or trial.world.ground, effects=())
         found = []
         for motion, bare in zip(self._motions, self._bare, strict=True):
-            weight = motion.weight + heavier * (motion.weight > 1.0)
-            told = replace(motion, weight=weight, speed=motion.speed * (1.0 + faster))
+            told = replace(motion, weight=motion.weight * (1.0 + heavier), speed=motion.speed * (1.0 + faster))
             felt = respond(world, told, False, bare.scene.theta_1)
             found.append(channels(felt, trial.wrench))
         return _less(found, [channels(bare, trial.wrench) for bare in self._bare])

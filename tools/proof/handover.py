@@ -65,18 +65,15 @@ def driven(case: Case, number: int) -> Felt:
     """One run of the concealed truth, without noise."""
     trial, run = case.trial, case.trial.runs[number]
     orders = campaign.orders(run, trial.known.radius)
-    error = _weight_error(case, run.weight)
-    heavier = np.where(
-        orders.weight > 0.5 * run.weight, orders.weight + error * orders.weight / run.weight, orders.weight
-    )
-    return drive(trial.world, campaign.with_weight(orders, heavier))
+    share = 1.0 + _weight_error(case, run.weight)
+    return drive(trial.world, campaign.with_weight(orders, orders.weight * share))
 
 
 def _weight_error(case: Case, weight: float) -> float:
-    """Error of the weights [N], within their sigma: half the carriage's, half the plates'; a plate keeps its own."""
+    """Relative error of the weights, within their sigma: half the carriage's, half the plates' own."""
     sources = ((case.seed, 2), (case.seed, 3, round(weight * 1e3)))
     drawn = [float(np.clip(np.random.default_rng(source).standard_normal(), -2.5, 2.5)) for source in sources]
-    return case.trial.known.weight_sigma * sum(drawn) / float(np.sqrt(2.0))
+    return case.trial.known.weight_share * sum(drawn) / float(np.sqrt(2.0))
 
 
 def truth(case: Case, number: int) -> dict[str, Array]:
@@ -115,7 +112,7 @@ def configuration(known: Knowledge, nominal: float) -> str:
     document["pulley_radius"] = f"{known.pulley!r} m"
     document["soil"] = _soil(known.soil)
     document["drive"]["torque_constant"] = _stated(known.torque_constant, "N*m/A")
-    document["load"] = {"nominal": _stated(Stated(nominal, known.weight_sigma), "N"), "minimum": "1 N"}
+    document["load"] = {"nominal": _stated(Stated(nominal, known.weight_share * nominal), "N"), "minimum": "1 N"}
     _channels(document, known)
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
 

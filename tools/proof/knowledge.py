@@ -22,7 +22,6 @@ FAMILIES: dict[str, tuple[float, float, float, float, float]] = {
     "clayey soil": (4100.0, 13.0, 0.010, 0.50, 0.30e6),
 }
 SPREAD = {"cohesion": 0.25, "tan_phi": 0.07, "shear_modulus": 0.2, "exponent": 0.04, "modulus": 0.25}
-CONFIGURED_MODULUS = "modulus"
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Knowledge:
     pulley: float  # [m]
     soil: dict[str, Stated]  # by the fields of Ground
     torque_constant: Stated
-    weight_sigma: float  # [N] of the weights
+    weight_share: float  # relative standard deviation of the weights
     instruments: dict[str, Instrument]  # by channel, with drawbar_pull, load, torque of the wrench
 
 
@@ -82,12 +81,18 @@ def soil_known(ground: Ground, rng: np.random.Generator) -> dict[str, Stated]:
 
 
 def rig_drawn(rng: np.random.Generator) -> Rig:
-    """A small testbed; its torque constant is set when the loads are known."""
+    """A small testbed; its drives and its torque constant follow from the loads, see `fitted`."""
     radius = float(np.round(rng.uniform(0.055, 0.15), 3))
     width = float(np.round(radius * rng.uniform(0.6, 1.2), 3))
-    wheel = Servo(8e-4, float(rng.uniform(60.0, 200.0)), float(rng.uniform(0.03, 0.1)))
-    carriage = Servo(5.0, float(rng.uniform(1e4, 4e4)), float(rng.uniform(0.05, 0.15)))
-    return Rig(radius, width, 2.0, wheel, carriage, float(rng.uniform(0.005, 0.025)))
+    idle = Servo(1.0, 1.0, 1.0)
+    return Rig(radius, width, 1.0, idle, idle, float(rng.uniform(0.005, 0.025)))
+
+
+def fitted(rig: Rig, heaviest: float, constant: Stated, rng: np.random.Generator) -> Rig:
+    """The rig with drives that its loads ask for: full torque slows the wheel by 4-12 mrad/s until they catch up."""
+    wheel = Servo(8e-4, heaviest * rig.radius / float(rng.uniform(0.004, 0.012)), float(rng.uniform(0.03, 0.1)))
+    carriage = Servo(5.0, heaviest / float(rng.uniform(2e-4, 6e-4)), float(rng.uniform(0.05, 0.15)))
+    return replace(rig, torque_constant=_true(constant, rng), wheel=wheel, carriage=carriage)
 
 
 def knowledge_drawn(rig: Rig, ground: Ground, heaviest: float, wrench: bool, rng: np.random.Generator) -> Knowledge:
@@ -109,7 +114,7 @@ def knowledge_drawn(rig: Rig, ground: Ground, heaviest: float, wrench: bool, rng
         0.02,
         soil_known(ground, rng),
         Stated(constant, 0.005 * constant),
-        float(np.round(max(0.1, 0.005 * heaviest), 2)),
+        0.005,
         instruments,
     )
 

@@ -19,6 +19,7 @@ from tools.diagnose.apply import applied
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
 from tools.diagnose.engine import diagnose
+from tools.diagnose.innovations import with_innovations
 from tools.diagnose.load import drive_series, is_drive, read_all, sha256, signals
 from tools.diagnose.result import Diagnosis
 from tools.diagnose.rig import Rig
@@ -63,6 +64,8 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None)
+        if isinstance(rig, WheelRig) and "torque" in rig.channels:
+            found = with_innovations(found, configuration, recordings)
     return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
 
 
@@ -118,6 +121,10 @@ def text(found: Diagnosis) -> str:
             f"  held-out {channel}: {found.fit.before[channel]:.3g} before, {found.fit.after[channel]:.3g} after, "
             f"noise {found.fit.noise_floor[channel]:.2g} {unit}"
         )
+    if found.fit.innovation_before and found.fit.innovation_after:
+        pairs = found.fit.innovation_before.items()
+        said = ", ".join(f"{n} {v:.2g} before, {found.fit.innovation_after.get(n, v):.2g} after" for n, v in pairs)
+        lines.append(f"  on-line filter, innovation over its sigma: {said}")
     if found.next_experiment is not None:
         lines.append(f"  next: {found.next_experiment.action} ({found.next_experiment.expected_gain_nats:.0f} nats)")
     return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])

@@ -16,7 +16,7 @@ import numpy as np
 from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.screen import Screen, whitened
-from tools.diagnose.select import Model, Search
+from tools.diagnose.select import Model, Search, rescreen
 
 TEMPERATURE = 2.0  # of evidence where nothing remains
 LEFTOVER = 0.15  # further temperature per nat left unexplained
@@ -24,7 +24,7 @@ ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off
 LISTED = 5.0  # [nats] head start of the library over functions without a name
 SHAPE = 0.05  # and this share of its evidence, since a form's details may differ
 PAIR = 3.0  # [nats] a second function must gain
-FAMILIES = 2  # functions without a name that may act together
+FAMILIES, LEFT = 2, 4  # functions without a name that may act together; that count what is left
 TAKEN = 0.8  # share of the explainable misfit a listed explanation must take
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 
@@ -49,7 +49,7 @@ def decide(search: Search) -> Decision:
     best, share, left, significant = _explanation(search)
     temperature = TEMPERATURE + LEFTOVER * left
     gained = best.evidence - base.evidence
-    ahead = nameless(search, found) - gained - LISTED - SHAPE * max(gained, 0.0)
+    ahead = nameless(search, base, FAMILIES) - gained - LISTED - SHAPE * max(gained, 0.0)
     unlisted = max(_unlisted(share, significant, bool(best.names)), float(1.0 / (1.0 + np.exp(-ahead / TEMPERATURE))))
     listed = bool(best.names) and unlisted < 0.5
     probability = {n: p * (1.0 - unlisted) for n, p in probabilities(search.models, temperature).items()}
@@ -69,28 +69,21 @@ def _explanation(search: Search) -> tuple[Model, float, float, bool]:
 
 
 def remaining(search: Search, model: Model) -> tuple[float, bool]:
-    """Nats that smooth functions of the covariates would still gain beyond chance; whether that is significant."""
+    """Nats that smooth functions of the covariates would still gain; whether any of them stands out of the noise."""
+    found = search.screens.get(model.names) or rescreen(search, model)
+    standing = [e for n, e in found.evidence.items() if "~" in n and e > found.threshold]
+    return (nameless(search, model, LEFT) if standing else 0.0), bool(standing)
+
+
+def nameless(search: Search, model: Model, most: int) -> float:
+    """Evidence for the best few smooth functions of covariates on top of a model, taken up in turn [nats]."""
     base = model.fitted.base()
-    columns = np.column_stack([w.columns for w in whitened(search.problem.noise, search.generics)])
-    a, b = base.projected(columns)
-    noise, strain = search.draws
-    size = base.jacobian.shape[1]
-    strain = np.resize(strain, (size, strain.shape[1])) if size > strain.shape[0] else strain[:size]
-    null = base.scores(columns, noise, strain)
-    smooth = np.linalg.inv(a + np.eye(len(b)))
-    value, nulls = 0.5 * b @ smooth @ b, 0.5 * np.sum(null * (smooth @ null), axis=0)
-    return float(max(value - nulls.mean(), 0.0)), bool(value > np.quantile(nulls, 0.98))
-
-
-def nameless(search: Search, found: Screen) -> float:
-    """Evidence for the best one or two smooth functions of covariates, taken up in turn [nats]."""
-    base = search.models[0].fitted.base()
     ready = whitened(search.problem.noise, search.generics)
     a, b = base.projected(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
     total, kept = 0.0, np.zeros(0, dtype=int)
-    for _ in range(FAMILIES):
+    for _ in range(most):
         tried = [
             float(log_bayes(a[np.ix_(i, i)], b[i], (0,) * len(i))) for p in parts if (i := np.union1d(kept, p)).size
         ]

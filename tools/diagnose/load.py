@@ -190,8 +190,8 @@ def _mean(block: Index, values: Array, n: int) -> tuple[Array, Array]:
 def slope(time: Array, values: Array, edges: Array) -> tuple[Array, Array]:
     """Value and slope of an encoder at the middle of each interval.
 
-    By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is steady within its own
-    noise, STEADY to either side: at creeping speed one count is much of the slip.
+    By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is steady within its
+    own noise, STEADY to either side: at creeping speed one count is much of the slip.
     """
     at, quick = _line(time, values, edges, QUICK)
     far, steady = _line(time, values, edges, STEADY)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import norm
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose.result import Location
@@ -12,6 +13,11 @@ from tools.diagnose.select import Model, Search
 
 DISCOVERY = 0.05  # false-discovery rate of the list
 MOST = 8
+FAR = 3.0  # [σ]
+STRAINED = {
+    "scale": "constant",
+    "offset": "constant",
+}  # what of a channel's calibration, and the covariate it stands for
 LEAST = 0.05  # share below which a place is not worth naming
 WORDS = {
     "slip": "slip", "speed": "rim speed [m/s]", "load": "load [N]", "sinkage": "sinkage [m]", "position": "place [m]",
@@ -41,8 +47,24 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
             covariate = w.signature.name.partition("~")[2]
             where = sentence(stack, model, channel, covariate)
             found.append((value, Location(channel, covariate, share, float(p_i), float(q_i), where)))
+    found += _strains(stack, model)
     found.sort(key=lambda item: -item[0])
     return tuple(location for _, location in found[:MOST])
+
+
+def _strains(stack: Stack, model: Model) -> list[tuple[float, Location]]:
+    """Calibration constants pulled far off what is known: a misfit that hides there leaves no residual."""
+    nats = 0.5 * model.fitted.u**2
+    found = []
+    for known, u, value in zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True):
+        channel, _, what = known.name.rpartition("_")
+        if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
+            to = f"{known.of(u):+.3g} {known.unit}"
+            where = f"{channel}: the fit pulls its {what} {u:+.1f} σ off the calibration, to {to}"
+            p = float(2.0 * norm.sf(abs(u)))
+            place = Location(channel, STRAINED[what], value / float(nats.sum()), p, p, where.rstrip())
+            found.append((value, place))
+    return found
 
 
 def _gain(a: Array, b: Array, null: Array) -> tuple[float, float]:

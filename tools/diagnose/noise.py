@@ -20,7 +20,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose.rig import Bools, Stack
+from tools.diagnose.rig import Bools, Index, Stack
 
 SLOW_TIMES = (0.5, 1.0, 2.0, 4.0, 10.0)  # [s] correlation times of the slow part tried
 SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)  # its shares of the variance tried
@@ -108,11 +108,16 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
     return Noise(stack, tuple(colours), tuple((c,) for c in colours), loose)
 
 
-def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np.random.Generator) -> Noise:
-    """Size and colour of each channel, from the prediction (N,) and the columns of the saturated mean (N, p)."""
+def fit(
+    stack: Stack, predicted: Array, saturated: Array, cells: Index, before: Noise, rng: np.random.Generator
+) -> Noise:
+    """Size and colour of each channel, from the prediction (N,).
+
+    The saturated mean: columns (N, p), and the means of the cells (N,), −1 where there is none (see replicates.py).
+    """
     steady = before.loose < STEADY
     found = [
-        _fit_channel(stack, channel, stack.measured - predicted, saturated, steady & stack.of(channel), rng)
+        _fit_channel(stack, channel, stack.measured - predicted, saturated, cells, steady & stack.of(channel), rng)
         for channel in stack.rig.channels
     ]
     colours = tuple(f[0] for f in found)
@@ -121,9 +126,15 @@ def fit(stack: Stack, predicted: Array, saturated: Array, before: Noise, rng: np
 
 
 def _fit_channel(
-    stack: Stack, channel: str, residual: Array, saturated: Array, own: Bools, rng: np.random.Generator
+    stack: Stack,
+    channel: str,
+    residual: Array,
+    saturated: Array,
+    cells: Index,
+    own: Bools,
+    rng: np.random.Generator,
 ) -> tuple[Colour, ...]:
-    columns = np.column_stack((_basis(saturated[own]), residual[own]))
+    columns = np.column_stack((_saturated(saturated[own], cells[own]), residual[own]))
     colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
     colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
     likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
@@ -157,6 +168,13 @@ def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 
 
+def _saturated(columns: Array, cells: Index) -> Array:
+    """Means of the cells and, beside them, the leading directions of the other columns; orthonormal."""
+    held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
+    held /= np.linalg.norm(held, axis=0)
+    return np.column_stack((held, _basis(columns - held @ (held.T @ columns))))
+
+
 def _basis(columns: Array) -> Array:
     """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
     scale = np.linalg.norm(columns, axis=0)
@@ -164,7 +182,7 @@ def _basis(columns: Array) -> Array:
     if not columns.size:
         return np.zeros((columns.shape[0], 0))
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.flatnonzero(values > 1e-7 * values[-1])[-min(max(columns.shape[0] // 4, 1), COLUMNS) :]
+    kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[-min(max(columns.shape[0] // 4, 1), COLUMNS) :]
     basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     return basis
 

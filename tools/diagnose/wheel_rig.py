@@ -23,7 +23,8 @@ ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
 EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
 CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
-SETTLING = 0.5  # [s] after the wheel starts, before the comparison counts
+SETTLING, LONGEST = 0.5, 5.0  # [s] after the wheel starts, before the comparison counts: at least, at most
+ANGLE = 0.7  # [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
 RESTING = 0.4  # [s] the wheel must have stood before its current counts as the reading at rest
 TIMING = 5e-3  # [s] by which a channel's stamps may be off
 BLUR = 0.3  # second differences by which speeds, slopes over three intervals, cut corners that a channel does not
@@ -36,9 +37,9 @@ FLOORS = {
 }  # least relative sigma
 SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
 UNITS = {
-    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-", "speed": "m/s",
-    "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s", "run": "-",
-    "direction": "-", "constant": "-",
+    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-",
+    "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s",
+    "run": "-", "direction": "-", "constant": "-",
 }  # fmt: skip
 PHYSICS = (
     "c",
@@ -317,7 +318,8 @@ def _states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     load = np.asarray(motion.load)
     carrying = load >= settings.load.minimum
     step = float(np.median(np.diff(np.asarray(motion.time))))
-    settled = _lasting(moving, round(SETTLING / step))
+    passing = ANGLE / max(usual / settings.wheel.radius, 1e-6)
+    settled = _lasting(moving, round(float(np.clip(passing, SETTLING, LONGEST)) / step))
     rest = _rest(np.asarray(motion.wheel_speed) * settings.wheel.radius, np.asarray(motion.carriage_speed))
     resting = _lasting(rest, round(RESTING / step)) & _lasting(rest[::-1], 2)[::-1]
     return settled & carrying, resting & carrying, settled & (load < 0.2 * settings.load.minimum)

@@ -127,8 +127,16 @@ UNITS = {
 
 def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
     return {
-        "scale": Key(_uncertain(scale), "physical = raw · scale + offset", default_scale),
-        "offset": Key(_uncertain(offset), "see `scale`", f"0 {offset}"),
+        "scale": Key(
+            _uncertain(scale),
+            "physical = raw · scale + offset; its sigma is that of the slope about the physical zero",
+            default_scale,
+        ),
+        "offset": Key(
+            _uncertain(offset),
+            "see `scale`; its sigma is that of the zero: the physical value read at rest",
+            f"0 {offset}",
+        ),
         "date": Key(Text("a date such as 2026-11-20", r"|\d{4}-\d\d-\d\d"), "day of the calibration", "''"),
         "serial": Key(Text(), "serial number of the sensor", "''"),
     }

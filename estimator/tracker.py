@@ -34,7 +34,7 @@ from estimator.settings import Settings
 from estimator.sync import NS, Measured, Snapshot
 from estimator.wheel_state import REQUIRED_BITS, WheelState, classify
 
-SLIP_MEMORY = 20.0  # [s] k is estimated while slip has varied within this time …
+SLIP_MEMORY = 20.0  # [s] k is estimated once slip has varied within this time …
 SLIP_VARIES = 0.05  # … by this standard deviation
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
@@ -94,6 +94,7 @@ class TrackState(NamedTuple):
     before: WheelState | None = None
     slip_mean: float = 0.0
     slip_variance: float = 0.0
+    slip_varied: bool = False  # at some time since the last reset
     surprise: float = 0.0  # sum of normalised innovations squared, exponentially forgotten
     components: float = 0.0  # number of them, likewise
     last_reset: int = -1
@@ -188,7 +189,7 @@ class Tracker:
     def estimates_k(self, state: TrackState) -> bool:
         """Whether ln k is a state; otherwise it is considered."""
         choice = self.settings.filter.estimate_k
-        return choice == "always" or (choice == "auto" and state.slip_variance > SLIP_VARIES**2)
+        return choice == "always" or (choice == "auto" and state.slip_varied)
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate, variances = self.settings.filter.gate, self.measurement.variances
@@ -254,6 +255,7 @@ class Tracker:
             estimate=estimate,
             memory=Memory(estimate),
             linearised=None,
+            slip_varied=False,
             surprise=0.0,
             components=0.0,
             last_reset=state.window_end,
@@ -302,7 +304,8 @@ def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackSt
     step = slip.value - state.slip_mean
     mean = state.slip_mean + (1.0 - keep) * step
     spread = state.slip_variance + (1.0 - keep) * (step * step - slip.sigma**2)
-    return state._replace(slip_mean=mean, slip_variance=keep * spread)
+    varied = state.slip_varied or keep * spread > SLIP_VARIES**2
+    return state._replace(slip_mean=mean, slip_variance=keep * spread, slip_varied=varied)
 
 
 def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:

@@ -20,7 +20,7 @@ STYLE = """
 body { margin: 2rem auto; max-width: 72rem; padding: 0 1rem; background: var(--paper); color: var(--ink);
        font: 1rem/1.5 Georgia, "Times New Roman", serif; }
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-p, li { max-width: 44rem; } code { font-size: 0.88em; }
+p, li { max-width: 44rem; } code { font-size: 0.88em; overflow-wrap: anywhere; } td.inset { padding-left: 1.8rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font: 0.85rem/1.4 system-ui, sans-serif; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid var(--rule); padding: 0.25rem 0.6rem; text-align: left; white-space: nowrap; }
@@ -41,7 +41,14 @@ def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
         "<h1>Blind trials of <code>gritd diagnose</code></h1>",
         f"<p>{score['cases']} cases, drawn and simulated by an independent plant. The answers were sealed before the "
         f"first diagnosis; SHA-256 of the batch:<br><code>{escape(seal)}</code></p>",
-        _preformatted("Figures", tables.text(score, ())),
+        "<h2>Figures</h2>",
+        _table(tables.headline(score)),
+        "<h2>By stratum and strength</h2>",
+        _table(tables.strata(score), head=True),
+        "<h2>Stated probability, and how often it was right</h2>",
+        _table(tables.reliability(score), head=True),
+        "<h2>Soil</h2>",
+        _table(tables.soil(score), head=True),
         "<h2>Confusion matrix</h2><p>Rows: what was concealed. Columns: what was named first. A filled cell on its "
         "own name is a hit; shading is the share of the row.</p>",
         _matrix(score["confusion"]),
@@ -61,8 +68,17 @@ def _document(body: str) -> str:
     )
 
 
-def _preformatted(title: str, text: str) -> str:
-    return f'<h2>{escape(title)}</h2><div class="wide"><pre>{escape(text)}</pre></div>'
+def _table(table: tables.Table, head: bool = False) -> str:
+    top = "".join(f"<th>{escape(cell)}</th>" for cell in table[0]) if head else ""
+    body = "".join(_row(row) for row in (table[1:] if head else table))
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _row(row: Sequence[str]) -> str:
+    """One row; a label that is set in is set in here as well."""
+    inset = ' class="inset"' if row[0].startswith(" ") else ""
+    first = f"<td{inset}>{escape(row[0].strip())}</td>"
+    return "<tr>" + first + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:]) + "</tr>"
 
 
 def _matrix(confusion: Mapping[str, Mapping[str, int]]) -> str:
@@ -99,19 +115,15 @@ def _cell(count: int, total: int, hit: bool) -> str:
 def _effects(effects: Mapping[str, Any]) -> str:
     head = ("effect", "alarm", "first name", "fixed groups", "stated group", "campaign can tell", "three, fixed groups")
     rows = [
-        (name, *(tables.said(of["first"][by]) for by in ("name", "table", "engine", "plant")), of)
+        (
+            name,
+            tables.said(of["detected"]),
+            *(tables.said(of["first"][by]) for by in ("name", "table", "engine", "plant")),
+            tables.said(of["three"]["table"]),
+        )
         for name, of in effects.items()
     ]
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _cells(name, first, of)) + "</tr>"
-        for name, *first, of in rows
-    )
-    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
-    return f'<div class="wide"><table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _cells(name: str, first: Sequence[str], of: Mapping[str, Any]) -> tuple[str, ...]:
-    return name, tables.said(of["detected"]), *first, tables.said(of["three"]["table"])
+    return _table([head, *rows], head=True)
 
 
 def _misses(rows: Sequence[Row]) -> str:

@@ -7,13 +7,22 @@ from typing import Any
 
 from tools.proof.verdicts import Row
 
-WIDTHS = (20, 20, 20, 20, 20, 20)
+Table = list[tuple[str, ...]]  # rows of cells, all as long as the first
+GAP = "  "
 
 
 def text(score: Mapping[str, Any], rows: Sequence[Row]) -> str:
     """All tables, then what went wrong, case by case."""
-    parts = [_headline(score), _strata(score), _reliability(score), _soil(score), _misses(rows)]
-    return "\n\n".join(part for part in parts if part)
+    parts = [aligned(table(score)) for table in (headline, strata, reliability, soil)]
+    wrong = [f"  {row.number:4}  {explained(row)}" for row in rows if missed(row)]
+    return "\n\n".join([*parts, "\n".join(["what went wrong", *wrong])] if wrong else parts)
+
+
+def aligned(table: Table) -> str:
+    """Columns as wide as their widest cell."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = (GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table)
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def said(share: Mapping[str, Any]) -> str:
@@ -28,77 +37,68 @@ def number(value: float | None, form: str = ".2f") -> str:
     return "–" if value is None else format(value, form)
 
 
-def _headline(score: Mapping[str, Any]) -> str:
+def headline(score: Mapping[str, Any]) -> Table:
+    """What a batch comes to."""
     alarms, singles, unlisted = score["false_alarms"], score["detectable_singles"], score["unlisted"]
-    heldout = score["heldout"]
-    lines = [
+    first, heldout, two = singles["first"], score["heldout"], score["two"]
+    return [
         ("cases, of which failed", said(score["failed"])),
         ("false alarms", said(alarms["all"])),
         ("  noise as stated", said(alarms["noise as stated"])),
         ("  noise off by two", said(alarms["noise misstated"])),
         ("detectable single effects: detected", said(singles["detected"])),
-        ("  first name right", said(singles["first"]["name"])),
-        ("  … by the fixed groups", said(singles["first"]["table"])),
-        ("  … by the group it states", said(singles["first"]["engine"])),
-        ("  … by what the campaign can tell", said(singles["first"]["plant"])),
-        ("  among the first three, by groups", said(singles["three"]["table"])),
+        ("  first name right", said(first["name"])),
+        ("  … by the fixed groups", said(first["table"])),
+        ("  … by the group it states", said(first["engine"])),
+        ("  … by what the campaign can tell", said(first["plant"])),
+        ("  among the first three, by the fixed groups", said(singles["three"]["table"])),
         ("unlisted: recall", said(unlisted["recall"])),
         ("  given a listed name above 0.5", said(unlisted["listed name above one half"])),
-        ("two effects: one named / both", f"{said(score['two']['one named'])} / {said(score['two']['both named'])}"),
+        ("two effects: one named", said(two["one named"])),
+        ("  both named", said(two["both named"])),
         ("parameters within two sigma", said(score["parameters"]["within two sigma"])),
         ("held-out error over oracle, median", number(heldout["detectable"]["over fitted"]["median"])),
         ("  where nothing is concealed", number(heldout["none"]["over fitted"]["median"])),
         ("  where the name is right", number(heldout["named right"]["over fitted"]["median"])),
         ("  … over the noiseless truth", number(heldout["named right"]["over truth"]["median"])),
-        ("Brier score, by name / stated group", " / ".join(_brier(score, by) for by in ("name", "engine"))),
+        ("Brier score, by name", number(score["calibration"]["name"]["brier"], ".3f")),
+        ("  by the group it states", number(score["calibration"]["engine"]["brier"], ".3f")),
         ("a diagnosis takes, median", f"{number(score['seconds']['median'], '.0f')} s"),
     ]
-    return "\n".join(f"{label:36}{value}" for label, value in lines)
 
 
-def _brier(score: Mapping[str, Any], by: str) -> str:
-    return number(score["calibration"][by]["brier"], ".3f")
-
-
-def _strata(score: Mapping[str, Any]) -> str:
+def strata(score: Mapping[str, Any]) -> Table:
+    """Alarms and names by stratum and strength."""
     head = ("stratum", "alarm", "first name", "first, fixed groups", "first, stated group", "three, fixed groups")
-    lines = [_line(head)]
-    for name, of in score["strata"].items():
-        first, three = of["first"], of["three"]
-        cells = (of["detected"], first["name"], first["table"], first["engine"], three["table"])
-        lines.append(_line((name, *(said(cell) for cell in cells))))
-    return "\n".join(lines)
+    rows = [(name, *(said(cell) for cell in _cells(of))) for name, of in score["strata"].items()]
+    return [head, *rows]
 
 
-def _line(cells: Sequence[str]) -> str:
-    return "  ".join(f"{cell:{width}}" for cell, width in zip(cells, WIDTHS, strict=True)).rstrip()
+def _cells(of: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    first = of["first"]
+    return of["detected"], first["name"], first["table"], first["engine"], of["three"]["table"]
 
 
-def _reliability(score: Mapping[str, Any]) -> str:
-    lines = ["stated probability of the first name, and how often it (or the group it was stated with) was right"]
+def reliability(score: Mapping[str, Any]) -> Table:
+    """Stated probability of the first name against how often it, or the group it was stated with, was right."""
     by_name, by_group = (score["calibration"][by]["table"] for by in ("name", "engine"))
-    for one, group in zip(by_name, by_group, strict=True):
-        label = f"{one['from']:.1f} – {one['to']:.1f}"
-        lines.append(f"{label:12}{number(one['stated']):8}{said(one['right']):22}{said(group['right'])}")
-    return "\n".join(lines)
+    rows = [
+        (f"{one['from']:.1f}-{one['to']:.1f}", number(one["stated"]), said(one["right"]), said(group["right"]))
+        for one, group in zip(by_name, by_group, strict=True)
+    ]
+    return [("stated probability", "mean", "name right", "stated group right"), *rows]
 
 
-def _soil(score: Mapping[str, Any]) -> str:
-    lines = ["relative error of c and tan φ, median before → after; within two sigma after"]
-    for stratum, of in score["soil"].items():
-        cells = []
-        for name, found in of.items():
-            before, after = (number(found[when]["median"], ".1%") for when in ("before", "after"))
-            cells.append(f"{name}: {before} → {after}; {said(found['within two sigma after'])}")
-        lines.append(f"{stratum:12}{'   '.join(cells)}")
-    return "\n".join(lines)
+def soil(score: Mapping[str, Any]) -> Table:
+    """Median relative error of c and tan φ before and after, and how often two sigma cover the truth after."""
+    head = ("soil, median error", "c before", "c after", "within 2σ", "tan φ before", "tan φ after", "within 2σ")
+    rows = [(stratum, *_errors(of["c"]), *_errors(of["tan_phi"])) for stratum, of in score["soil"].items()]
+    return [head, *rows]
 
 
-def _misses(rows: Sequence[Row]) -> str:
-    wrong = [row for row in rows if missed(row)]
-    if not wrong:
-        return ""
-    return "\n".join(["what went wrong", *(f"  {row.number:4}  {explained(row)}" for row in wrong)])
+def _errors(of: Mapping[str, Any]) -> tuple[str, str, str]:
+    before, after = (number(of[when]["median"], ".1%") for when in ("before", "after"))
+    return before, after, said(of["within two sigma after"])
 
 
 def missed(row: Row) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ from estimator.settings import (
 )
 from estimator.terramechanics.soil import PressureSinkage, Wheel
 from estimator.yamltree import Mapping as Tree
-from estimator.yamltree import Node
+from estimator.yamltree import Node, Scalar, describe
 
 EffectSchema = Callable[[str], Mapping[str, str] | None]
 """Effect name → unit of each of its parameters; None for a name that is no effect."""
@@ -125,6 +126,27 @@ UNITS = {
 }
 
 
+# No reading is exact. Less than this is a slip of the pen: the filter divides by its square.
+LEAST_NOISE = 1e-9  # in every raw unit
+
+
+@dataclass(frozen=True)
+class Unlimited:
+    """A limit that this kind of channel cannot have. The word stands in the effective text of earlier recordings."""
+
+    value: Any
+    reason: str
+
+    @property
+    def expected(self) -> str:
+        return f"{UNLIMITED}: {self.reason}"
+
+    def read(self, node: Node) -> tuple[Any, Node]:
+        if not isinstance(node, Scalar) or node.text != UNLIMITED:
+            raise node.place.error(describe(node), self.expected)
+        return self.value, node
+
+
 def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
     return {
         "scale": Key(
@@ -161,14 +183,15 @@ def _channel(name: str) -> Section:
     raw, physical, step = UNITS[name]
     slope = f"{physical}/{raw}"
     keys = _source() | (_calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED))
-    keys["noise"] = Key(Quantity(step, low=0), "standard deviation of one reading")
+    keys["noise"] = Key(Quantity(step, above=LEAST_NOISE), "standard deviation of one reading")
     if name in ENCODERS:
-        keys["range"] = Key(Interval(Quantity(raw), unlimited=True), "valid counts", UNLIMITED)
+        max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
+        keys["range"] = Key(Unlimited((-inf, inf), "no count is impossible, max_rate tells a jump"), "none", UNLIMITED)
         keys["bits"] = Key(Integer(8, 64), "width of the counter on the wire", "32")
+        keys["max_rate"] = Key(max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED)
     else:
         keys["range"] = Key(Interval(Quantity(raw)), "valid readings; one outside is quarantined")
-    max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
-    keys["max_rate"] = Key(max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED)
+        keys["max_rate"] = Key(Unlimited(inf, "only an encoder's counts can jump"), "none", UNLIMITED)
     return Section(keys | _timing(), partial(_build_channel, name))
 
 
@@ -190,8 +213,8 @@ WRENCH = {
     "drawbar_pull": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fx", "{}"),
     "load": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fz", "{}"),
     "torque": Key(Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"),
-    "force_noise": Key(Quantity("N", low=0), "standard deviation of one force reading"),
-    "torque_noise": Key(Quantity("N*m", low=0), "standard deviation of one torque reading"),
+    "force_noise": Key(Quantity("N", above=LEAST_NOISE), "standard deviation of one force reading"),
+    "torque_noise": Key(Quantity("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"),
     "max_force": Key(Quantity("N", above=0), "a larger force is quarantined", "10 kN"),
     "max_torque": Key(Quantity("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
 }

@@ -124,16 +124,12 @@ class Interval:
     """A list of two quantities, the first below the second."""
 
     quantity: Quantity
-    unlimited: bool = False
 
     @property
     def expected(self) -> str:
-        unlimited = f", or {UNLIMITED}" if self.unlimited else ""
-        return f"[low, high], each {self.quantity.expected}{unlimited}"
+        return f"[low, high], each {self.quantity.expected}"
 
     def read(self, node: Node) -> tuple[tuple[float, float], Node]:
-        if self.unlimited and isinstance(node, Scalar) and node.text == UNLIMITED:
-            return (-math.inf, math.inf), node
         if not isinstance(node, Sequence) or len(node.items) != 2:
             raise node.place.error(describe(node), self.expected)
         low, high = (self.quantity.read(item)[0] for item in node.items)

@@ -191,6 +191,13 @@ REFUSED = [
      "channels.sinkage_pot.range", "found [5 V, 0 V]; expected the low end below"),
     ("scale: 2 A/V, noise: 2 mV", "scale: 2 A/V, noise: 2 mV, latency: 60 ms", 19, "channels.motor_shunt.latency",
      "less than rates.horizon"),
+    ("25 mm/V, noise: 2 mV", "25 mm/V, noise: 0 mV", 18, "channels.sinkage_pot.noise", "found 0 mV; expected"),
+    ("25 mm/V, noise: 2 mV", "25 mm/V, noise: 1e-200 V", 18, "channels.sinkage_pot.noise", "above 1e-09 V"),
+    ("0.1 mrad/count, noise: 0.3 count", "0.1 mrad/count, noise: 0 count", 16, "channels.wheel_encoder.noise", "above"),
+    ("0.1 mrad/count, noise", "0.1 mrad/count, range: [0 count, 9 count], noise", 16, "channels.wheel_encoder.range",
+     "found a list of 2; expected unlimited: no count is impossible"),
+    ("25 mm/V, noise", "25 mm/V, max_rate: 3 V/s, noise", 18, "channels.sinkage_pot.max_rate",
+     "found 3 V/s; expected unlimited: only an encoder's counts can jump"),
     ("drive: {torque_constant: 2 N*m/A}", "drive: {torque_constant: 2 N*m/A, torque_source: wrench}", 11,
      "drive.torque_source", "there is no channel wrench"),
     ("testbed: bench", "testbed: off", 1, "testbed", "found off, which YAML reads as false; expected a name in quotes"),
@@ -244,6 +251,13 @@ def test_every_required_channel_is_missed() -> None:
     for name in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt"):
         text = re.sub(rf"  {name}: .*\n", "", MINIMAL)
         assert message(text).startswith(f"rig.yaml:15: channels.{name}: found nothing; expected a mapping")
+
+
+@pytest.mark.parametrize("noise", ["force_noise: 0.3 N", "torque_noise: 20 mN*m"])
+def test_an_exact_wrench_is_refused(noise: str) -> None:
+    name, _, quantity = noise.partition(": ")
+    line = message(changed(noise, f"{name}: 0 {quantity.split()[1]}", TESTBED))
+    assert f"channels.wrench.{name}: found 0 " in line and "above 1e-09 N" in line
 
 
 @pytest.mark.parametrize("text", ["", "\n# nothing\n", "hello", "[1, 2]", "3", "null", "{}"])

@@ -60,8 +60,12 @@ def test_strength_follows_detectability() -> None:
     assert detector.detectability([half]) == pytest.approx(0.5 * case.detectability, rel=0.05)
 
 
-def test_nothing_concealed_changes_nothing(null: cases.Case) -> None:
-    assert Detector(null.trial).detectability([CoulombFriction(0.0)]) == pytest.approx(0.0, abs=1e-6)
+def test_what_is_off_is_invisible(null: cases.Case) -> None:
+    detector = Detector(null.trial)
+    facts = detector.facts()
+    for name, effect in (LISTED | UNLISTED).items():
+        off = replace(effect.drawn(np.random.default_rng(1), facts), strength=0.0)
+        assert detector.detectability([off]) < 0.05, name
 
 
 def test_an_offset_within_its_calibration_is_invisible(null: cases.Case) -> None:
@@ -88,6 +92,9 @@ def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.Case, tmp_path:
     true, told = null.trial.world.ground, loaded.settings.soil
     assert told.cohesion.value != true.cohesion
     assert abs(told.cohesion.value - float(true.cohesion)) < 3.0 * told.cohesion.sigma
+    at_rest = read(files[0]).arrays("/raw/motor_shunt")["volts"][:200].mean()
+    shunt = loaded.settings.channels["motor_shunt"].calibration
+    assert abs(at_rest * shunt.scale.value + shunt.offset.value) < 3.0 * shunt.offset.sigma  # zeroed at rest
     recording = read(files[0])
     assert recording.complete and not recording.damage
     for topic in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt", "wrench"):

@@ -265,7 +265,8 @@ def _told(felt: Felt, motion: Motion, trial: Trial) -> Motion:
     """The motion and load that an engineer sees: the encoders' and the force sensor's."""
     changed: dict[str, Any] = {}
     if felt.carriage is not motion.travel:
-        changed |= {"travel": felt.carriage, "speed": np.gradient(felt.carriage, motion.step)}
+        unseen = np.gradient(felt.carriage - motion.travel, motion.step)
+        changed |= {"travel": felt.carriage, "speed": motion.speed + unseen}
     if trial.wrench and not np.array_equal(felt.load, motion.weight):
         changed["weight"] = felt.load
     return replace(motion, **changed) if changed else motion

@@ -155,8 +155,14 @@ def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Convert
     volts = name in ("sinkage_pot", "motor_shunt")
     quantum = 1.0 if encoder else 4.8 / 2 ** int(rng.choice((12, 14, 16))) if volts else 0.2 * said.noise
     low, high = (0.1, 4.9) if volts else (-1e12, 1e12)
-    scale, offset = _true(said.scale, rng), _true(said.offset, rng)
+    scale, offset = _calibrated(said, rng)
     return Converter(name, scale, offset, noise, quantum, low, high, 0.0 if encoder else 1e-3, 250.0)
+
+
+def _calibrated(said: Instrument, rng: np.random.Generator) -> tuple[float, float]:
+    """True scale and offset. Sensors are zeroed where they read nothing, so the gain errs about the physical zero."""
+    gain = _true(said.scale, rng) / said.scale.value
+    return said.scale.value / gain, (2.0 * said.offset.value - _true(said.offset, rng)) / gain
 
 
 def _true(stated: Stated, rng: np.random.Generator) -> float:

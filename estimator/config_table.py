@@ -51,8 +51,8 @@ from estimator.terramechanics.soil import PressureSinkage, Wheel
 from estimator.yamltree import Mapping as Tree
 from estimator.yamltree import Node, Scalar, describe
 
-EffectSchema = Callable[[str], Mapping[str, str] | None]
-"""Effect name → unit of each of its parameters; None for a name that is no effect."""
+EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
+"""Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""
 
 
 def _uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
@@ -298,7 +298,7 @@ def _rates(tick: float, update: float, horizon: float) -> Rates:
 
 @dataclass(frozen=True)
 class Effects:
-    """Effect name → parameters. With a schema each has its unit; without one any quantity will do."""
+    """Effect name → parameters. With a schema each has its unit and bounds; without one any quantity will do."""
 
     schema: EffectSchema | None
     expected: str = "a mapping of effects"
@@ -314,7 +314,7 @@ class Effects:
             return Named(UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters")
         if (known := self.schema(name)) is None:
             raise item.place.error("an unknown effect", "the name of an effect")
-        keys = {parameter: Key(_uncertain(unit), "parameter") for parameter, unit in known.items()}
+        keys = {parameter: Key(UncertainQuantity(kind), "parameter") for parameter, kind in known.items()}
         return Section(keys, dict, "a mapping of parameters")
 
 

@@ -80,9 +80,13 @@ class Quantity:
         if self.unlimited and text == UNLIMITED:
             return math.inf, node
         value = self._si(node, text)
-        if not (self.above < value and self.low <= value <= self.high):
+        if not self.holds(value):
             raise node.place.error(shown(text), self.expected)
         return value, node
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is finite and inside the bounds."""
+        return math.isfinite(value) and self.above < value and self.low <= value <= self.high
 
     def _si(self, node: Node, text: str) -> float:
         try:

@@ -15,6 +15,7 @@ from config import packaged
 from estimator import config
 from estimator.config import ConfigError
 from estimator.recording import RunInfo
+from estimator.schema import Quantity
 from estimator.settings import Channel, ConfiguredEffect, FilterSettings, Load, Logging, Rates, Uncertain
 
 TESTBED = packaged().read_text(encoding="utf-8")
@@ -130,8 +131,8 @@ def test_effects_are_read_into_si() -> None:
 
 
 def test_effects_are_checked_against_a_schema() -> None:
-    def schema(name: str) -> dict[str, str] | None:
-        return {"coulomb_friction": {"loss": "N*m"}, "other": {"gain": ""}}.get(name)
+    def schema(name: str) -> dict[str, Quantity] | None:
+        return {"coulomb_friction": {"loss": Quantity("N*m")}, "other": {"gain": Quantity("")}}.get(name)
 
     assert config.loads(MINIMAL + EFFECTS, "rig.yaml", effect_schema=schema).settings.effects
     for old, new, words in [
@@ -234,6 +235,12 @@ APPENDED = [
     ("logging: {directory: }", "logging.directory", "found nothing"),
     ("effects: {bulldozing: [1]}", "effects.bulldozing", "a mapping of parameters"),
     ("effects: {bulldozing: {share: 1 parsec}}", "effects.bulldozing.share", "unknown unit"),
+    ("effects: {stress_linearisation: {share: 7}}", "effects.stress_linearisation.share", "found 7; expected a number"),
+    (
+        "effects: {stress_linearisation: {share: {value: -1, sigma: 0}}}",
+        "effects.stress_linearisation.share.value",
+        "found -1; expected a number from 0",
+    ),
     ("efects: {}", "efects", "did you mean effects?"),
     ("run: {pass: 0}", "run.pass", "from 1"),
     ("---\na: 1", "document", "one document a file"),

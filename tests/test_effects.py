@@ -243,5 +243,8 @@ def test_order_of_action_is_by_stage() -> None:
 
 
 def test_units_are_what_the_configuration_asks() -> None:
-    assert library.units("coulomb_friction") == {"loss": "N·m"}
+    asked = library.units("coulomb_friction")
+    assert asked is not None and set(asked) == {"loss"}
+    known = library.EFFECTS["coulomb_friction"].parameters()[0]
+    assert (asked["loss"].unit, asked["loss"].low, asked["loss"].high) == ("N·m", known.low, known.high)
     assert library.units("gremlins") is None

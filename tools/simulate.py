@@ -225,7 +225,7 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
             raise CommandError(
                 f"--effect {text}: found '{name if known is None else parameter}'; expected one of {options}", USAGE
             )
-        values.setdefault(name, {})[parameter] = _quantity(f"--effect {text}", value, known[parameter])
+        values.setdefault(name, {})[parameter] = _quantity(f"--effect {text}", value, known[parameter].unit or "")
     try:
         made = [effects.make(name, parameters) for name, parameters in values.items()]
     except ValueError as error:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from estimator.effects.base import STAGES, Effect
+from estimator.schema import Quantity
 from estimator.settings import ConfiguredEffect
 
 
@@ -49,9 +50,11 @@ def configured(effects: Iterable[ConfiguredEffect]) -> tuple[Effect, ...]:
     return tuple(make(e.name, {key: value.value for key, value in e.parameters.items()}) for e in effects)
 
 
-def units(name: str) -> dict[str, str] | None:
-    """Unit of each parameter of an effect, as the configuration reads it; None where there is no such effect."""
-    return {p.name: p.unit for p in EFFECTS[name].parameters()} if name in EFFECTS else None
+def units(name: str) -> dict[str, Quantity] | None:
+    """What the configuration reads each parameter of an effect as, unit and bounds; None for no such effect."""
+    if name not in EFFECTS:
+        return None
+    return {p.name: Quantity(p.unit, low=p.low, high=p.high) for p in EFFECTS[name].parameters()}
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:

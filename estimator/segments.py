@@ -21,6 +21,7 @@ from estimator.wheel_state import WheelState
 
 CAPACITY = 24  # stretches that are linearised anew
 LONGEST = 40  # windows merged into one stretch
+STEADY = 3  # windows that make a stretch one of steady motion
 SAME_SLIP = 0.02
 SAME_LOAD = 0.02  # relative
 SAME_ANGLE = 0.02  # relative change of θ₁
@@ -80,6 +81,11 @@ class Memory(NamedTuple):
     anchor: Estimate
     stretches: tuple[Stretch, ...] = ()
     pending: float = 0.0  # [s] of random walk not yet assigned to a stretch
+
+    def slip_span(self) -> float:
+        """Largest difference of slip between steady stretches."""
+        slips = [stretch.mean.slip.value for stretch in self.stretches if stretch.windows >= STEADY]
+        return max(slips) - min(slips) if slips else 0.0
 
     def waited(self, elapsed: float) -> Memory:
         """Time passed without an accepted window."""

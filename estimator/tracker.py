@@ -31,11 +31,11 @@ from estimator.plain import PlainEngine
 from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
 from estimator.segments import CAPACITY, Memory, Stretch
 from estimator.settings import Settings
-from estimator.sync import NS, Measured, Snapshot
+from estimator.sync import NS, Snapshot
 from estimator.wheel_state import REQUIRED_BITS, WheelState, classify
 
-SLIP_MEMORY = 20.0  # [s] k is estimated once slip has varied within this time …
-SLIP_VARIES = 0.05  # … by this standard deviation
+SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …
+CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
 CONSISTENCY_MEMORY = 2.0  # [s]
@@ -92,9 +92,7 @@ class TrackState(NamedTuple):
     began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
-    slip_mean: float = 0.0
-    slip_variance: float = 0.0
-    slip_varied: bool = False  # at some time since the last reset
+    slip_varied: bool = False  # from one steady stretch to another, since the last reset
     surprise: float = 0.0  # sum of normalised innovations squared, exponentially forgotten
     components: float = 0.0  # number of them, likewise
     last_reset: int = -1
@@ -167,7 +165,6 @@ class Tracker:
 
     def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
         """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
-        state = _remember_slip(state, now.slip, elapsed)
         state = state._replace(estimate=self._walk(state.estimate, elapsed))
         update = self.measurement.linearise(now, self.measurement.predict(state.estimate, now))
         aids = self._gate(state.estimate, now, update)
@@ -205,6 +202,8 @@ class Tracker:
     def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:
         """Add the window to the memory; when a new stretch begins and the state has moved, linearise all anew."""
         memory, begun = state.memory.extended(now, taken, self.measurement.chain.wheel.radius, elapsed)
+        if not state.slip_varied and memory.slip_span() > max(SLIP_VARIES, CLEARLY * now.slip.sigma):
+            state = state._replace(slip_varied=True)
         if not begun or len(memory.stretches) == 1:
             return state._replace(memory=memory)
         if len(memory.stretches) > CAPACITY:
@@ -296,16 +295,6 @@ def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
         sinking = (snapshot.sinkage.value - before.read[1]) / elapsed
     time = 0.0 if state.began < 0 else (snapshot.evaluated - state.began) / NS
     return Context(time, *soil(state.estimate), acceleration, sinking, state.recall)
-
-
-def _remember_slip(state: TrackState, slip: Measured, elapsed: float) -> TrackState:
-    """Exponentially forgotten mean and variance of slip, the variance of its own noise left out."""
-    keep = exp(-elapsed / SLIP_MEMORY) if state.updates else 0.0
-    step = slip.value - state.slip_mean
-    mean = state.slip_mean + (1.0 - keep) * step
-    spread = state.slip_variance + (1.0 - keep) * (step * step - slip.sigma**2)
-    varied = state.slip_varied or keep * spread > SLIP_VARIES**2
-    return state._replace(slip_mean=mean, slip_variance=keep * spread, slip_varied=varied)
 
 
 def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:

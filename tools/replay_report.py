@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.record import Status
+from estimator.record import Flag, Status
 
 Rows = NDArray[np.void]  # structured: fields of /tick, one row a tick or one a window
 SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
@@ -24,6 +24,7 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"{path}: {seconds:.1f} s, {len(rows)} {each}, {int(last['updates'])} filter updates, "
             f"{int(last['resets'])} resets",
             f"  status     {_statuses(rows)}",
+            f"  flags      {_flags(rows)}",
             f"  c          {last['cohesion']:.0f} ± {last['cohesion_sigma']:.0f} Pa",
             f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with c "
             f"{_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the prior's σ",
@@ -38,6 +39,12 @@ def _statuses(rows: Rows) -> str:
     values, counts = np.unique(rows["status"], return_counts=True)
     shares = sorted(zip(counts.tolist(), values.tolist(), strict=True), reverse=True)
     return ", ".join(f"{Status(int(value)).name} {count / len(rows):.0%}" for count, value in shares)
+
+
+def _flags(rows: Rows) -> str:
+    """How much of the recording each flag was raised."""
+    raised = {flag: np.mean(rows["flags"].astype(int) & flag > 0) for flag in Flag if flag}
+    return ", ".join(f"{flag.name} {share:.0%}" for flag, share in raised.items() if share > 0.0) or "none"
 
 
 def _correlation(row: dict[str, float]) -> float:

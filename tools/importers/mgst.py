@@ -98,7 +98,8 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     trials = [read_trial(*pair) for pair in _pairs(args.paths)]
     known = {"drawbar_pull": "2", "torque": "0.3"}
     sigmas = {f"{name}_sigma": f"{UNKNOWN:.1f}" if name in args.conceal else text for name, text in known.items()}
-    configured = configuration("rig_mgst.yaml", args.output, "mgst.yaml", **sigmas)
+    source = "motor_shunt" if "torque" in args.conceal else "wrench"
+    configured = configuration("rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas)
     written = [args.output / "mgst.yaml"]
     progress(HEADER)
     for trial in trials:

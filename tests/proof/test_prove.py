@@ -56,6 +56,18 @@ def test_a_finished_batch_resumes_to_the_same_score(finished: Path, monkeypatch:
     assert (finished / "score.json").read_text(encoding="utf-8") == before
 
 
+def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(tmp_path: Path) -> None:
+    """Stopped after one case was sealed but not diagnosed, and before the other was drawn."""
+    begun = batch.started(tmp_path, 2, ("none",), 3)
+    first, second = begun.specs(keep=True, diagnose=STUB)
+    sealed = trial.prepare(first)
+    assert not first.done and not second.folder.exists()
+    assert command.main(["--resume", "--keep", "--jobs", "1", "--output", str(tmp_path)], STUB) == 0
+    assert first.done and second.done
+    assert first.seal.read_text(encoding="utf-8").strip() == sealed
+    assert list(first.folder.glob("given/*.mcap"))
+
+
 def test_a_changed_answer_is_noticed(finished: Path) -> None:
     answers = finished / "answers" / "case-0001.json"
     text = answers.read_text(encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     for path in (arguments.json, arguments.report, arguments.apply):
         if path is not None and not path.parent.is_dir():
             raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)
-    found, damage = of_files(arguments.files, configuration, arguments.seed, _said)
+    found, damage = of_files(arguments.files, configuration, arguments.seed, _said, arguments.jobs)
     if arguments.json is not None:
         arguments.json.write_text(json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
     if arguments.report is not None:
@@ -48,7 +49,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def of_files(
-    files: Sequence[Path], configuration: config.Configuration, seed: int, step: object = None
+    files: Sequence[Path], configuration: config.Configuration, seed: int, step: object = None, jobs: int = 1
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
     recordings = read_all(files)
@@ -63,7 +64,7 @@ def of_files(
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None)
+        found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None, jobs)
         if isinstance(rig, WheelRig) and "torque" in rig.channels:
             found = with_innovations(found, configuration, recordings)
     return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
@@ -90,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
     parser.add_argument("--seed", type=int, default=0, help="of the surrogates; default 0")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; default: one a core")
     return parser
 
 

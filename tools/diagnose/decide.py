@@ -13,8 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
+from tools.diagnose.rig import Index
 from tools.diagnose.screen import Screen, whitened
 from tools.diagnose.select import Model, Search, rescreen
 
@@ -24,8 +26,9 @@ ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off
 LISTED = 5.0  # [nats] head start of the library over functions without a name
 SHAPE = 0.05  # and this share of its evidence, since a form's details may differ
 PAIR = 3.0  # [nats] a second function must gain
+SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, LEFT = 2, 4  # functions without a name that may act together; that count what is left
-TAKEN = 0.8  # share of the explainable misfit a listed explanation must take
+TAKEN, ABOUT = 0.9, 0.04  # share of the explainable misfit a listed explanation must take
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 
 
@@ -49,7 +52,7 @@ def decide(search: Search) -> Decision:
     best, share, left, significant = _explanation(search)
     temperature = TEMPERATURE + LEFTOVER * left
     gained = best.evidence - base.evidence
-    ahead = nameless(search, base, FAMILIES) - gained - LISTED - SHAPE * max(gained, 0.0)
+    ahead = refitted(search, base) - gained - LISTED - SHAPE * max(gained, 0.0)
     unlisted = max(_unlisted(share, significant, bool(best.names)), float(1.0 / (1.0 + np.exp(-ahead / TEMPERATURE))))
     listed = bool(best.names) and unlisted < 0.5
     probability = {n: p * (1.0 - unlisted) for n, p in probabilities(search.models, temperature).items()}
@@ -77,21 +80,44 @@ def remaining(search: Search, model: Model) -> tuple[float, bool]:
 
 def nameless(search: Search, model: Model, most: int) -> float:
     """Evidence for the best few smooth functions of covariates on top of a model, taken up in turn [nats]."""
+    return _families(search, model, most)[0]
+
+
+def refitted(search: Search, model: Model) -> float:
+    """The same with soil and calibration fitted anew beside the best functions, as listed effects are fitted [nats]."""
+    linear, chosen = _families(search, model, FAMILIES)
+    if not chosen:
+        return linear
+    problem, found = search.problem, model.fitted
+    columns = np.column_stack([search.generics[i].columns for i in chosen])
+    gains = [linear]
+    for scale in SIZES:
+        fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
+        gains.append(fitted.log_evidence - found.log_evidence - PAIR * (len(chosen) - 1))
+    return max(gains)
+
+
+def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]]:
+    """Evidence of the chosen functions together [nats], and their places among the generics."""
     base = model.fitted.base()
     ready = whitened(search.problem.noise, search.generics)
     a, b = base.projected(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
-    total, kept = 0.0, np.zeros(0, dtype=int)
+    total, chosen = 0.0, []
     for _ in range(most):
-        tried = [
-            float(log_bayes(a[np.ix_(i, i)], b[i], (0,) * len(i))) for p in parts if (i := np.union1d(kept, p)).size
-        ]
+        tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
         best = int(np.argmax(tried))
-        if tried[best] - PAIR <= total:
+        price = PAIR if chosen else 0.0
+        if best in chosen or tried[best] - price <= total:
             break
-        total, kept = tried[best] - (PAIR if kept.size else 0.0), np.union1d(kept, parts[best])
-    return total
+        total, chosen = tried[best] - price, [*chosen, best]
+    return total, chosen
+
+
+def _together(a: Array, b: Array, parts: list[Index]) -> float:
+    index = np.unique(np.concatenate(parts))
+    return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
 def _unlisted(share: float, significant: bool, any_effect: bool) -> float:
@@ -100,7 +126,7 @@ def _unlisted(share: float, significant: bool, any_effect: bool) -> float:
         return 0.95
     if not significant:
         return 0.02
-    return float(1.0 / (1.0 + np.exp((share - TAKEN) / 0.06)))
+    return float(1.0 / (1.0 + np.exp((share - TAKEN) / ABOUT)))
 
 
 def probabilities(models: Sequence[Model], temperature: float) -> dict[str, float]:

@@ -24,12 +24,18 @@ Step = Callable[[str], None]
 SHOWN = 12  # hypotheses
 
 
-def diagnose(rig: Rig, seed: int = 0, redo: Mapping[str, Any] | None = None, step: Step = lambda _: None) -> Diagnosis:
+def diagnose(
+    rig: Rig,
+    seed: int = 0,
+    redo: Mapping[str, Any] | None = None,
+    step: Step = lambda _: None,
+    jobs: int = 1,
+) -> Diagnosis:
     """Everything `gritd diagnose` says. Deterministic for a seed."""
     rng = np.random.default_rng(seed)
     step("fitting the soil and the noise")
     prepared = prepare(rig, rng)
-    search = Search(prepared.problem, prepared.generics, prepared.draws)
+    search = Search(prepared.problem, prepared.generics, prepared.draws, jobs=jobs)
     run(search, Model(prepared.base, (), 0.0), step)
     decision = decide(search)
     step("holding out runs and conditions")

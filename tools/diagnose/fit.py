@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +98,12 @@ class Problem:
         self.stack, self.noise = stack, noise
         self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
         self.measured = whiten(noise, stack.measured)
+
+    def beside(self, columns: Array) -> Problem:
+        """The same with more columns (N, m), each one standard deviation, that no effect stands for."""
+        other = copy(self)
+        other.tolerance = np.column_stack((self.tolerance, whiten(self.noise, columns)))
+        return other
 
     def descend(
         self, effects: Sequence[Maker], free: Sequence[Free], u: Array, x: Array, rounds: int = ROUNDS

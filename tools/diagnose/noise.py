@@ -258,7 +258,7 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
     for share, time in ((colour.slow, colour.time), (colour.fast, FAST_TIME * _step(gaps))):
         if share > 0.0:
             out += np.sqrt(share) * _relaxing(gaps, count, time, rng)
-    return colour.sigma * out
+    return np.asarray(colour.sigma * out)
 
 
 def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:

@@ -11,6 +11,7 @@ from estimator.effects.base import Effect
 from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base, Signature
 from tools.diagnose.fit import Fitted, Free, Maker, Problem, free_of
+from tools.diagnose.parallel import each
 from tools.diagnose.screen import Screen, Whitened, screen, whitened
 from tools.diagnose.signatures import shape_grid, signature, strengths
 
@@ -26,7 +27,7 @@ PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
 FORM = 0.08  # of what the effects so far gained: what a published form other than ours may leave for another effect
 
 
-@dataclass
+@dataclass(eq=False)
 class Model:
     """A set of effects and its fit."""
 
@@ -48,6 +49,7 @@ class Search:
     draws: tuple[Array, Array]
     models: list[Model] = field(default_factory=list)
     screens: dict[tuple[str, ...], Screen] = field(default_factory=dict)
+    jobs: int = 1  # processes that fit
 
     def best(self, size: int | None = None) -> Model:
         return max((m for m in self.models if size is None or len(m.names) == size), key=lambda m: m.evidence)
@@ -103,10 +105,12 @@ def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model
     """Fits of the model with one more effect each; those that may win are fitted to the end."""
     effects = search.problem.stack.rig.effects
     names = [n for n in likely(found, list(effects), most) if not search.has((*model.names, n))]
-    made = [_fitted(search, model, effects[name], found.best[name]) for name in names]
+    made = each(search.jobs, lambda name: _fitted(search, model, effects[name], found.best[name]), names)
     if made:
         top = max(max(m.evidence for m in made), search.best().evidence)
-        made = [_finished(search.problem, m) if m.evidence > top - HOPELESS else m for m in made]
+        close = [m for m in made if m.evidence > top - HOPELESS]
+        done = iter(each(search.jobs, lambda m: _finished(search.problem, m), close))
+        made = [next(done) if m in close else m for m in made]
     search.models += made
     return made
 

@@ -29,7 +29,7 @@ from estimator.effects.base import Effect
 from tools.diagnose import heldout
 from tools.diagnose.cases import Plan, draw, record, scaled
 from tools.diagnose.cousins import COUSINS
-from tools.diagnose.decide import FAMILIES, decide, nameless
+from tools.diagnose.decide import decide, refitted
 from tools.diagnose.engine import said
 from tools.diagnose.fit import free_of
 from tools.diagnose.prepare import Prepared, prepare
@@ -114,7 +114,7 @@ def _work(search: Search) -> dict[str, Any]:
     return {
         "screen": dict(sorted(((n, round(e, 1)) for n, e in first.evidence.items()), key=lambda i: -i[1])[:8]),
         "models": [["+".join(m.names), round(m.evidence - base.evidence, 1)] for m in models],
-        "nameless": nameless(search, base, FAMILIES),
+        "nameless": refitted(search, base) if first.alarmed else 0.0,
         "share": decision.share,
         "left": decision.left,
         "unlisted": decision.unlisted,

@@ -104,7 +104,8 @@ def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]
     a, b = base.projected(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
-    total, chosen = 0.0, []
+    total = 0.0
+    chosen: list[int] = []
     for _ in range(most):
         tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
         best = int(np.argmax(tried))

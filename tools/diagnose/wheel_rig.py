@@ -20,6 +20,7 @@ from tools.diagnose.rig import Bools, Known, Run
 from tools.diagnose.weights import weights_of
 
 ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
+HELD = 0.05  # of the driving torque: current at rest that differs by more holds something
 EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
 CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
@@ -81,7 +82,7 @@ class WheelRig:
         self._starts: list[Array | None] = [None] * len(signals)
         self._kept: list[dict[tuple[object, ...], Array]] = [{} for _ in signals]
         self._steps = [float(np.median(np.diff(s.time))) for s in signals]
-        self.runs = [self._run(s, n) for n, s in enumerate(signals)]
+        self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
 
     # ---- prediction --------------------------------------------------------------------------------------------------
 
@@ -186,6 +187,21 @@ class WheelRig:
         known[:EDGE] = known[-EDGE:] = False
         used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
         return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
+
+    def _without_held_torque(self, runs: list[Run]) -> list[Run]:
+        """A servo may hold torque at rest: where the current at rest differs from rest to rest, rest says nothing."""
+        if "torque" not in self.channels:
+            return runs
+        still = [run.used["torque"] & (run.covariates["speed"] == 0.0) for run in runs]
+        means = [float(r.measured["torque"][m].mean()) for r, m in zip(runs, still, strict=True) if m.any()]
+        driven = np.concatenate([r.measured["torque"][r.used["torque"] & ~m] for r, m in zip(runs, still, strict=True)])
+        if len(means) < 2 or not driven.size or float(np.ptp(means)) < HELD * float(np.sqrt(np.mean(driven**2))):
+            return runs
+        self.caveats.append("The motor holds torque while the wheel stands, so its current at rest tells no offset.")
+        return [
+            replace(run, used={**run.used, "torque": run.used["torque"] & ~mask})
+            for run, mask in zip(runs, still, strict=True)
+        ]
 
     def _depth(self, number: int) -> Array:
         """Sinkage predicted from the prior: the measured one carries the noise of its channel."""

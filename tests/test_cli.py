@@ -63,6 +63,16 @@ def test_effective_text_checks_too(tmp_path: Path) -> None:
         ((), "gritd: expected a command"),
         (("dance",), "gritd: argument COMMAND: invalid choice"),
         (("check-config", "--dance"), "gritd: unrecognized arguments: --dance"),
+        (
+            ("run", "--config", "x", "--load", "-5"),
+            "gritd: argument --load: found '-5'; expected a number above 0 (see",
+        ),
+        (("run", "--config", "x", "--load", "nan"), "gritd: argument --load: found 'nan'; expected a number above 0"),
+        (("run", "--config", "x", "--pass", "0"), "gritd: argument --pass: found '0'; expected a whole number from 1"),
+        (("run", "--config", "x", "--start", "inf"), "gritd: argument --start: found 'inf'; expected a number"),
+        (("run", "--config", "x", "--status", "-1"), "gritd: argument --status: found '-1'; expected a number from 0"),
+        (("reproduce", "--seed", "-1"), "gritd: argument --seed: found '-1'; expected a whole number from 0"),
+        (("reproduce", "--simulations", "0"), "gritd: argument --simulations: found '0'"),
         (("check-config", "/nowhere.yaml"), "gritd: /nowhere.yaml: found no such file or directory; expected"),
     ],
 )

@@ -12,6 +12,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from config import packaged
 from estimator import config, effects
+from estimator.readings import Reading
+from estimator.recording import RunInfo, RunWriter
 from estimator.yamltree import ConfigError
 from tools import schedule as schedules
 from tools.command import CommandError
@@ -148,7 +150,10 @@ def test_wrong_schedule_is_one_line(tmp_path: Path, text: str, said: str) -> Non
         (["--effect", "coulomb_friction.loss=2 mm"], "found '2 mm'"),
         (["--effect", "coulomb_friction.loss=much"], "found 'much'"),
         (["--soil", "moisture=3"], "found 'moisture'; expected one of cohesion"),
-        (["--soil", "cohesion=-3"], "expected a positive value"),
+        (["--soil", "cohesion=-3"], "found -3; expected a quantity in Pa from 0 Pa to 1e+06 Pa"),
+        (["--soil", "cohesion=1e300 Pa"], "found 1e300 Pa; expected a quantity in Pa from 0 Pa to 1e+06 Pa"),
+        (["--soil", "tan_phi=0"], "found 0; expected a number above 0 up to 5"),
+        (["--soil", "modulus_factor=1e9"], "found 1e9; expected a number above 0 up to 100"),
     ],
 )
 def test_wrong_option_is_one_line(tmp_path: Path, options: list[str], said: str) -> None:
@@ -178,13 +183,48 @@ def test_a_recording_drives_it_again(schedule: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--motion", "nowhere.mcap"], "nowhere.mcap: cannot read: No such file or directory"),
-        ([], "taken.mcap: cannot create: File exists"),
+        (["--seed", "-1"], "argument --seed: found '-1'; expected a whole number from 0"),
+        (["--pass", "-3"], "argument --pass: found '-3'; expected a whole number from 1 to 1000"),
+        (["--pass", "0"], "found '0'"),
+        (["--pass", "9999999999999999"], "found '9999999999999999'"),
     ],
 )
-def test_a_file_in_the_way_is_one_line(options: list[str], said: str, schedule: Path, tmp_path: Path) -> None:
+def test_impossible_numbers_are_usage(
+    options: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([*options, "-o", str(tmp_path / "x.mcap")])
+    streams = capsys.readouterr()
+    assert stop.value.code == 2 and streams.out == ""
+    assert said in streams.err and streams.err.count("\n") == 1 and not (tmp_path / "x.mcap").exists()
+
+
+def test_a_file_in_the_way_stays_as_it_is(schedule: Path, tmp_path: Path) -> None:
     (tmp_path / "taken.mcap").write_bytes(b"mine")
-    with pytest.raises(CommandError) as error:
-        main(["--schedule", str(schedule), *options, "-o", str(tmp_path / "taken.mcap")])
-    assert str(error.value).endswith(said) and (tmp_path / "taken.mcap").read_bytes() == b"mine"
+    with pytest.raises(CommandError, match=r"taken\.mcap: is there already") as error:
+        main(["--schedule", str(schedule), "-o", str(tmp_path / "taken.mcap")])
+    assert error.value.code == 2 and (tmp_path / "taken.mcap").read_bytes() == b"mine"
     assert not (tmp_path / "taken.truth.json").exists()
+
+
+def test_a_motion_that_is_missing_or_no_recording_is_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG" + bytes(500))
+    for name, code in (("nowhere.mcap", 2), ("photo.png", 3), (".", 3)):
+        with pytest.raises(CommandError) as error:
+            main(["--motion", str(tmp_path / name), "-o", str(tmp_path / "x.mcap")])
+        assert error.value.code == code and str(error.value).startswith(str(tmp_path / name))
+
+
+def test_a_run_too_long_for_memory_is_refused_before_it_is_made(tmp_path: Path) -> None:
+    path = tmp_path / "day.yaml"
+    path.write_text("segments:\n  - {duration: 24 h, load: 40 N, slip: 0.2, speed: 20 mm/s}")
+    with pytest.raises(CommandError, match=r"day\.yaml: found 86400 s, 21600000 samples at 250 Hz; expected at most"):
+        main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
+    writer = RunWriter(tmp_path / "day.mcap", (), "", RunInfo())
+    for channel, value in (("wheel_encoder", 1), ("carriage_encoder", 1), ("sinkage_pot", 1.0), ("motor_shunt", 2.5)):
+        for stamp in (0, 86_400_000_000_000):
+            writer.reading(Reading(stamp, channel, value, stamp))
+    writer.close()
+    with pytest.raises(CommandError, match=r"day\.mcap: found 86400 s, 21600000 samples") as error:
+        main(["--motion", str(tmp_path / "day.mcap"), "-o", str(tmp_path / "x.mcap")])
+    assert error.value.code == 2

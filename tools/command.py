@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
+from collections.abc import Callable
 from typing import NoReturn
+
+from estimator.schema import Quantity
 
 DONE, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -23,3 +27,32 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         print(f"gritd: {message} (see {self.prog} --help)", file=sys.stderr)
         sys.exit(USAGE)
+
+
+def number(**bounds: float) -> Callable[[str], float]:
+    """An argparse type: a finite number within bounds, those of `estimator.schema.Quantity`."""
+    kind = Quantity("", **bounds)  # type: ignore[arg-type]
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not kind.holds(value):
+            raise argparse.ArgumentTypeError(f"found {text!r}; expected {kind.expected}")
+        return value
+
+    return read
+
+
+def whole(low: int, high: int | None = None) -> Callable[[str], int]:
+    """An argparse type: a whole number from `low`, up to `high` if there is one."""
+    expected = f"a whole number from {low}" + ("" if high is None else f" to {high}")
+
+    def read(text: str) -> int:
+        value = int(text) if re.fullmatch(r"-?[0-9]{1,19}", text) else low - 1
+        if value < low or (high is not None and value > high):
+            raise argparse.ArgumentTypeError(f"found {text[:40]!r}; expected {expected}")
+        return value
+
+    return read

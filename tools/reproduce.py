@@ -21,7 +21,7 @@ from estimator.terramechanics import linear, original
 from estimator.terramechanics.original import arc, contact, front_stress, janosi, shear_displacement
 from estimator.terramechanics.soil import Array, Soil, Wheel
 from estimator.terramechanics.soils import DRY_SAND, LOOSE_SAND, MARS_LIKE, SANDY_LOAM, TABLE_1, NamedSoil
-from tools.command import DONE, Parser
+from tools.command import DONE, Parser, whole
 
 WHEEL = Wheel(radius=0.072, width=0.071)
 SIMULATIONS = 60_000
@@ -56,11 +56,9 @@ DEFINITIONS: dict[str, Callable[[Array, Array], float]] = {
 def main(argv: Sequence[str]) -> int:
     """Print every section; 0 when done."""
     parser = Parser(prog="gritd reproduce", description="The paper's figures beside ours.")
-    parser.add_argument("--simulations", type=int, default=SIMULATIONS, help=f"default: {SIMULATIONS}")
-    parser.add_argument("--seed", type=int, default=2005)
+    parser.add_argument("--simulations", type=whole(1), default=SIMULATIONS, help=f"default: {SIMULATIONS}")
+    parser.add_argument("--seed", type=whole(0), default=2005)
     arguments = parser.parse_args(argv)
-    if arguments.simulations < 1:
-        parser.error(f"argument --simulations: expected a positive number, not {arguments.simulations}")
     for section in (
         closed_forms(arguments.seed),
         figure_3(),

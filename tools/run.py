@@ -19,7 +19,7 @@ from estimator.daemon import WARNING, Daemon, DaemonError, locked, real_time, ru
 from estimator.publish import Publisher, PublishError
 from estimator.recording import RecordingError, RunInfo
 from estimator.writer import WriterStatus
-from tools.command import DONE, FAILED, CommandError, Parser
+from tools.command import DONE, FAILED, CommandError, Parser, number, whole
 from tools.telemetry import Reporter
 from tools.watcher import Watcher
 
@@ -58,8 +58,8 @@ def _serve(configuration: Configuration, folder: Path, run: RunInfo, socket: Pat
     daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock)
     publisher = Publisher(socket, Reporter(daemon, readers, queue, notice))
     watcher = Watcher(configuration.source, readers, queue, publisher, status_every)
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: daemon.stop())
+    for ending in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ending, lambda *_: daemon.stop())
     signal.signal(signal.SIGHUP, lambda *_: watcher.ask_reload())
     print(f"logging to {path}", flush=True)
     if notice:
@@ -115,13 +115,17 @@ def _parser() -> Parser:
     parser.add_argument("--directory", metavar="DIR", help="where logs go (default: logging.directory)")
     parser.add_argument("--socket", metavar="PATH", help=f"status socket (default: {SOCKET} beside the logs)")
     parser.add_argument("--name", help="name of the run")
-    parser.add_argument("--load", type=float, metavar="N", help="nominal load of the run [N]")
+    parser.add_argument("--load", type=number(above=0.0), metavar="N", help="nominal load of the run [N]")
     parser.add_argument(
-        "--pass", dest="passes", type=int, metavar="K", help="how often the wheel went here, this run included"
+        "--pass",
+        dest="passes",
+        type=whole(1, 1000),
+        metavar="K",
+        help="how often the wheel went here, this run included",
     )
-    parser.add_argument("--start", type=float, metavar="M", help="starting position on the bed [m]")
+    parser.add_argument("--start", type=number(), metavar="M", help="starting position on the bed [m]")
     parser.add_argument("--notes", help="free text kept with the run")
     parser.add_argument(
-        "--status", type=float, default=1.0, metavar="S", help="seconds between status lines, 0 for none"
+        "--status", type=number(low=0.0), default=1.0, metavar="S", help="seconds between status lines, 0 for none"
     )
     return parser

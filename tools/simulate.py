@@ -18,12 +18,15 @@ from estimator.forward import Response, simulate_arrays
 from estimator.measured import measured_run
 from estimator.readings import ENCODERS, WRENCH_FIELDS, Reading
 from estimator.recording import RecordingError, RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.salvage import Recording
+from estimator.schema import Quantity
 from estimator.settings import Calibration, Channel, Settings, Wrench
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
 from tools import schedule as schedules
-from tools.command import DONE, FAILED, USAGE, CommandError, Parser
+from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
+from tools.files import recording as recorded
+from tools.files import unwritten, vacant
 
 START = 1_767_225_600_000_000_000  # [ns] 2026-01-01: a recording made twice is the same to the byte
 NS = 1_000_000_000
@@ -32,7 +35,14 @@ ADC_STEPS = 1 << 16  # over the channel's valid range
 AMBIENT = 21.0  # [°C]
 ROUNDING = 1.0 / 12.0  # [count²] variance of rounding to whole counts; the stated noise of an encoder includes it
 SPARSE = 250  # samples from one temperature to the next
-SOIL_UNITS = {"cohesion": "Pa", "tan_phi": "", "shear_modulus": "m", "exponent": "", "modulus_factor": ""}
+SOIL_VALUES = {  # with the bounds that they have in a configuration
+    "cohesion": Quantity("Pa", low=0.0, high=1e6),
+    "tan_phi": Quantity("", above=0.0, high=5.0),
+    "shear_modulus": Quantity("m", above=0.0, high=1.0),
+    "exponent": Quantity("", above=0.0, high=5.0),
+    "modulus_factor": Quantity("", above=0.0, high=100.0),
+}
+MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.4 kB a sample
 
 
 @dataclass(frozen=True)
@@ -162,12 +172,13 @@ def main(argv: Sequence[str]) -> int:
     configuration = config.load(arguments.config, effects.units)
     settings, soil = configuration.settings, soil_of(configuration.settings, _soil_changes(arguments.soil))
     acting = _acting(settings, arguments.effect)
+    vacant(arguments.output)
+    motion, info = _motion(arguments, configuration)
+    run = simulate_run(settings, soil, motion, acting, arguments.seed)
     try:
-        motion, info = _motion(arguments, configuration)
-        run = simulate_run(settings, soil, motion, acting, arguments.seed)
         write(arguments.output, configuration, info, run)
     except RecordingError as error:
-        raise CommandError(error, FAILED) from None
+        raise unwritten(error) from None
     write_truth(arguments.output, settings, soil, acting, run, arguments.seed)
     print(_summary(arguments.output, acting, run))
     return DONE
@@ -175,15 +186,35 @@ def main(argv: Sequence[str]) -> int:
 
 def _motion(arguments: argparse.Namespace, configuration: config.Configuration) -> tuple[Motion, RunInfo]:
     """The motion of a recording if one is given, else that of the schedule; and what the run is called."""
-    settings, recording = configuration.settings, read(arguments.motion) if arguments.motion else None
-    info = recording.run if recording else configuration.run
+    settings, driven = configuration.settings, recorded(arguments.motion) if arguments.motion else None
+    info = driven.run if driven else configuration.run
     info = replace(info, pass_number=arguments.pass_number or info.pass_number, name=arguments.output.stem)
-    if recording:
-        motion = measured_run(recording, settings, settings.rates.tick).motion
-        return replace(motion, pass_number=float(info.pass_number)), info
+    if driven:
+        return replace(_driven(driven, settings), pass_number=float(info.pass_number)), info
     schedule = schedules.read(arguments.schedule)
+    _check_length(arguments.schedule, schedule.duration, settings.rates.tick)
     place = float(info.pass_number), info.start_position
     return schedules.motion_of(schedule, settings.wheel.radius, settings.rates.tick, *place), info
+
+
+def _driven(recording: Recording, settings: Settings) -> Motion:
+    """The motion of a recording. Raises CommandError."""
+    stamps = recording.arrays("/raw/wheel_encoder")["stamp"]
+    _check_length(
+        recording.path, (int(stamps.max()) - int(stamps.min())) / NS if stamps.size else 0.0, settings.rates.tick
+    )
+    try:
+        return measured_run(recording, settings, settings.rates.tick).motion
+    except RecordingError as error:
+        raise CommandError(error, DAMAGED) from None
+
+
+def _check_length(what: Path, seconds: float, rate: float) -> None:
+    """Raises CommandError where a run would not fit into memory."""
+    if seconds * rate > MOST_SAMPLES:
+        found = f"{seconds:.0f} s, {seconds * rate:.0f} samples at {rate:g} Hz"
+        longest = f"{MOST_SAMPLES}, which are {MOST_SAMPLES / rate:.0f} s"
+        raise CommandError(f"{what}: found {found}; expected at most {longest}", USAGE)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -205,10 +236,10 @@ def _parser() -> argparse.ArgumentParser:
         help="added to the configured ones",
     )
     parser.add_argument(
-        "--soil", action="append", default=[], metavar="NAME=VALUE", help=f"one of {', '.join(SOIL_UNITS)}"
+        "--soil", action="append", default=[], metavar="NAME=VALUE", help=f"one of {', '.join(SOIL_VALUES)}"
     )
-    parser.add_argument("--pass", dest="pass_number", type=int, metavar="N", help="which pass over the soil this is")
-    parser.add_argument("--seed", type=int, default=0, help="of the noise; default 0")
+    parser.add_argument("--pass", dest="pass_number", type=whole(1, 1000), metavar="N", help="which pass over the soil")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the noise; default 0")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="must not exist yet")
     return parser
 
@@ -237,11 +268,12 @@ def _soil_changes(given: Sequence[str]) -> dict[str, float]:
     changes = {}
     for text in given:
         name, _, value = text.partition("=")
-        if name not in SOIL_UNITS:
-            raise CommandError(f"--soil {text}: found '{name}'; expected one of {', '.join(SOIL_UNITS)}", USAGE)
-        changes[name] = _quantity(f"--soil {text}", value, SOIL_UNITS[name])
-        if changes[name] < 0.0 or (name != "cohesion" and changes[name] == 0.0):
-            raise CommandError(f"--soil {text}: found {value}; expected a positive value", USAGE)
+        if name not in SOIL_VALUES:
+            raise CommandError(f"--soil {text}: found '{name}'; expected one of {', '.join(SOIL_VALUES)}", USAGE)
+        kind = SOIL_VALUES[name]
+        changes[name] = _quantity(f"--soil {text}", value, kind.unit or "")
+        if not kind.holds(changes[name]):
+            raise CommandError(f"--soil {text}: found {value}; expected {kind.expected}", USAGE)
     return changes
 
 

@@ -63,6 +63,18 @@ def test_effective_text_checks_too(tmp_path: Path) -> None:
         ((), "gritd: expected a command"),
         (("dance",), "gritd: argument COMMAND: invalid choice"),
         (("check-config", "--dance"), "gritd: unrecognized arguments: --dance"),
+        (("check-config", "/nowhere.yaml"), "gritd: /nowhere.yaml: found no such file or directory; expected"),
+    ],
+)
+def test_usage_errors_are_one_line_and_code_2(arguments: Sequence[str], words: str) -> None:
+    run = gritd(*arguments)
+    assert run.returncode == 2 and run.stdout == ""
+    assert run.stderr.startswith(words) and run.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
         (
             ("run", "--config", "x", "--load", "-5"),
             "gritd: argument --load: found '-5'; expected a number above 0 (see",
@@ -73,13 +85,13 @@ def test_effective_text_checks_too(tmp_path: Path) -> None:
         (("run", "--config", "x", "--status", "-1"), "gritd: argument --status: found '-1'; expected a number from 0"),
         (("reproduce", "--seed", "-1"), "gritd: argument --seed: found '-1'; expected a whole number from 0"),
         (("reproduce", "--simulations", "0"), "gritd: argument --simulations: found '0'"),
-        (("check-config", "/nowhere.yaml"), "gritd: /nowhere.yaml: found no such file or directory; expected"),
     ],
 )
-def test_usage_errors_are_one_line_and_code_2(arguments: Sequence[str], words: str) -> None:
-    run = gritd(*arguments)
-    assert run.returncode == 2 and run.stdout == ""
-    assert run.stderr.startswith(words) and run.stderr.count("\n") == 1
+def test_impossible_numbers_are_usage(arguments: Sequence[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(arguments)
+    said = capsys.readouterr()
+    assert stop.value.code == 2 and said.out == "" and said.err.startswith(words) and said.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

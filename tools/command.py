@@ -6,9 +6,8 @@ import argparse
 import re
 import sys
 from collections.abc import Callable
+from math import inf, nan
 from typing import NoReturn
-
-from estimator.schema import Quantity
 
 DONE, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -29,17 +28,18 @@ class Parser(argparse.ArgumentParser):
         sys.exit(USAGE)
 
 
-def number(**bounds: float) -> Callable[[str], float]:
-    """An argparse type: a finite number within bounds, those of `estimator.schema.Quantity`."""
-    kind = Quantity("", **bounds)  # type: ignore[arg-type]
+def number(above: float = -inf, low: float = -inf) -> Callable[[str], float]:
+    """An argparse type: a finite number greater than `above`, and `low` or more."""
+    bounds = ((" above", above), (" from", low))
+    expected = "a number" + "".join(f"{word} {bound:g}" for word, bound in bounds if bound > -inf)
 
     def read(text: str) -> float:
         try:
             value = float(text)
         except ValueError:
-            value = float("nan")
-        if not kind.holds(value):
-            raise argparse.ArgumentTypeError(f"found {text!r}; expected {kind.expected}")
+            value = nan
+        if not (above < value < inf and low <= value):
+            raise argparse.ArgumentTypeError(f"found {text[:40]!r}; expected {expected}")
         return value
 
     return read

@@ -9,9 +9,10 @@ so −1 ≤ i ≤ 1 for forward travel and i is continuous through zero with slo
 
 from __future__ import annotations
 
-from math import acos, hypot, sin, sqrt
+from math import acos, hypot, isnan, nan, sin, sqrt
 from typing import NamedTuple
 
+AT_REST = 1e-12  # [m/s] a slower wheel has no slip to speak of, and its square is no number any more
 SMALLEST_SINE = 1e-6  # below this θ₁ a sinkage error is not a small error of angle
 
 
@@ -24,9 +25,11 @@ class Slip(NamedTuple):
 def slip(rim_speed: float, travel_speed: float) -> Slip:
     """Slip i from the rim speed rω and the travel speed v, both [m/s] along the direction of travel; 0 at rest.
 
-    Defined for rω ≥ 0 or v ≥ 0; opposed motions saturate at ±1 with zero derivatives.
+    NaN of NaN. Defined for rω ≥ 0 or v ≥ 0; opposed motions saturate at ±1 with zero derivatives.
     """
-    if rim_speed == travel_speed == 0.0:
+    if isnan(rim_speed) or isnan(travel_speed):
+        return Slip(nan, nan, nan)
+    if abs(rim_speed) < AT_REST and abs(travel_speed) < AT_REST:
         return Slip(0.0, 0.0, 0.0)
     if rim_speed >= travel_speed:
         if travel_speed < 0.0:

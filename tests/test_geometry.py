@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, cos, isfinite, sqrt
+from math import acos, cos, isfinite, isnan, nan, sqrt
 
 import numpy as np
 import pytest
@@ -91,3 +91,10 @@ def test_stated_speed_error_covers_quantisation(rate):
         error = centred @ counts / spread**2 - true
         squares.append((error / slope_sigma(sqrt(1 / 12), spread, 25, abs(counts[-1] - counts[0]))) ** 2)
     assert sqrt(np.mean(squares)) < 1.3
+
+
+def test_slip_of_what_is_not_known_or_hardly_moves_is_no_error():
+    """A silent wheel encoder beside a carriage at rest gives NaN and 0; squares of tiny speeds underflow."""
+    assert all(isnan(value) for value in slip(nan, 0.0))
+    assert all(isnan(value) for value in slip(1.0, nan))
+    assert slip(1e-200, 1e-170) == (0.0, 0.0, 0.0) == slip(0.0, -0.0)

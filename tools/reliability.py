@@ -1,0 +1,74 @@
+"""docs/reliability.md from what the scenarios measure: `python -m tools.reliability [--quick]`."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from tools.command import DONE, FAILED, Parser
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "reliability.md"
+BEGIN = "<!-- from here on written by `python -m tools.reliability` -->\n"
+FIGURES = "GRITD_FIGURES"  # as in tests/scenarios/conftest.py
+
+Figure = dict[str, Any]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run every scenario and write the page; exit 1, and no page, if one fails."""
+    parser = Parser(prog="python -m tools.reliability", description="Run the scenarios and write docs/reliability.md.")
+    parser.add_argument("--quick", action="store_true", help="without the long ones")
+    parser.add_argument("--figures", metavar="FILE", help="write the page from figures measured before")
+    arguments = parser.parse_args(argv)
+    if arguments.figures:
+        PAGE.write_text(page(_read(Path(arguments.figures))), encoding="utf-8")
+        return DONE
+    with tempfile.TemporaryDirectory() as folder:
+        figures = Path(folder) / "figures.jsonl"
+        began = time.monotonic()
+        if _run(figures, arguments.quick):
+            return FAILED
+        print(f"all scenarios in {time.monotonic() - began:.0f} s")
+        PAGE.write_text(page(_read(figures)), encoding="utf-8")
+    return DONE
+
+
+def _run(figures: Path, quick: bool) -> int:
+    chosen = "not slow" if quick else "slow or not slow"
+    command = [sys.executable, "-m", "pytest", "--quiet", "-m", chosen, str(ROOT / "tests" / "scenarios")]
+    return subprocess.run(command, env={**os.environ, FIGURES: str(figures)}, cwd=ROOT, check=False).returncode
+
+
+def _read(path: Path) -> list[Figure]:
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def page(figures: Sequence[Figure]) -> str:
+    """The page: its hand-written head, then one row for each fault and thing measured."""
+    head = PAGE.read_text(encoding="utf-8").partition(BEGIN)[0]
+    return head + BEGIN + "\n".join(["", *_table(figures)]) + "\n"
+
+
+def _table(figures: Sequence[Figure]) -> Iterator[str]:
+    yield "| fault | measured | worst | limit | runs | on |"
+    yield "|---|---|---|---|---|---|"
+    groups: dict[tuple[str, str, str], list[Figure]] = {}
+    for figure in figures:
+        groups.setdefault((figure["row"], figure["name"], figure["level"]), []).append(figure)
+    for row, name, level in sorted(groups, key=lambda key: key[0].lower()):
+        found = groups[row, name, level]
+        worst, limit, unit = max(f["value"] for f in found), found[0]["limit"], found[0]["unit"]
+        bound = "" if limit is None else f"{limit:g} {unit}".strip()
+        yield f"| {row} | {name} | {worst:.3g} {unit} | {bound} | {len(found)} | {level} |".replace("  ", " ")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,203 @@
+"""How it holds out: simulated hours through the pipeline, then the real daemon on wires under load.
+
+python -m tools.soak [--hours 100] [--minutes 60] [--busy 2]
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from argparse import Namespace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+
+from config import packaged
+from estimator import config
+from estimator.pipeline import Pipeline
+from estimator.readings import ENCODERS, Reading
+from estimator.record import TICK_NAMES
+from estimator.settings import Rates
+from estimator.sync import NS
+from tools.command import DONE, FAILED, Parser
+from tools.demo import Child
+from tools.status import connected, reports
+from tools.testbed import experiment
+
+LAP = 300.0  # [s] the simulated run that is driven again and again
+SLOPE = 1.0  # [MB/h] largest growth of memory
+SETTLED = 0.2  # share of the time after which memory has settled
+READ = [
+    TICK_NAMES.index(name) for name in ("cohesion", "tan_phi", "cohesion_sigma", "tan_phi_sigma", "resets", "updates")
+]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Exit 1 if memory grows, a descriptor or thread stays, an estimate fails or a loss is not reported."""
+    parser = Parser(prog="python -m tools.soak", description="Run for long, and look at what grows.")
+    parser.add_argument(
+        "--hours", type=float, default=100.0, help="simulated, through the pipeline; default 100, 0: none"
+    )
+    parser.add_argument("--tick", type=float, default=20.0, help="ticks a simulated second; default 20")
+    parser.add_argument("--thin", type=int, default=5, help="of the readings of 250 Hz take one in so many; default 5")
+    parser.add_argument("--minutes", type=float, default=60.0, help="of the daemon on wires; default 60, 0: none")
+    parser.add_argument("--busy", type=int, default=2, help="busy processes beside the daemon; default 2")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args(argv)
+    failures = simulated(arguments) if arguments.hours else []
+    failures += on_wires(arguments) if arguments.minutes else []
+    for failure in failures:
+        print(f"failed: {failure}", file=sys.stderr)
+    return FAILED if failures else DONE
+
+
+# --- the pipeline -----------------------------------------------------------------------------------------------------
+
+
+def simulated(arguments: Namespace) -> list[str]:
+    """Laps of the simulated testbed, one after the other without a pause; what was not right."""
+    configuration = config.load(packaged())
+    settings = replace(configuration.settings, effects=(), rates=Rates(tick=arguments.tick))  # of the linear plant
+    pipeline = Pipeline(settings, "plain")
+    state, began, memory, ticks = pipeline.start(), time.monotonic(), [], 0
+    unfit = 0
+    lap = thinned(experiment(configuration, LAP, "linear", arguments.seed).run.readings, arguments.thin)
+    for number, readings in enumerate(laps(lap, arguments.hours, round(NS / arguments.tick))):
+        for stamp, batch in readings:
+            state, record = pipeline.step(state, batch, stamp)
+            unfit += not all(math.isfinite(record[place]) for place in READ)
+            ticks += 1
+        memory.append((number * LAP / 3600.0, resident(os.getpid())))
+    slope = growth(memory)
+    found = dict(zip(TICK_NAMES, record, strict=True))
+    print(
+        f"pipeline: {ticks} ticks of {arguments.tick:g} Hz, one reading in {arguments.thin}, {number + 1} laps of"
+        f" {LAP / 60:g} min ({(number + 1) * LAP / 3600:.1f} h simulated), in {time.monotonic() - began:.0f} s,"
+        f" {unfit} ticks without a finite estimate, {found['updates']} updates, {found['resets']} resets,"
+        f" memory {memory[-1][1]:.1f} MB, {slope:+.3f} MB per simulated hour",
+        flush=True,
+    )
+    return [f"{unfit} unfit ticks"] * bool(unfit) + [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE)
+
+
+def thinned(readings: Sequence[Reading], by: int) -> list[Reading]:
+    """One reading in `by` of every channel."""
+    seen: Counter[str] = Counter()
+    kept = []
+    for reading in readings:
+        seen[reading.channel] += 1
+        if seen[reading.channel] % by == 0:
+            kept.append(reading)
+    return kept
+
+
+def laps(lap: Sequence[Reading], hours: float, period: int) -> Iterator[Iterator[tuple[int, list[Reading]]]]:
+    """(tick time, readings) of lap after lap: stamps go on, and so do the encoders' counts."""
+    length = max(reading.received for reading in lap) - lap[0].received + period
+    turned = {name: [r.value for r in lap if r.channel == name][-1] for name in ENCODERS}
+    ordered = sorted(lap, key=lambda reading: reading.received)
+    for number in range(max(1, round(hours * 3600.0 / LAP))):
+        moved = (later(r, number * length, {name: number * by for name, by in turned.items()}) for r in ordered)
+        ticks = groupby(moved, key=lambda reading: -(-reading.received // period) * period)
+        yield ((stamp, list(batch)) for stamp, batch in ticks)
+
+
+def later(reading: Reading, by: int, turned: dict[str, Any]) -> Reading:
+    value = reading.value + turned[reading.channel] if reading.channel in turned else reading.value
+    return reading._replace(stamp=reading.stamp + by, received=reading.received + by, value=value)
+
+
+def resident(pid: int) -> float:
+    """Memory of a process [MB]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def growth(memory: Sequence[tuple[float, float]]) -> float:
+    """Slope of (hours, MB) after it has settled [MB/h]."""
+    settled = np.array(memory[int(SETTLED * len(memory)) :])
+    return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0]) if len(settled) > 2 else 0.0
+
+
+# --- the daemon -------------------------------------------------------------------------------------------------------
+
+
+def on_wires(arguments: Namespace) -> list[str]:
+    """Testbed and daemon as processes, and busy ones beside them; what was not right."""
+    seconds = arguments.minutes * 60.0
+    with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
+        told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
+        with Child(Event(), "testbed", "tools.testbed", *told) as testbed:
+            path = testbed.wait_for("configuration ", 120.0).split(" ", 1)[1]
+            with Child(
+                Event(), "daemon", "tools.cli", "run", "--config", path, "--name", "soak", "--status", "0"
+            ) as daemon:
+                daemon.wait_for("device ", 60.0)
+                daemon.wait_for("device ", 60.0)
+                testbed.tell("play")
+                looks = list(watched(Path(name) / "gritd.sock", seconds))
+                words = daemon.stop()
+    return judged(looks, words, arguments)
+
+
+@contextmanager
+def busy(number: int) -> Iterator[None]:
+    processes = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+
+
+def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
+    """A look at the daemon every few seconds: its report, memory, descriptors and threads."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        with connected(str(path)) as connection:
+            report = next(reports(connection))
+        pid = report["pid"]
+        report["memory"] = resident(pid)
+        report["descriptors"] = len(os.listdir(f"/proc/{pid}/fd"))
+        report["threads"] = len(os.listdir(f"/proc/{pid}/task"))
+        yield report
+        time.sleep(min(5.0, seconds / 50))
+
+
+def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Namespace) -> list[str]:
+    last = looks[-1]
+    slope = growth([(look["uptime"] / 3600.0, look["memory"]) for look in looks])
+    settled = looks[int(SETTLED * len(looks)) :]
+    constant = all(len({look[what] for look in settled}) == 1 for what in ("descriptors", "threads"))
+    print(
+        f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
+        f" memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
+        f" {last['descriptors']} descriptors, {last['threads']} threads"
+    )
+    print(f"lost on the wires: {json.dumps({name: device['lost'] for name, device in last['devices'].items()})}")
+    for name in ("late_50", "late_99", "late_999", "late_max"):
+        worst = [1e3 * look["loop"][name] for look in looks]
+        print(f"{name} of 10 s [ms]: median {np.median(worst):.3f}, worst {max(worst):.3f}")
+    print("\n".join(line for line in words if line.startswith(("queue:", "loop:", "log "))))
+    wrong = [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE and arguments.minutes >= 30.0)
+    wrong += ["descriptors or threads are not constant"] * (not constant)
+    return wrong + ["the log was not closed"] * (not any(line.startswith("log closed") for line in words))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

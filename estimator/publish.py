@@ -70,10 +70,12 @@ class Publisher:
                     self._send(line_of(self._report()))
 
     def _accept(self) -> None:
-        with suppress(OSError):  # it has left already
-            client, _ = self._listener.accept()
-            client.setblocking(False)
-            self._clients.append(client)
+        """Take in everybody who waits; there is room for MAX_CLIENTS."""
+        with suppress(OSError):  # nobody else waits, or one has left already
+            while True:
+                client, _ = self._listener.accept()
+                client.setblocking(False)
+                self._clients.append(client)
         for surplus in self._clients[MAX_CLIENTS:]:
             surplus.close()
         del self._clients[MAX_CLIENTS:]

@@ -14,10 +14,11 @@ from config import packaged
 from estimator.config import load
 from estimator.daemon import TICK_TOPIC, TOPICS
 from estimator.pipeline import Pipeline
+from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter
 from estimator.salvage import read
 from tests.linear_plant import readings
-from tools import replay
+from tools import cli, replay
 from tools.command import CommandError
 
 ROOT = Path(__file__).parents[1]
@@ -139,3 +140,50 @@ def test_a_file_that_is_no_recording_is_damaged_input(tmp_path):
     text.write_text("not a recording")
     with pytest.raises(CommandError, match=r"notes\.mcap"):
         replay.main([str(text)])
+
+
+@pytest.mark.parametrize("output", ["the input", "nowhere/x.mcap", "taken.mcap", "its folder"])
+def test_an_output_that_cannot_be_made_is_refused_before_the_replay(recorded, tmp_path, output, capsys):
+    (tmp_path / "taken.mcap").write_bytes(b"mine")
+    before = recorded.read_bytes()
+    target = {"the input": recorded, "its folder": recorded.parent}.get(output, tmp_path / output)
+    assert cli.main(["replay", str(recorded), "-o", str(target)]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("\n") == 1 and str(target) in said.err and "expected" in said.err
+    assert recorded.read_bytes() == before and (tmp_path / "taken.mcap").read_bytes() == b"mine"
+
+
+def test_missing_is_usage_and_no_recording_is_damage_wherever_it_stands(recorded, tmp_path, capsys):
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG" + bytes(500))
+    for name, code in (("none.mcap", 2), (".", 3), ("photo.png", 3)):
+        for files in ([tmp_path / name], [recorded, tmp_path / name]):
+            assert cli.main(["replay", *map(str, files), "--engine", "plain"]) == code
+            said = capsys.readouterr().err
+            assert said.startswith(f"gritd: {tmp_path / name}") and said.count("\n") == 1
+
+
+def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, configuration):
+    other = configuration.text.replace("range: [0.1 V, 4.9 V]", "range: [4.8 V, 4.9 V]", 1)
+    (tmp_path / "other.yaml").write_text(other, encoding="utf-8")
+    for output in ([], ["-o", str(tmp_path / "out.mcap")]):
+        assert cli.main(["replay", str(recorded), "--config", str(tmp_path / "other.yaml"), *output]) == 0
+        said = capsys.readouterr()
+        count = read(recorded).counts["/raw/sinkage_pot"]
+        assert "STARTING 100%" in said.out
+        reason = f"{count} of {count} readings of sinkage_pot are invalid, outside 4.8 … 4.9 V"
+        assert said.err == f"{recorded}: never ready: {reason}\n"
+
+
+def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, configuration):
+    writer = RunWriter(tmp_path / "slow.mcap", (), configuration.text, RunInfo())
+    recording, kept = read(recorded), {"wheel_encoder": 25, "carriage_encoder": 1, "sinkage_pot": 1}
+    for channel, step in kept.items():
+        rows = recording.arrays(f"/raw/{channel}")[::step]
+        for stamp, value in zip(rows["stamp"].tolist(), rows[rows.dtype.names[-1]].tolist(), strict=True):
+            writer.reading(Reading(stamp, channel, value, stamp))
+    writer.close()
+    assert cli.main(["replay", str(tmp_path / "slow.mcap"), "--engine", "plain"]) == 0
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert (
+        "wheel_encoder has 60 readings, never three over half a window of 100 ms; motor_shunt has no readings" in said
+    )

@@ -17,12 +17,14 @@ from estimator.course import Course
 from estimator.daemon import TICK_TOPIC, TOPICS
 from estimator.pipeline import TickRecord
 from estimator.playback import RecordedTick, played, settings_for, without_absent
-from estimator.record import TICK_FIELDS, TICK_NAMES
+from estimator.record import TICK_FIELDS, TICK_NAMES, Status
 from estimator.recording import RecordingError, RunWriter, parts
-from estimator.salvage import Recording, read
+from estimator.salvage import Recording
 from estimator.settings import Settings
+from tools import files
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from tools.progress import Progress
+from tools.readiness import never_ready
 from tools.replay_report import Rows, report
 
 SHOWN = 5  # differing fields named in full
@@ -33,12 +35,17 @@ def main(argv: Sequence[str]) -> int:
     arguments = _parser().parse_args(argv)
     if arguments.verify and (arguments.config or arguments.output or arguments.engine):
         raise CommandError("--verify replays a recording as it was made: without --config, --engine, --output", USAGE)
-    codes = [_replay(Path(name), arguments) for name in arguments.files]
-    return max(codes)
+    paths = [Path(name) for name in arguments.files]
+    for path in paths:
+        if not path.exists():
+            raise CommandError(f"{path}: found no such file; expected a recording", USAGE)
+        if arguments.output:
+            files.vacant(_target(arguments, path))
+    return max([_replay(path, arguments) for path in paths])
 
 
 def _replay(path: Path, arguments: Namespace) -> int:
-    recordings = [_read(part) for part in parts(path)]
+    recordings = [files.recording(part) for part in parts(path)]
     for recording in recordings:
         for line in recording.damage or ([] if recording.closed else ["was not closed: replayed as far as it goes"]):
             print(f"{recording.path}: {line}", file=sys.stderr)
@@ -46,15 +53,11 @@ def _replay(path: Path, arguments: Namespace) -> int:
     configuration = _configuration(recordings[0], arguments.config)
     if arguments.verify:
         return max(_verify(recordings, configuration), DAMAGED if damaged else DONE)
-    _recompute(recordings, configuration, arguments)
-    return DAMAGED if damaged else DONE
-
-
-def _read(path: Path) -> Recording:
     try:
-        return read(path)
+        _recompute(recordings, configuration, arguments)
     except RecordingError as error:
-        raise CommandError(error, DAMAGED if path.exists() else USAGE) from None
+        raise CommandError(error, DAMAGED) if error.errno is None else files.unwritten(error) from None
+    return DAMAGED if damaged else DONE
 
 
 def _configuration(recording: Recording, path: str | None) -> Configuration:
@@ -146,11 +149,14 @@ def _recompute(recordings: list[Recording], configuration: Configuration, argume
     if not len(rows):
         raise CommandError(f"{first.path}: holds no readings", DAMAGED)
     print(report(first.path, rows, each))
+    if np.all(rows["status"] == Status.STARTING):
+        print(f"{first.path}: {never_ready(_settings(first, configuration, first), first)}", file=sys.stderr)
 
 
 def _every_tick(recordings: list[Recording], configuration: Configuration, arguments: Namespace) -> Rows:
     first = recordings[0]
-    writer = RunWriter(_target(arguments, first), TOPICS, configuration.text, first.run) if arguments.output else None
+    output = files.vacant(_target(arguments, first.path)) if arguments.output else None
+    writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
     records = []
     course = _course(recordings, configuration, arguments.engine, as_it_ran=False)
     for _, tick in _ticks(recordings, configuration, "replaying"):
@@ -168,12 +174,12 @@ def _every_tick(recordings: list[Recording], configuration: Configuration, argum
     return np.array(records, dtype=[(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS])
 
 
-def _target(arguments: Namespace, recording: Recording) -> Path:
+def _target(arguments: Namespace, path: Path) -> Path:
     """The output file; a folder where there are several recordings."""
     output = Path(arguments.output)
     if len(arguments.files) > 1 and not output.is_dir():
         raise CommandError(f"{output}: several recordings need a folder to be written to", USAGE)
-    return output / recording.path.name if output.is_dir() else output
+    return output / path.name if output.is_dir() else output
 
 
 def _course(recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool) -> Course:

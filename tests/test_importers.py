@@ -38,10 +38,10 @@ def mgst_files(folder: Path, seconds: float = 6.0, lag: float = 0.4) -> Path:
     return folder
 
 
-def complaint(*arguments: object) -> str:
+def complaint(*arguments: object, code: int = 3) -> str:
     with pytest.raises(CommandError) as caught:
         main([*map(str, arguments)])
-    assert caught.value.code == 3
+    assert caught.value.code == code
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -120,7 +120,11 @@ def test_a_lag_beyond_the_logs_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
-    assert complaint("mgst", tmp_path / "none", "-o", tmp_path).startswith(f"{tmp_path / 'none'}: found nothing there")
+    said = complaint("mgst", tmp_path / "none", "-o", tmp_path, code=2)
+    assert said.startswith(f"{tmp_path / 'none'}: found nothing there")
+    for rig in ("mgst", "cmu", "emps", "table"):
+        said = complaint(rig, tmp_path, "-o", tmp_path / "out")
+        assert said.startswith(f"{tmp_path}") and not re.search(r"[\\?|*]", said.removeprefix(f"{tmp_path}"))
     assert "found no rig log" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
     mgst_files(tmp_path)
     packed = gzip.compress((tmp_path / RIG).read_bytes())
@@ -194,3 +198,13 @@ def test_a_matlab_file_that_is_none_is_refused(tmp_path: Path) -> None:
     assert "DATA_EMPS.mat: cannot be read" in complaint("emps", tmp_path, "-o", tmp_path / "out")
     savemat(tmp_path / "DATA_EMPS.mat", {"t": np.arange(5.0), "qm": np.zeros(4), "gtau": 35.0, "vir": np.zeros(5)})
     assert "qm: found 4 values; expected 5" in complaint("emps", tmp_path, "-o", tmp_path / "out")
+
+
+@pytest.mark.parametrize("taken", ["out", "out/mgst-20-165209.mcap"])
+def test_an_output_that_cannot_be_made_is_usage(tmp_path: Path, taken: str) -> None:
+    if taken == "out":
+        (tmp_path / "out").write_bytes(b"mine")
+    else:
+        (tmp_path / taken).mkdir(parents=True)
+    said = complaint("mgst", mgst_files(tmp_path), "-o", tmp_path / "out", code=2)
+    assert said.startswith(f"{tmp_path / 'out'}")

@@ -12,6 +12,7 @@ from estimator.blocks import records
 from estimator.salvage import read
 from tests.test_recording import write_sample
 from tests.test_salvage import write_foreign
+from tools import cli
 from tools.recover import main
 
 
@@ -81,21 +82,27 @@ def test_topics_of_unknown_encoding_are_kept_as_they_are(tmp_path: Path) -> None
     assert read(tmp_path / "a.recovered.mcap").counts == read(tmp_path / "a.mcap").counts
 
 
-def test_usage_and_files_that_are_no_recordings_are_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_name_is_usage_and_no_recording_is_damage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "photo.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
-    assert main([str(tmp_path / "photo.png")]) == 2
-    said = capsys.readouterr()
-    assert said.err == f"gritd recover: {tmp_path}/photo.png: not an MCAP file\n" and said.out == ""
-    assert main([str(tmp_path / "none.mcap")]) == 2
-    assert main([]) == 2
+    for name, code, said in (
+        ("photo.png", 3, "photo.png: not an MCAP file"),
+        (".", 3, ": cannot read: Is a directory"),
+        ("none.mcap", 2, "none.mcap: cannot read: No such file or directory"),
+    ):
+        assert cli.main(["recover", str(tmp_path / name), "-o", str(tmp_path / "out.mcap")]) == code
+        streams = capsys.readouterr()
+        assert streams.err.startswith(f"gritd: {tmp_path}") and streams.err.endswith(f"{said}\n") and streams.out == ""
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == ["photo.png"]
 
 
-def test_an_existing_file_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("name", ["a.mcap", "nowhere/b.mcap"])
+def test_an_output_that_cannot_be_made_is_usage(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     write_sample(tmp_path / "a.mcap")
     before = (tmp_path / "a.mcap").read_bytes()
-    assert main([str(tmp_path / "a.mcap"), "-o", str(tmp_path / "a.mcap")]) == 2
-    assert "File exists" in capsys.readouterr().err
+    assert cli.main(["recover", str(tmp_path / "a.mcap"), "-o", str(tmp_path / name)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"gritd: {tmp_path / name}: ") and said.count("\n") == 1
     assert (tmp_path / "a.mcap").read_bytes() == before

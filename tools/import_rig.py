@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from estimator.recording import RecordingError
-from tools.command import DAMAGED, DONE, CommandError, Parser
+from tools.command import DONE, Parser
+from tools.files import unwritten
 from tools.importers import rigs
 
 
@@ -18,7 +19,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         written = rigs()[args.rig].run(args, lambda line: print(line, flush=True))
     except RecordingError as error:
-        raise CommandError(error, DAMAGED) from None
+        raise unwritten(error) from None
     for path in written:
         print(path)
     return DONE

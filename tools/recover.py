@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,31 +9,32 @@ from pathlib import Path
 from estimator.mcapfile import McapFile, RecordingError
 from estimator.recording import RECOVERED, sealed
 from estimator.salvage import Recording, read
+from tools.command import DAMAGED, DONE, Parser
+from tools.files import unread, unwritten, vacant
 
 LIBRARY = "gritd recover"
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit code: 0 nothing lost, 2 usage or not an MCAP file, 3 saved in part."""
-    parser = argparse.ArgumentParser(prog="gritd recover", description=__doc__)
+    """Exit code: 0 nothing lost, 3 saved in part. Raises CommandError."""
+    parser = Parser(prog="gritd recover", description=__doc__)
     parser.add_argument("file", type=Path, help="the recording; it is not changed")
     parser.add_argument("-o", "--output", type=Path, help="default: FILE with .recovered before its suffix")
-    try:
-        arguments = parser.parse_args(argv)
-    except SystemExit as stop:
-        return int(stop.code or 0)
+    arguments = parser.parse_args(argv)
     source: Path = arguments.file
     target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
     try:
         recording = read(source, topics=())
-        recover(recording, target)
     except RecordingError as error:
-        print(f"gritd recover: {error}", file=sys.stderr)
-        return 2
+        raise unread(source, error) from None
+    try:
+        recover(recording, vacant(target))
+    except RecordingError as error:
+        raise unwritten(error) from None
     for line in recording.damage:
         print(f"{source}: {line}", file=sys.stderr)
     print(f"{target}: {summary(recording)}")
-    return 0 if recording.saved and not recording.attachments else 3
+    return DONE if recording.saved and not recording.attachments else DAMAGED
 
 
 def recover(recording: Recording, target: Path) -> None:

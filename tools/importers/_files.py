@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.command import DAMAGED, CommandError
+from tools.command import DAMAGED, USAGE, CommandError
 
 Array = NDArray[np.float64]
 Table = dict[str, list[str]]
 
 
 class RigFileError(CommandError):
-    """A file is missing or not what the importer expects; the message is one line naming it."""
+    """A file is not what the importer expects, or (USAGE) its name is wrong; the message is one line naming it."""
 
-    def __init__(self, message: str) -> None:
-        super().__init__(message, DAMAGED)
+    def __init__(self, message: str, code: int = DAMAGED) -> None:
+        super().__init__(message, code)
 
 
 def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re.Match[str]]]:
@@ -34,7 +34,7 @@ def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re
 
 def _below(path: Path) -> Iterator[Path]:
     if not path.exists():
-        raise RigFileError(f"{path}: found nothing there; expected a file or a folder")
+        raise RigFileError(f"{path}: found nothing there; expected a file or a folder", USAGE)
     yield from (path.rglob("*") if path.is_dir() else [path])
 
 

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator import config
+from estimator.mcapfile import reported
 from estimator.readings import CHANNELS, Reading
 from estimator.recording import RunInfo, RunWriter
+from tools.command import USAGE
 from tools.importers._files import Array, RigFileError
 
 NS = 1_000_000_000
@@ -59,7 +61,8 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
         output.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise RigFileError(f"{path}: cannot be written: {error.strerror}; expected a folder for the output") from None
+        reason = error.strerror or error
+        raise RigFileError(f"{path}: cannot be written: {reason}; expected a folder for the output", USAGE) from None
     return config.load(path)
 
 
@@ -68,8 +71,9 @@ def write(path: Path, streams: Sequence[Stream], configured: config.Configuratio
 
     Raises RecordingError.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.unlink(missing_ok=True)
+    with reported(path, "create"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)
     order = {channel: place for place, channel in enumerate(CHANNELS)}
     writer = RunWriter(path, (), configured.text, run)
     merged = heapq.merge(*(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel]))

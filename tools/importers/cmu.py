@@ -51,7 +51,8 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     wheels = [args.wheel] if args.wheel else ["smooth", "grouser"]
     tables, logs, pressed = (find(args.paths, pattern) for pattern in (TABLE, LOG, PRESSED))
     if not (tables or logs or pressed):
-        raise RigFileError(f"{args.paths[0]}: found none of the rig's files; expected {TABLE.pattern} or the like")
+        expected = "smooth_all_trials_steady_state.csv or another of those in docs/importing.md"
+        raise RigFileError(f"{args.paths[0]}: found none of the rig's files; expected {expected}")
     configured = configuration("rig_cmu.yaml", args.output, "cmu.yaml")
     written = [args.output / "cmu.yaml"]
     for file, match in tables:

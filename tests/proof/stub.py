@@ -2,7 +2,7 @@
 
     python -m tests.proof.stub FILES --config F --json OUT
 
-It says what STUB_SAYS in its own source folder cannot tell it: only what its arguments and its working folder hold.
+It always names coulomb_friction, and tells what it saw of its folder and environment.
 """
 
 from __future__ import annotations

@@ -12,9 +12,14 @@ FIGURES = "GRITD_FIGURES"  # file that collects what is measured, one JSON line 
 
 
 def pytest_generate_tests(metafunc):
-    """A scenario that takes a seed is run with three."""
+    """A scenario that takes a seed is run with three; where it needs the daemon, two of them count as slow."""
     if "seed" in metafunc.fixturenames:
-        metafunc.parametrize("seed", SEEDS)
+        others = SEEDS[1:] if getattr(metafunc.module, "QUICK", False) else map(slow, SEEDS[1:])
+        metafunc.parametrize("seed", [SEEDS[0], *others])
+
+
+def slow(seed):
+    return pytest.param(seed, marks=pytest.mark.slow)
 
 
 @pytest.fixture

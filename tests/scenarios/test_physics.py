@@ -16,6 +16,7 @@ from estimator.terramechanics import linear
 from tests.linear_plant import THREE_LOADS, readings
 from tests.test_tracker import RIG, TRUTH, run
 
+QUICK = True  # all seeds in every run
 PLANT = "pipeline, plant simulated"
 AIR, ZERO, NEGATIVE = "wheel in the air", "zero slip", "negative slip, reverse driving"
 STALL, FLAT, DIVERGENCE = "stall (100 % slip)", "θ₁ → 0, f → 0", "filter divergence"

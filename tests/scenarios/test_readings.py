@@ -22,6 +22,7 @@ from tests.scenarios.rig import TESTBED, driven
 SETTINGS = TESTBED.settings
 START = 1_700_000_000_000_000_000
 TICK = 4_000_000  # [ns]
+QUICK = True  # all seeds in every run
 PIPELINE = "pipeline, readings simulated"
 DRIVERS = "drivers' decoders and pipeline, bytes simulated"
 ESTIMATE = ("cohesion", "cohesion_sigma", "tan_phi", "tan_phi_sigma", "shear_modulus", "shear_modulus_sigma")

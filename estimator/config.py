@@ -16,7 +16,7 @@ from estimator.recording import RunInfo
 from estimator.settings import Settings
 from estimator.yamltree import MAX_BYTES, ConfigError, compose, serialise
 
-__all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads"]
+__all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text"]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Configuration:
 
 def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = units) -> Configuration:
     """Read a configuration file; a relative DBC path counts from its folder. Raises ConfigError."""
-    return loads(_read(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
+    return loads(read_text(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
 
 
 def loads(
@@ -51,18 +51,23 @@ def loads(
     return Configuration(settings, serialise(complete), name, run)
 
 
-def _read(path: Path) -> str:
-    """Text of a regular file of bounded size; a pipe or a device is refused without waiting for it."""
+def read_text(path: Path, expected: str = "a configuration file") -> str:
+    """Text of a regular file of bounded size; a pipe or a device is refused without waiting for it.
+
+    Raises ConfigError, which says what was expected.
+    """
     try:
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as stream:
             if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                raise ConfigError(f"{path}: found something that is no regular file; expected a configuration file")
+                raise ConfigError(f"{path}: found something that is no regular file; expected {expected}")
             data = stream.read(MAX_BYTES + 1)
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: found a directory; expected {expected}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ConfigError(f"{path}: found {str(reason).lower()}; expected a configuration file") from None
+        raise ConfigError(f"{path}: found {str(reason).lower()}; expected {expected}") from None
     if len(data) > MAX_BYTES:
-        raise ConfigError(f"{path}: found more than {MAX_BYTES // 1024} KiB; expected a configuration file")
+        raise ConfigError(f"{path}: found more than {MAX_BYTES // 1024} KiB; expected {expected}")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -294,6 +294,8 @@ def test_missing_file_folder_and_endless_device(tmp_path: Path) -> None:
     for path in (tmp_path / "none.yaml", tmp_path, Path("/dev/zero"), tmp_path / "a\0b"):
         with pytest.raises(ConfigError, match="expected a configuration file"):
             config.load(path)
+    with pytest.raises(ConfigError, match="found a directory; expected a configuration file"):
+        config.load(tmp_path)
 
 
 HOSTILE = {

@@ -141,6 +141,19 @@ def test_wrong_schedule_is_one_line(tmp_path: Path, text: str, said: str) -> Non
     assert str(error.value).startswith(str(path)) and said in str(error.value) and "\n" not in str(error.value)
 
 
+def test_what_is_no_schedule_file_is_said_in_words(tmp_path: Path) -> None:
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG\xff")
+    for name, said in (
+        (".", "found a directory; expected a schedule file"),
+        ("photo.png", "found a byte that is not UTF-8; expected UTF-8 text"),
+        ("no.yaml", "found no such file or directory; expected a schedule file"),
+        ("/dev/zero", "found something that is no regular file; expected a schedule file"),
+    ):
+        with pytest.raises(ConfigError) as error:
+            schedules.read(tmp_path / name)
+        assert str(error.value).endswith(said)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -12,7 +12,7 @@ import numpy as np
 from estimator import config, effects
 from estimator.config import Configuration
 from estimator.terramechanics.soil import Array
-from tools.command import DONE, FAILED, CommandError, Parser
+from tools.command import DONE, FAILED, USAGE, CommandError, Parser
 from tools.diagnose import noise
 from tools.diagnose.fit import Fitted
 from tools.diagnose.load import read_all, sha256, signals
@@ -37,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
         if arguments.png:
             sheet.draw(arguments.png, found)
     except OSError as error:
-        raise CommandError(f"{error.filename}: {(error.strerror or 'cannot write').lower()}", FAILED) from None
+        raise CommandError(f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE) from None
     print(comparison.printed(found))
     return DONE
 

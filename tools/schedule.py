@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.config import read_text
 from estimator.schema import Key, Kind, Quantity, Section
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array
-from estimator.yamltree import ConfigError, Node, Sequence, compose, describe
+from estimator.yamltree import Node, Sequence, compose, describe
 
 LOCKED = -0.95  # [-] a wheel more locked than this is not driven by its motor any more
 
@@ -63,11 +64,7 @@ SCHEDULE = {
 
 def read(path: Path) -> Schedule:
     """A schedule file. Raises ConfigError in one line."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise ConfigError(f"{path}: found {reason.lower()}; expected a schedule file") from None
+    text = read_text(path, "a schedule file")
     schedule: Schedule = Section(SCHEDULE, lambda ramp, segments: Schedule(segments, ramp)).read(
         compose(text, str(path))
     )[0]

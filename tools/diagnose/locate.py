@@ -6,13 +6,16 @@ import numpy as np
 from scipy.stats import norm
 
 from estimator.terramechanics.soil import Array
+from tools.diagnose.noise import whiten
 from tools.diagnose.result import Location
 from tools.diagnose.rig import Stack
 from tools.diagnose.screen import whitened
 from tools.diagnose.select import Model, Search
+from tools.diagnose.signatures import NYQUIST, ORDERS
 
 DISCOVERY = 0.05  # false-discovery rate of the list
 MOST = 8
+RIPPLE = 0.01  # chance of the strongest order by noise alone
 FAR = 3.0  # [σ]
 STRAINED = {
     "scale": "constant",
@@ -36,20 +39,66 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     own = [slice(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
     gain = [_gain(a[s, s], b[s], null[s]) for s in own]
-    channels = [w.signature.name.partition("~")[0] for w in ready]
+    names = [w.signature.name.partition("~") for w in ready]
+    channels = [channel for channel, _, _ in names]
     whole = {c: _whole(a, b, null, [s for s, d in zip(own, channels, strict=True) if d == c]) for c in set(channels)}
-    p = np.array([g[1] for g in gain])
-    q = _false_discovery(p)
+    alone = {(c, n): g[0] for (c, _, n), g in zip(names, gain, strict=True)}
+    q = _false_discovery(np.array([g[1] for g in gain]))
     found = []
-    for w, channel, (value, _), p_i, q_i in zip(ready, channels, gain, p, q, strict=True):
+    for (channel, _, name), (value, p_i), q_i in zip(names, gain, q, strict=True):
         share = float(np.clip(value / max(whole[channel], 1e-9), 0.0, 1.0))
         if q_i <= DISCOVERY and share >= LEAST:
-            covariate = w.signature.name.partition("~")[2]
-            where = sentence(stack, model, channel, covariate)
+            covariate = max(name.split("·"), key=lambda n: alone.get((channel, n), 0.0))
+            where = sentence(stack, model, channel, name)
             found.append((value, Location(channel, covariate, share, float(p_i), float(q_i), where)))
-    found += _strains(stack, model)
+    found += _strains(stack, model) + ripples(search, model)
     found.sort(key=lambda item: -item[0])
-    return tuple(location for _, location in found[:MOST])
+    return tuple({(place.channel, place.covariate): place for _, place in reversed(found)}.values())[::-1][:MOST]
+
+
+def ripples(search: Search, model: Model) -> list[tuple[float, Location]]:
+    """The strongest order of the wheel angle in each channel, against the strongest of every surrogate."""
+    stack = search.problem.stack
+    orders = np.arange(3.0, _highest(stack))
+    if not orders.size:
+        return []
+    phase = np.outer(stack.covariate("wheel_angle"), orders)
+    moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)[:, None]
+    waves = moving * np.exp(1j * phase)
+    found = []
+    for channel in stack.rig.channels:
+        own = stack.of(channel)[:, None]
+        both = [whiten(search.problem.noise, np.where(own, part, 0.0)) for part in (waves.real, waves.imag)]
+        size = np.maximum(sum(np.sum(part**2, axis=0) for part in both), 1e-12)
+        gain, nulls = (
+            sum((part.T @ values) ** 2 for part in both) / (size if values.ndim == 1 else size[:, None])
+            for values in (model.fitted.residual, search.draws[0])
+        )
+        best = int(np.argmax(gain))
+        p = float((1 + np.sum(nulls.max(axis=0) >= gain[best])) / (1 + nulls.shape[1]))
+        if p <= RIPPLE:
+            found.append((float(gain[best]), _ripple(stack, model, channel, float(orders[best]), p)))
+    return found
+
+
+def _ripple(stack: Stack, model: Model, channel: str, order: float, p: float) -> Location:
+    own = stack.of(channel)
+    residual = (stack.measured - model.fitted.predicted)[own]
+    angle = stack.covariate("wheel_angle")[own]
+    amplitude = 2.0 * abs(np.mean((residual - residual.mean()) * np.exp(-1j * order * angle)))
+    share = float(np.clip(0.5 * amplitude**2 / max(float(np.var(residual)), 1e-300), 0.0, 1.0))
+    where = f"{channel}: ripples {order:.0f} times a turn, ± {amplitude:.2g} {stack.rig.units[channel]}"
+    return Location(channel, "wheel_angle", share, p, p, where)
+
+
+def _highest(stack: Stack) -> float:
+    """The fastest order that the grid shows, at the usual speed."""
+    run = stack.rig.runs[0]
+    rate = 1.0 / float(np.median(np.diff(run.time)))
+    speed = np.concatenate([np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs])
+    turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
+    usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
+    return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
 
 
 def _strains(stack: Stack, model: Model) -> list[tuple[float, Location]]:

@@ -76,7 +76,7 @@ def test_a_child_that_dies_is_named_with_its_last_words():
 def test_an_impossible_length_is_one_line():
     done = subprocess.run([*GRITD, "demo", "--seconds", "1"], capture_output=True, text=True)
     assert done.returncode == 2
-    assert done.stderr == "gritd: --seconds 1: expected 5 or more\n"
+    assert done.stderr == "gritd: argument --seconds: found '1'; expected a number from 5 (see gritd demo --help)\n"
 
 
 # --- verdict --------------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from typing import IO, get_args
 from estimator.daemon import TOPICS
 from estimator.salvage import Recording, read
 from tools import figure, verdict
-from tools.command import DONE, FAILED, USAGE, CommandError, Parser
+from tools.command import DONE, FAILED, CommandError, Parser, number, whole
 from tools.plant import PlantKind
 from tools.testbed import NAME, PLAYED, SHORTEST
 from tools.wires import CanKind
@@ -33,8 +33,6 @@ DEVICES = 2  # of the packaged testbed
 def main(argv: Sequence[str]) -> int:
     """Exit 0 if every target is met, 1 with the reason if not. Raises CommandError where a process fails."""
     arguments = _parser().parse_args(argv)
-    if arguments.seconds < SHORTEST:
-        raise CommandError(f"--seconds {arguments.seconds:g}: expected {SHORTEST:g} or more", USAGE)
     folder = Path(arguments.output or Path("runs") / time.strftime("demo-%Y%m%d-%H%M%S"))
     folder.mkdir(parents=True, exist_ok=True)
     with interruptible() as stop:
@@ -44,9 +42,11 @@ def main(argv: Sequence[str]) -> int:
 
 def _parser() -> Parser:
     parser = Parser(prog="gritd demo", description="Run the daemon against the simulated testbed on real wires.")
-    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of the run, default 60")
+    parser.add_argument(
+        "--seconds", type=number(low=SHORTEST), default=60.0, metavar="S", help="length of the run, default 60"
+    )
     parser.add_argument("--output", metavar="DIR", help="folder of the run; default runs/demo-DATE-TIME")
-    parser.add_argument("--seed", type=int, default=1, help="of soil and noise; default 1")
+    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
     parser.add_argument(
         "--plant", choices=get_args(PlantKind), default="original", help="Eqs. 1-10 (default), or the closed forms"
     )

@@ -29,7 +29,7 @@ from estimator.readings import Reading
 from estimator.terramechanics.soil import Soil
 from tools import plant, rig_config, simulate
 from tools.cli import guarded
-from tools.command import DONE, USAGE, CommandError, Parser
+from tools.command import DONE, Parser, number, whole
 from tools.plant import PlantKind
 from tools.schedule import motion_of
 from tools.wires import CanKind, Rig
@@ -105,10 +105,8 @@ def play(readings: Sequence[Reading], rig: Rig, stopped: Callable[[], bool] = la
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play one run; exit 0 at its end or when told to stop. Raises ConfigError, CommandError or OSError."""
+    """Play one run; exit 0 at its end or when told to stop. Raises ConfigError or OSError."""
     arguments = _parser().parse_args(argv)
-    if arguments.seconds < SHORTEST:
-        raise CommandError(f"--seconds {arguments.seconds:g}: expected {SHORTEST:g} or more", USAGE)
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
     configuration = config.load(arguments.config, effects.units)
@@ -134,8 +132,8 @@ def write_truth(folder: Path, prepared: Experiment) -> None:
 def _stop_on_signals() -> Event:
     """Set by SIGTERM and SIGINT."""
     stop = Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    for ending in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ending, lambda *_: stop.set())
     return stop
 
 
@@ -143,8 +141,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="python -m tools.testbed", description="Play a simulated run on a pseudo-terminal and on CAN.")
     parser.add_argument("--folder", type=Path, required=True, metavar="F", help="where configuration and truth go")
     parser.add_argument("--config", default=packaged(), help="the testbed; default: the packaged testbed.yaml")
-    parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of the run, default 60")
-    parser.add_argument("--seed", type=int, default=1, help="of soil and noise; default 1")
+    parser.add_argument(
+        "--seconds", type=number(low=SHORTEST), default=60.0, metavar="S", help="length of the run, default 60"
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
     parser.add_argument("--plant", choices=get_args(PlantKind), default="original", help="default original")
     parser.add_argument(
         "--can", choices=get_args(CanKind), default="auto", help="slcan where the computer has no multicast"

@@ -15,7 +15,7 @@ from estimator import config, effects
 from estimator.recording import versions
 from estimator.salvage import Recording
 from estimator.settings import Settings
-from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
 from tools.diagnose.apply import applied
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
-    parser.add_argument("--seed", type=int, default=0, help="of the surrogates; default 0")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the surrogates; default 0")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; default: one a core")
     return parser
 

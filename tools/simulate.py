@@ -42,7 +42,7 @@ SOIL_VALUES = {  # with the bounds that they have in a configuration
     "exponent": Quantity("", above=0.0, high=5.0),
     "modulus_factor": Quantity("", above=0.0, high=100.0),
 }
-MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.4 kB a sample
+MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.9 kB a sample
 
 
 @dataclass(frozen=True)

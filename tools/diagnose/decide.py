@@ -18,13 +18,13 @@ from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.rig import Index
 from tools.diagnose.screen import Screen, whitened
-from tools.diagnose.select import Model, Search, rescreen
+from tools.diagnose.select import FORM, Model, Search, rescreen
 
 TEMPERATURE = 2.0  # of evidence where nothing remains
 LEFTOVER = 0.15  # further temperature per nat left unexplained
 ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off, cannot be told apart
 LISTED = 5.0  # [nats] head start of the library over functions without a name
-SHAPE = 0.05  # and this share of its evidence, since a form's details may differ
+SHAPE = 0.08  # and this share of its evidence, since a form's details may differ
 PAIR = 3.0  # [nats] a second function must gain
 SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, LEFT = 2, 4  # functions without a name that may act together; that count what is left
@@ -93,7 +93,8 @@ def refitted(search: Search, model: Model) -> float:
     gains = [linear]
     for scale in SIZES:
         fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
-        gains.append(fitted.log_evidence - found.log_evidence - PAIR * (len(chosen) - 1))
+        gain = fitted.log_evidence - found.log_evidence
+        gains.append(gain - (PAIR + FORM * max(gain, 0.0)) * (len(chosen) - 1))
     return max(gains)
 
 
@@ -109,7 +110,7 @@ def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]
     for _ in range(most):
         tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
         best = int(np.argmax(tried))
-        price = PAIR if chosen else 0.0
+        price = PAIR + FORM * max(total, 0.0) if chosen else 0.0
         if best in chosen or tried[best] - price <= total:
             break
         total, chosen = tried[best] - price, [*chosen, best]

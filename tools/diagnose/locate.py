@@ -11,7 +11,7 @@ from tools.diagnose.result import Location
 from tools.diagnose.rig import Stack
 from tools.diagnose.screen import whitened
 from tools.diagnose.select import Model, Search
-from tools.diagnose.signatures import NYQUIST, ORDERS
+from tools.diagnose.signatures import highest_order
 
 DISCOVERY = 0.05  # false-discovery rate of the list
 MOST = 8
@@ -59,7 +59,7 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
 def ripples(search: Search, model: Model) -> list[tuple[float, Location]]:
     """The strongest order of the wheel angle in each channel, against the strongest of every surrogate."""
     stack = search.problem.stack
-    orders = np.arange(3.0, _highest(stack))
+    orders = np.arange(3.0, highest_order(stack))
     if not orders.size:
         return []
     phase = np.outer(stack.covariate("wheel_angle"), orders)
@@ -89,16 +89,6 @@ def _ripple(stack: Stack, model: Model, channel: str, order: float, p: float) ->
     share = float(np.clip(0.5 * amplitude**2 / max(float(np.var(residual)), 1e-300), 0.0, 1.0))
     where = f"{channel}: ripples {order:.0f} times a turn, ± {amplitude:.2g} {stack.rig.units[channel]}"
     return Location(channel, "wheel_angle", share, p, p, where)
-
-
-def _highest(stack: Stack) -> float:
-    """The fastest order that the grid shows, at the usual speed."""
-    run = stack.rig.runs[0]
-    rate = 1.0 / float(np.median(np.diff(run.time)))
-    speed = np.concatenate([np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs])
-    turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
-    usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
-    return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
 
 
 def _strains(stack: Stack, model: Model) -> list[tuple[float, Location]]:

@@ -109,11 +109,17 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
 
 
 def fit(
-    stack: Stack, predicted: Array, saturated: Array, cells: Index, before: Noise, rng: np.random.Generator
+    stack: Stack,
+    predicted: Array,
+    saturated: tuple[Array, Array],
+    cells: Index,
+    before: Noise,
+    rng: np.random.Generator,
 ) -> Noise:
     """Size and colour of each channel, from the prediction (N,).
 
-    The saturated mean: columns (N, p), and the means of the cells (N,), −1 where there is none (see replicates.py).
+    The saturated mean: columns (N, p), of which the leading directions count, columns (N, r) which all count, and the
+    means of the cells (N,), −1 where there is none (see replicates.py).
     """
     steady = before.loose < STEADY
     found = [
@@ -129,12 +135,12 @@ def _fit_channel(
     stack: Stack,
     channel: str,
     residual: Array,
-    saturated: Array,
+    saturated: tuple[Array, Array],
     cells: Index,
     own: Bools,
     rng: np.random.Generator,
 ) -> tuple[Colour, ...]:
-    columns = np.column_stack((_saturated(saturated[own], cells[own]), residual[own]))
+    columns = np.column_stack((_saturated(saturated[0][own], saturated[1][own], cells[own]), residual[own]))
     colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
     colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
     likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
@@ -168,21 +174,22 @@ def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 
 
-def _saturated(columns: Array, cells: Index) -> Array:
-    """Means of the cells and, beside them, the leading directions of the other columns; orthonormal."""
+def _saturated(columns: Array, sure: Array, cells: Index) -> Array:
+    """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal."""
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
-    held /= np.linalg.norm(held, axis=0)
+    held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
+    held = _basis(held, held.shape[1])
     return np.column_stack((held, _basis(columns - held @ (held.T @ columns))))
 
 
-def _basis(columns: Array) -> Array:
+def _basis(columns: Array, most: int = COLUMNS) -> Array:
     """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     if not columns.size:
         return np.zeros((columns.shape[0], 0))
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[-min(max(columns.shape[0] // 4, 1), COLUMNS) :]
+    kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[-max(min(columns.shape[0] // 4, most), 1) :]
     basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     return basis
 

@@ -12,7 +12,7 @@ from tools.diagnose.evidence import Signature
 from tools.diagnose.fit import Fitted, Problem
 from tools.diagnose.rig import Rig, Stack
 from tools.diagnose.screen import noise_draws
-from tools.diagnose.signatures import raw_signatures
+from tools.diagnose.signatures import raw_signatures, ripple_columns
 
 TOLERANCE = 2e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
@@ -36,7 +36,7 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     generics = generic.signatures(stack)
     smooth = [n for n, e in rig.effects.items() if not any(p.scan and not p.unit for p in e.parameters())]
     explained = [s.columns for s in (*raw_signatures(stack, rough.u, rough.predicted, smooth), *generics)]
-    saturated = np.column_stack([*explained, rough.raw])
+    saturated = np.column_stack([*explained, rough.raw]), ripple_columns(stack, stack.measured - rough.predicted)
     found = noise.fit(stack, rough.predicted, saturated, replicates.cells(stack), first, rng)
     spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
     problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))

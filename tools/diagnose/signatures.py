@@ -10,11 +10,12 @@ import numpy as np
 from estimator.effects.base import Effect, Parameter
 from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Signature
-from tools.diagnose.rig import Rig, Stack
+from tools.diagnose.rig import Index, Rig, Stack
 
 HIGHEST_ORDER = 200.0  # ripples a turn
 NYQUIST = 0.35  # of the grid's rate: faster ripples are damped too much by the averaging
 TURNS = 1.5  # ripples a run must hold to be told from a trend
+STRONGEST = 3  # orders of a channel that do not count as its noise
 ORDERS = 120  # at most
 RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
 
@@ -96,3 +97,38 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     least = max(parameter.low, TURNS / max(turned, 1e-6))
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // ORDERS))]]
+
+
+def highest_order(stack: Stack) -> float:
+    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where the wheel hardly turns."""
+    run = stack.rig.runs[0]
+    rate = 1.0 / float(np.median(np.diff(run.time)))
+    speed = np.concatenate([np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs])
+    turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
+    usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
+    return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
+
+
+def ripple_columns(stack: Stack, residual: Array) -> Array:
+    """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after the other."""
+    orders = np.arange(3.0, highest_order(stack), 0.25)
+    if not orders.size:
+        return np.zeros((stack.size, 0))
+    moving = stack.covariate("speed") > 0.0
+    angle, columns = stack.covariate("wheel_angle"), []
+    for channel in stack.rig.channels:
+        own = np.flatnonzero(stack.of(channel) & moving)
+        waves = np.exp(1j * np.outer(angle[own], orders))
+        left = residual[own] - np.mean(residual[own])
+        for _ in range(STRONGEST if own.size > 100 else 0):
+            best = waves[:, int(np.argmax(np.abs(left @ waves)))]
+            pair = np.column_stack((best.real, best.imag))
+            left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
+            columns += [_placed(part, own, stack.size) for part in (best.real, best.imag)]
+    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def _placed(values: Array, own: Index, size: int) -> Array:
+    out = np.zeros(size)
+    out[own] = values
+    return out

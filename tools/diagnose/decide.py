@@ -18,7 +18,7 @@ from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.rig import Index
 from tools.diagnose.screen import Screen, whitened
-from tools.diagnose.select import FORM, Model, Search, rescreen
+from tools.diagnose.select import Model, Search, form, rescreen
 
 TEMPERATURE = 2.0  # of evidence where nothing remains
 LEFTOVER = 0.15  # further temperature per nat left unexplained
@@ -94,7 +94,7 @@ def refitted(search: Search, model: Model) -> float:
     for scale in SIZES:
         fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
         gain = fitted.log_evidence - found.log_evidence
-        gains.append(gain - (PAIR + FORM * max(gain, 0.0)) * (len(chosen) - 1))
+        gains.append(gain - (PAIR + form(gain)) * (len(chosen) - 1))
     return max(gains)
 
 
@@ -110,7 +110,7 @@ def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]
     for _ in range(most):
         tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
         best = int(np.argmax(tried))
-        price = PAIR + FORM * max(total, 0.0) if chosen else 0.0
+        price = PAIR + form(total) if chosen else 0.0
         if best in chosen or tried[best] - price <= total:
             break
         total, chosen = tried[best] - price, [*chosen, best]

@@ -24,7 +24,10 @@ AGAIN = 4  # shapes of an effect that a later screen tries
 QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
 HOPELESS = 12.0  # [nats] behind the best after the first fit
 PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
-FORM = 0.08  # of what the effects so far gained: what a published form other than ours may leave for another effect
+FORM, FORM_MOST = (
+    0.08,
+    25.0,
+)  # of what the effects so far gained: what a published form other than ours may leave for another effect
 
 
 @dataclass(eq=False)
@@ -136,7 +139,12 @@ def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) 
 def _one_more(search: Search, model: Model) -> float:
     """Log prior of one more effect beside those of a model."""
     gained = model.fitted.log_evidence - search.models[0].fitted.log_evidence
-    return PAIR_PRIOR - FORM * max(gained, 0.0) if model.names else 0.0
+    return PAIR_PRIOR - form(gained) if model.names else 0.0
+
+
+def form(gained: float) -> float:
+    """What the remainder of another published form may be worth [nats]."""
+    return float(np.clip(FORM * gained, 0.0, FORM_MOST))
 
 
 def _start(free: Sequence[Free], effect: type[Effect], amplitude: Array, shape: dict[str, float]) -> Array:

@@ -34,8 +34,8 @@ def consumed():
 
 def run(pipeline, state, ticks):
     records = []
-    for stamp, readings in ticks:
-        state, record = pipeline.step(state, readings, stamp)
+    for stamp, consumed in ticks:
+        state, record = pipeline.step(state, consumed, stamp)
         records.append(TICK_TOPIC.codec.encode(record))
     return state, records
 

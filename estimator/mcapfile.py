@@ -115,7 +115,7 @@ class McapFile:
         self._definitions: dict[int, Definition] = {}
         self._preambles: dict[int, bytes] = {}
         self._metadata_index: list[MetadataIndex] = []
-        self._chunk_indexes: list[bytes] = []
+        self._chunk_indexes = _Packed()
         self._counts: Counter[int] = Counter()
         self._span: tuple[int, int] | None = None  # first and last log_time [ns]
         self._length = 0
@@ -162,7 +162,7 @@ class McapFile:
         indexes = [_message_index(int(c), heads, offsets) for c in np.unique(heads["channel"])]
         entry = self._chunk_index(chunk, indexes, len(content), span)
         self._append(chunk + b"".join(index for _, index in indexes))
-        self._chunk_indexes.append(entry)
+        self._chunk_indexes.add(entry)
         self._counts.update(heads["channel"].tolist())
         self._span = span if self._span is None else (min(self._span[0], span[0]), max(self._span[1], span[1]))
 
@@ -260,7 +260,7 @@ class McapFile:
             (Opcode.SCHEMA, record_bytes(*schemas.values())),
             (Opcode.CHANNEL, record_bytes(*(channel for _, channel in used))),
             (Opcode.STATISTICS, record_bytes(self._statistics(len(schemas)))),
-            (Opcode.CHUNK_INDEX, b"".join(self._chunk_indexes)),
+            (Opcode.CHUNK_INDEX, self._chunk_indexes.all()),
             (Opcode.METADATA_INDEX, record_bytes(*self._metadata_index)),
         ]
 
@@ -270,13 +270,29 @@ class McapFile:
             attachment_count=0,
             channel_count=len(self._counts),
             channel_message_counts=dict(sorted(self._counts.items())),
-            chunk_count=len(self._chunk_indexes),
+            chunk_count=self._chunk_indexes.count,
             message_count=self._counts.total(),
             message_end_time=last,
             message_start_time=first,
             metadata_count=len(self._metadata_index),
             schema_count=schemas,
         )
+
+
+class _Packed:
+    """Records that are added one by one and read once, compressed meanwhile: an index of many hours stays small."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._packer = zlib.compressobj(1)
+        self._packed = bytearray()
+
+    def add(self, record: bytes) -> None:
+        self._packed += self._packer.compress(record)
+        self.count += 1
+
+    def all(self) -> bytes:
+        return zlib.decompress(self._packed + self._packer.copy().flush())
 
 
 def _compress(kind: str, content: bytes) -> bytes:

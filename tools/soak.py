@@ -182,8 +182,7 @@ def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
 def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Namespace) -> list[str]:
     last = looks[-1]
     slope = growth([(look["uptime"] / 3600.0, look["memory"]) for look in looks])
-    settled = looks[int(SETTLED * len(looks)) :]
-    constant = all(len({look[what] for look in settled}) == 1 for what in ("descriptors", "threads"))
+    grown = {what: more(what, looks) for what in ("descriptors", "threads")}
     print(
         f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
         f" memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
@@ -195,8 +194,14 @@ def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Nam
         print(f"{name} of 10 s [ms]: median {np.median(worst):.3f}, worst {max(worst):.3f}")
     print("\n".join(line for line in words if line.startswith(("queue:", "loop:", "log "))))
     wrong = [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE and arguments.minutes >= 30.0)
-    wrong += ["descriptors or threads are not constant"] * (not constant)
+    wrong += [f"{by} {what} more than at the start" for what, by in grown.items() if by > 0]
     return wrong + ["the log was not closed"] * (not any(line.startswith("log closed") for line in words))
+
+
+def more(what: str, looks: Sequence[dict[str, Any]]) -> int:
+    """How many more there are in the last third than in the one after settling; a file being synced counts twice."""
+    third = len(looks) // 3
+    return int(min(look[what] for look in looks[-third:])) - int(min(look[what] for look in looks[third : 2 * third]))
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def check(path, figure):
     seconds, memory, said = probe(path)
     assert "\n" not in said.strip()
     figure(HUGE, OWN, "memory", memory, "MB", 256)
-    figure(HUGE, OWN, "time to the error", seconds, "s", 20)
+    figure(HUGE, OWN, "time to the error", seconds, "s", 2, slack=10)
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,8 @@ class Watcher:
     # --- what is told ---------------------------------------------------------------------------------------------
 
     def _follow(self, daemon: Daemon, stats: ReaderStats) -> None:
-        if stats.state == self._states[stats.device]:
+        beginning = stats.state == "WAITING" and not stats.last_error  # for its first attempt
+        if stats.state == self._states[stats.device] or beginning:
             return
         self._states[stats.device] = stats.state
         trouble = stats.state not in ("OPEN", "ENDED")

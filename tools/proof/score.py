@@ -50,7 +50,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "cases": len(rows),
         "failed": _share(row.verdict == "failed" for row in rows),
-        "false_alarms": _false_alarms([row for row in rows if not row.truth]),
+        "false_alarms": _false_alarms([row for row in rows if not row.truth and row.verdict != "failed"]),
         "detectable_singles": _names(detectable),
         "strata": _strata(rows),
         "effects": {name: _names([r for r in singles if r.truth == (name,)]) for name in sorted(_true_names(singles))},

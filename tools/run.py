@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -66,6 +67,7 @@ def _serve(configuration: Configuration, folder: Path, run: RunInfo, socket: Pat
         print(notice, file=sys.stderr, flush=True)
         daemon.say(WARNING, notice)
     threading.excepthook = _say_in_a_line
+    logging.getLogger("can").setLevel(logging.CRITICAL)  # a reader says the same, once
     with closing(publisher):
         publisher.start()
         last = daemon.serve(watcher)

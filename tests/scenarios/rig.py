@@ -41,7 +41,7 @@ build_readers(tools.run.load({config!r}).settings, lambda: 0, None)
 os.setgroups([]); os.setgid({user}); os.setuid({user})
 """
 LIMIT = 30.0  # [s] ends a scenario that has failed
-WIRES = "daemon process on a pseudo-terminal and a loopback CAN bus"
+WIRES = "daemon on wires"
 
 
 @lru_cache(maxsize=4)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.config_devices import NAME, device
+from estimator.effects import EFFECTS
 from estimator.readings import CHANNELS, ENCODERS, REQUIRED
 from estimator.recording import RunInfo
 from estimator.schema import (
@@ -314,8 +315,18 @@ class Effects:
             return Named(UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters")
         if (known := self.schema(name)) is None:
             raise item.place.error("an unknown effect", "the name of an effect")
-        keys = {parameter: Key(UncertainQuantity(kind), "parameter") for parameter, kind in known.items()}
+        if not entries(item, "a mapping of parameters"):
+            raise item.place.error("no parameter", f"at least one of {', '.join(known)}")
+        keys = {p: Key(UncertainQuantity(kind), "parameter", self._default(name, p)) for p, kind in known.items()}
         return Section(keys, dict, "a mapping of parameters")
+
+    @staticmethod
+    def _default(name: str, parameter: str) -> str:
+        """The library's own value: off for a strength, usual for a shape."""
+        if name not in EFFECTS:
+            return NEEDED
+        found = next(p for p in EFFECTS[name].parameters() if p.name == parameter)
+        return f"{found.centre!r} {found.unit}".strip()
 
 
 # ---- the whole file ------------------------------------------------------------------------------------------------

@@ -364,3 +364,14 @@ def test_packaged_testbed_is_consistent() -> None:
     assert (read.wheel.radius, read.wheel.width) == (0.072, 0.071)
     assert read.soil.tan_phi == Uncertain(0.577, 0.06)
     assert read.wrench is not None and len(read.channels) == 5
+
+
+def test_an_effect_needs_only_what_differs_from_the_library():
+    """Parameters that are not given have the library's own value; the effective text states them all."""
+    text = MINIMAL + "\neffects: {grousers: {height: 5 mm}}\n"
+    read = config.loads(text, "rig.yaml")
+    (effect,) = read.settings.effects
+    assert effect.parameters["height"].value == 0.005 and effect.parameters["count"].value == 16.0
+    assert config.loads(read.text, "effective").settings == read.settings
+    with pytest.raises(config.ConfigError, match="at least one of"):
+        config.loads(MINIMAL + "\neffects: {grousers: {}}\n", "rig.yaml")

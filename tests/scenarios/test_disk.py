@@ -211,19 +211,22 @@ def test_five_hundred_kills(tmp_path, figure):
     )
     killed = []
     for line in parent.stdout:
+        began = time.time_ns()
         time.sleep(rng.uniform(0.25, 0.7))
-        killed.append(time.time_ns())
+        killed.append((began, time.time_ns()))
         os.kill(int(line), signal.SIGKILL)
     assert parent.wait() == 0 and len(killed) == KILLS
-    level = "writer thread in a process of its own"
-    lost = []
-    for number, moment in enumerate(killed):
-        stamps = read(tmp_path / f"{number}.mcap").arrays("/raw/wheel_encoder")["stamp"]
-        lost.append((moment - stamps[-1]) * 1e-9 if len(stamps) else np.inf)
-    readable = sum(np.isfinite(lost))
-    figure(KILLED, level, f"of {KILLS} files not readable", KILLS - readable, "", 0)
+    level, lost, unreadable = "writer thread in a process of its own", [], 0
+    for number, (began, moment) in enumerate(killed):
+        try:
+            stamps = read(tmp_path / f"{number}.mcap").arrays("/raw/wheel_encoder")["stamp"]
+        except RecordingError:
+            unreadable += 1
+            continue
+        lost.append((moment - (stamps[-1] if len(stamps) else began)) * 1e-9)
+    figure(KILLED, level, f"of {KILLS} files not readable", unreadable, "", 0)
     figure(KILLED, level, "data lost, worst", max(lost), "s", 0.25, slack=4)
-    figure(KILLED, level, "data lost, 99 %", float(np.quantile(lost, 0.99)), "s", 0.25)
+    figure(KILLED, level, "data lost, 99 %", float(np.quantile(lost, 0.99)), "s", 0.25, slack=4)
 
 
 def test_power_cut(tmp_path, seed, figure):

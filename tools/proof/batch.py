@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -86,12 +85,12 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
 @contextmanager
 def _cluster(address: str) -> Iterator[Any]:
     try:
-        distributed: Any = import_module("distributed")  # an optional extra: not there when types are checked
+        from distributed import Client
     except ImportError:
         message = "--scheduler needs dask.distributed; expected it installed: pip install 'gritd[cluster]'"
         raise CommandError(message, USAGE) from None
     try:
-        client: Any = distributed.Client(address, timeout="5s")
+        client: Any = Client(address, timeout="5s")
     except (OSError, ValueError, TimeoutError):
         raise CommandError(f"--scheduler {address}: found no scheduler; expected one that answers", FAILED) from None
     try:

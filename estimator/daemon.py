@@ -22,6 +22,7 @@ from typing import Protocol
 from estimator.cdr import STRING, TIME, Topic
 from estimator.clock import Clock
 from estimator.config import Configuration
+from estimator.ending import Ending
 from estimator.health import Pulse, silent
 from estimator.loop import Change, Loop, LoopRecord, Source
 from estimator.pipeline import Pipeline, TickRecord
@@ -128,13 +129,13 @@ class Daemon:
         ]
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
         self._part_began = time.monotonic()
-        self._stop, self._loop_stop = Event(), Event()
+        self._ending, self._loop_stop = Ending(), Event()
         self._failure = ""
         self._wall_offset = 0.0
 
     def stop(self) -> None:
         """Ask `serve` to end; may be called from a signal handler."""
-        self._stop.set()
+        self._ending.set()
 
     def say(self, level: int, text: str) -> None:
         """A line into the recording's /log."""
@@ -161,7 +162,7 @@ class Daemon:
         loop = Thread(target=self._run_loop, name="loop", daemon=True)
         with _undisturbed():
             loop.start()
-            while not self._stop.wait(WATCH):
+            while not self._ending.wait(WATCH):
                 self._check(loop)
                 self._rotate()
                 watch(self)
@@ -175,7 +176,7 @@ class Daemon:
     def fail(self, reason: str) -> None:
         """Stop, with a reason; the first one given is the one told."""
         self._failure = self._failure or reason
-        self._stop.set()
+        self._ending.set()
 
     def _run_loop(self) -> None:
         try:

@@ -7,12 +7,12 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 import pytest
 
 from estimator.daemon import TICK_TOPIC
+from estimator.ending import Ending
 from tests.drivers_rig import wait_until
 from tools import demo, figure, verdict
 from tools.command import CommandError
@@ -68,7 +68,7 @@ def test_a_demo_that_is_stopped_leaves_no_process_behind(number, tmp_path):
 def test_a_child_that_dies_is_named_with_its_last_words():
     with (
         pytest.raises(CommandError, match=r"the daemon ended early \(exit 2\): gritd: nowhere.yaml: .*"),
-        demo.Child(Event(), "daemon", "tools.cli", "run", "--config", "nowhere.yaml") as child,
+        demo.Child(Ending(), "daemon", "tools.cli", "run", "--config", "nowhere.yaml") as child,
     ):
         child.wait_for("device ", 30.0)
 

@@ -14,10 +14,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from queue import Empty, Queue
-from threading import Event, Thread
+from threading import Thread
 from typing import IO, get_args
 
 from estimator.daemon import TOPICS
+from estimator.ending import Ending
 from estimator.salvage import Recording, read
 from tools import figure, verdict
 from tools.command import DONE, FAILED, CommandError, Parser, number, whole
@@ -60,9 +61,9 @@ def _parser() -> Parser:
 
 
 @contextmanager
-def interruptible() -> Iterator[Event]:
-    """An event that SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is lost."""
-    stop = Event()
+def interruptible() -> Iterator[Ending]:
+    """What SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is lost."""
+    stop = Ending()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
     try:
@@ -72,7 +73,7 @@ def interruptible() -> Iterator[Event]:
             signal.signal(number, handler)
 
 
-def run(folder: Path, arguments: Namespace, stop: Event) -> list[str]:
+def run(folder: Path, arguments: Namespace, stop: Ending) -> list[str]:
     """Testbed and daemon side by side for the given time; the daemon's closing lines."""
     told = ["--seconds", str(arguments.seconds), "--seed", str(arguments.seed), "--plant", arguments.plant]
     told += ["--folder", str(folder), "--can", arguments.can, "--wait"]
@@ -129,7 +130,7 @@ class Child:
     While `stop` is set, waiting for it raises KeyboardInterrupt.
     """
 
-    def __init__(self, stop: Event, name: str, module: str, *arguments: str) -> None:
+    def __init__(self, stop: Ending, name: str, module: str, *arguments: str) -> None:
         self._stop, self._name = stop, name
         self._lines: Queue[str] = Queue()
         self._process = subprocess.Popen(

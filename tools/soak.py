@@ -21,13 +21,13 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
 
 from config import packaged
 from estimator import config
+from estimator.ending import Ending
 from estimator.pipeline import Pipeline
 from estimator.readings import ENCODERS, Reading
 from estimator.record import TICK_NAMES
@@ -141,10 +141,10 @@ def on_wires(arguments: Namespace) -> list[str]:
     seconds = arguments.minutes * 60.0
     with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
         told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
-        with Child(Event(), "testbed", "tools.testbed", *told) as testbed:
+        with Child(Ending(), "testbed", "tools.testbed", *told) as testbed:
             path = testbed.wait_for("configuration ", 120.0).split(" ", 1)[1]
             with Child(
-                Event(), "daemon", "tools.cli", "run", "--config", path, "--name", "soak", "--status", "0"
+                Ending(), "daemon", "tools.cli", "run", "--config", path, "--name", "soak", "--status", "0"
             ) as daemon:
                 daemon.wait_for("device ", 60.0)
                 daemon.wait_for("device ", 60.0)

@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from threading import Event
 from typing import get_args
 
 import numpy as np
@@ -25,6 +24,7 @@ from config import packaged
 from estimator import config, effects
 from estimator.config import Configuration
 from estimator.daemon import real_time
+from estimator.ending import Ending
 from estimator.readings import Reading
 from estimator.terramechanics.soil import Soil
 from tools import plant, rig_config, simulate
@@ -129,9 +129,9 @@ def write_truth(folder: Path, prepared: Experiment) -> None:
     simulate.write_truth(folder / NAME, settings, prepared.soil, acting, prepared.run, prepared.seed)
 
 
-def _stop_on_signals() -> Event:
+def _stop_on_signals() -> Ending:
     """Set by SIGTERM and SIGINT."""
-    stop = Event()
+    stop = Ending()
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda *_: stop.set())
     return stop

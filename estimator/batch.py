@@ -12,14 +12,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.account import AIDED, ESTIMATED, HEALTH, MEASURED, Row, aided, estimated, health, measured
+from estimator.filter.account import AIDED, ESTIMATED, HEALTH, MEASURED, Row, aided, estimated, health, measured
+from estimator.filter.tracker import Account, Tracker, TrackState
 from estimator.pipeline import Pipeline
 from estimator.record import NOT_A_NUMBER, TICK_FIELDS
-from estimator.salvage import Recording
+from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from estimator.snapshots import Ints, played, snapshots
 from estimator.sync import NS
-from estimator.tracker import Account, Tracker, TrackState
 from estimator.wheel_state import wheel_state
 
 Table = NDArray[np.void]  # structured

@@ -11,10 +11,10 @@ from collections.abc import Callable
 
 from estimator.checkpoint import decode, encode
 from estimator.config import ConfigError, Configuration, loads
+from estimator.daemon.reload import carried
 from estimator.pipeline import Pipeline, TickRecord
-from estimator.playback import Checkpoint, RecordedTick
 from estimator.recording import RecordingError
-from estimator.reload import carried
+from estimator.recording.playback import Checkpoint, RecordedTick
 from estimator.settings import Settings
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.history import rate_of
-from estimator.mcapfile import RecordingError
-from estimator.salvage import Recording
+from estimator.recording.mcapfile import RecordingError
+from estimator.recording.salvage import Recording
 from estimator.settings import Calibration, Settings
 from estimator.situation import Motion, Sensed
 from estimator.terramechanics.soil import Array

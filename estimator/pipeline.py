@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from estimator.account import record
+from estimator.filter.account import record
+from estimator.filter.pull import UNKNOWN, Pull, Search, searched
+from estimator.filter.tracker import Tracker, TrackState
 from estimator.online import with_latencies
-from estimator.pull import UNKNOWN, Pull, Search, searched
 from estimator.readings import Reading
 from estimator.record import Flag
 from estimator.settings import Settings
 from estimator.sync import NS, Sync
-from estimator.tracker import Tracker, TrackState
 
 TickRecord = tuple[float, ...]  # values in the order of record.TICK_FIELDS; times are integer ns
 

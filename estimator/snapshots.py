@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.playback import TICK
 from estimator.readings import CHANNELS, ENCODERS, WRENCH_FIELDS
 from estimator.record import CHANNEL_BITS
-from estimator.salvage import Recording
+from estimator.recording.playback import TICK
+from estimator.recording.salvage import Recording
 from estimator.settings import Calibration, Settings
 from estimator.sync import NS, STUCK_AFTER, Measured, Snapshot
 from estimator.terramechanics.soil import Array

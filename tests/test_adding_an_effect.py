@@ -78,7 +78,7 @@ def test_the_command_simulates_it(cable_drag: type[Effect], tmp_path: Path, monk
 def test_the_configuration_takes_it(cable_drag: type[Effect]) -> None:
     text = packaged().read_text(encoding="utf-8")
     text = re.sub(r"(?ms)^effects:.*?(?=^\w|\Z)", block("yaml"), text)
-    read = config.loads(text, "testbed.yaml", None, effects.units)
+    read = config.loads(text, "testbed.yaml")
     (effect,) = effects.configured(read.settings.effects)
     assert effect == cable_drag(force=2.0)  # type: ignore[call-arg]
     assert read.settings.effects[0].parameters["force"].sigma == pytest.approx(0.3)

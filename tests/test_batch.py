@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from estimator.batch import ESTIMATES, SIGNALS, estimates, signals, window_ends
 from estimator.daemon import TICK_TOPIC
 from estimator.pipeline import Pipeline
-from estimator.playback import played as replayed
 from estimator.readings import CHANNELS, Reading
 from estimator.record import TICK_NAMES, Flag
 from estimator.recording import RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.recording.playback import played as replayed
+from estimator.recording.salvage import read
 from estimator.settings import Rates
 from estimator.snapshots import Played, Stream, snapshots
 from estimator.sync import NS, Sync

@@ -12,9 +12,9 @@ from config import packaged
 from estimator import checkpoint
 from estimator.config import load, loads
 from estimator.daemon import CHECKPOINT_TOPIC, TICK_TOPIC, TOPICS
+from estimator.daemon.reload import carried, needs_restart
 from estimator.pipeline import Pipeline
 from estimator.recording import RunInfo, RunWriter, part_path
-from estimator.reload import carried, needs_restart
 from estimator.settings import Uncertain
 from tests.linear_plant import readings
 from tools import replay

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from config import packaged
 from estimator import config
 from estimator.config import ConfigError
+from estimator.config.schema import Quantity
 from estimator.recording import RunInfo
-from estimator.schema import Quantity
 from estimator.settings import Channel, ConfiguredEffect, FilterSettings, Load, Logging, Rates, Uncertain
 
 TESTBED = packaged().read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from estimator.daemon import TICK_TOPIC
-from estimator.ending import Ending
+from estimator.daemon.ending import Ending
 from tests.drivers_rig import wait_until
 from tools import demo, figure, verdict
 from tools.command import CommandError

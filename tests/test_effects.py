@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from estimator import effects as library
+from estimator.config.effects import quantities
 from estimator.effects import EFFECTS, configured, in_order, make
 from estimator.effects.base import EXPERIMENTS, STAGES, Effect, Parameter
 from estimator.forward import Response, corrected, simulate_arrays
@@ -243,8 +244,8 @@ def test_order_of_action_is_by_stage() -> None:
 
 
 def test_units_are_what_the_configuration_asks() -> None:
-    asked = library.units("coulomb_friction")
+    asked = quantities("coulomb_friction")
     assert asked is not None and set(asked) == {"loss"}
     known = library.EFFECTS["coulomb_friction"].parameters()[0]
     assert (asked["loss"].unit, asked["loss"].low, asked["loss"].high) == ("N·m", known.low, known.high)
-    assert library.units("gremlins") is None
+    assert quantities("gremlins") is None

@@ -6,12 +6,12 @@ import subprocess
 import sys
 from threading import Thread
 
-from estimator.ending import Ending
+from estimator.daemon.ending import Ending
 
 SIGNALS = 3000  # a threading.Event hangs within the first few hundred
 MANY = f"""
 import faulthandler, random, signal
-from estimator.ending import Ending
+from estimator.daemon.ending import Ending
 faulthandler.dump_traceback_later(60.0, exit=True)
 rng = random.Random(1)
 for _ in range({SIGNALS}):

@@ -211,7 +211,7 @@ def test_too_many_inline_signals_are_refused():
 
 
 def test_inline_keys_are_those_of_the_configuration():
-    from estimator.config_devices import SIGNAL
+    from estimator.config.devices import SIGNAL
 
     assert set(INLINE_KEYS) == set(SIGNAL)
 

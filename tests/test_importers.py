@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from estimator import config, salvage
+from estimator import config
+from estimator.recording import salvage
 from tools.command import CommandError
 from tools.import_rig import main
 from tools.importers import mgst, rigs

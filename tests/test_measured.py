@@ -10,11 +10,11 @@ import pytest
 from config import packaged
 from estimator import config
 from estimator.forward import simulate_arrays
-from estimator.mcapfile import RecordingError
 from estimator.measured import SENSED, MeasuredRun, measured_run
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.recording.mcapfile import RecordingError
+from estimator.recording.salvage import read
 from tools.schedule import Schedule, Segment, motion_of
 from tools.simulate import Run, simulate_run, soil_of, write
 

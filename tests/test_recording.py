@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimator.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
 from estimator.readings import CHANNELS, Reading
 from estimator.record import TICK_FIELDS
 from estimator.recording import LOG_TOPIC, RAW_TOPICS, RecordingError, RunInfo, RunWriter, part_path, parts
-from estimator.salvage import read
+from estimator.recording.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
+from estimator.recording.salvage import read
 
 T0 = 1_700_000_000_123_456_789
 MIXED = Topic(

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from mcap.opcode import Opcode
 
-from estimator.blocks import records
-from estimator.salvage import read
+from estimator.recording.blocks import records
+from estimator.recording.salvage import read
 from tests.test_recording import write_sample
 from tests.test_salvage import write_foreign
 from tools import cli

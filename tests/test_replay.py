@@ -16,7 +16,7 @@ from estimator.daemon import TICK_TOPIC, TOPICS
 from estimator.pipeline import Pipeline
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.recording.salvage import read
 from tests.linear_plant import readings
 from tools import cli, replay
 from tools.command import CommandError

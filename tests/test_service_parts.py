@@ -12,11 +12,11 @@ import time
 
 import pytest
 
-from estimator import notify
-from estimator.health import Pulse, silent
-from estimator.notify import Notifier
-from estimator.publish import MAX_CLIENTS, Publisher, PublishError, line_of
-from estimator.retention import trim
+from estimator.daemon import notify
+from estimator.daemon.health import Pulse, silent
+from estimator.daemon.notify import Notifier
+from estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
+from estimator.recording.retention import trim
 from tools import monitor, status
 from tools.command import CommandError
 

@@ -9,7 +9,7 @@ import pytest
 
 from estimator import balance
 from estimator.effects import make
-from estimator.shift import SLIP, THETA_1, IntegralShift
+from estimator.filter.shift import SLIP, THETA_1, IntegralShift
 from estimator.situation import ContactLaw
 from estimator.terramechanics import linear, original
 from estimator.terramechanics.soil import Soil, Wheel

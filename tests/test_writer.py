@@ -15,11 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from estimator.mcapfile import McapFile
 from estimator.readings import Reading
 from estimator.recording import RecordingError, RunInfo, parts
-from estimator.salvage import read
-from estimator.writer import WriterStatus, WriterThread
+from estimator.recording.mcapfile import McapFile
+from estimator.recording.salvage import read
+from estimator.recording.writer import WriterStatus, WriterThread
 from tests.test_recording import MIXED, T0, mixed_values
 
 REPOSITORY = Path(__file__).parent.parent
@@ -204,7 +204,7 @@ def test_a_failed_sync_is_said(writer: WriterThread, monkeypatch: pytest.MonkeyP
     def failing(_: int) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    monkeypatch.setattr("estimator.writer.sync", failing)
+    monkeypatch.setattr("estimator.recording.writer.sync", failing)
     writer.put([reading(1)])
     wait_for(lambda: "cannot sync: Input/output error" in writer.status().error)
     monkeypatch.undo()
@@ -229,7 +229,7 @@ import os, sys, time
 from pathlib import Path
 from estimator.readings import Reading
 from estimator.recording import RunInfo
-from estimator.writer import WriterThread
+from estimator.recording.writer import WriterThread
 folder = Path(sys.argv[1])
 if os.system(f"mount -t tmpfs -o size=256k tmpfs {folder}"):
     sys.exit(77)
@@ -255,7 +255,7 @@ while thread.status().state != "writing":
     time.sleep(0.01)
 print(f"back after {time.monotonic() - freed:.2f} s")
 final = thread.stop()
-from estimator.salvage import read
+from estimator.recording.salvage import read
 recording = read(folder / "run.mcap")
 counts = recording.arrays("/raw/wheel_encoder")["count"].tolist()
 print(final.state, final.dropped, recording.complete, counts == list(range(i)))
@@ -297,7 +297,7 @@ LOGGING = """
 import sys, time
 from estimator.readings import Reading
 from estimator.recording import RunInfo
-from estimator.writer import WriterThread
+from estimator.recording.writer import WriterThread
 thread = WriterThread(sys.argv[1], [], "a: 1", RunInfo("killed"))
 thread.start()
 i, start = 0, time.monotonic()

@@ -23,14 +23,14 @@ import numpy as np
 from config import packaged
 from estimator import config
 from estimator.batch import estimates
+from estimator.filter.tracker import ENGINES, Tracker
 from estimator.pipeline import Pipeline
-from estimator.playback import played
 from estimator.recording import RAW_TOPICS, RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.recording.playback import played
+from estimator.recording.salvage import read
 from estimator.snapshots import played as played_arrays
 from estimator.snapshots import snapshots
 from estimator.terramechanics import linear, original, scalar
-from estimator.tracker import ENGINES, Tracker
 from tools import forward_bench
 from tools.command import DONE, Parser
 from tools.progress import Progress

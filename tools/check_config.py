@@ -11,7 +11,7 @@ from config import packaged
 from drivers.build import build_decoder, build_link, used_devices
 from drivers.errors import DeviceSettingsError
 from estimator import config, geometry
-from estimator.config_table import UNITS
+from estimator.config.table import UNITS
 from estimator.readings import ENCODERS
 from estimator.settings import Calibration, Channel, Device, Settings, Uncertain, Wrench
 from tools.command import DONE, USAGE, CommandError, Parser

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from importlib import metadata
 
 from drivers.errors import DeviceError, DeviceSettingsError
-from estimator.yamltree import ConfigError
+from estimator.config.yamltree import ConfigError
 from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 
 # command -> (module, what it does)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator import config, effects
+from estimator import config
 from estimator.config import Configuration
 from estimator.terramechanics.soil import Array
 from tools.command import DONE, FAILED, USAGE, CommandError, Parser
@@ -29,7 +29,7 @@ RATE = 10.0  # [Hz] of the grid on which they are compared
 def main(argv: Sequence[str]) -> int:
     """Print the errors, draw what was asked for. Raises ConfigError or CommandError."""
     arguments = _parser().parse_args(argv)
-    configuration = config.load(arguments.config, effects.units)
+    configuration = config.load(arguments.config)
     found = compare(arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv])
     try:
         if arguments.report:

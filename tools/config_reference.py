@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from estimator.config_table import table
-from estimator.schema import ABSENT, NEEDED, Key, Kind, Named, Section, Variant
+from estimator.config.schema import ABSENT, NEEDED, Key, Kind, Named, Section, Variant
+from estimator.config.table import table
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "configuration.md"
 BEGIN = "<!-- from here on written by `python -m tools.config_reference` -->\n"

@@ -18,8 +18,8 @@ from threading import Thread
 from typing import IO, get_args
 
 from estimator.daemon import TOPICS
-from estimator.ending import Ending
-from estimator.salvage import Recording, read
+from estimator.daemon.ending import Ending
+from estimator.recording.salvage import Recording, read
 from tools import figure, verdict
 from tools.command import DONE, FAILED, CommandError, Parser, number, whole
 from tools.plant import PlantKind

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from estimator.cdr import Rows
 from estimator.record import Status
+from estimator.recording.cdr import Rows
 from estimator.terramechanics.soil import Array
 
 NS = 1_000_000_000

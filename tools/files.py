@@ -6,8 +6,8 @@ import errno
 import os
 from pathlib import Path
 
-from estimator.mcapfile import RecordingError
-from estimator.salvage import Recording, read
+from estimator.recording.mcapfile import RecordingError
+from estimator.recording.salvage import Recording, read
 from tools.command import DAMAGED, FAILED, USAGE, CommandError
 
 WRONG_NAME = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.EACCES, errno.EPERM, errno.EROFS)

@@ -34,7 +34,7 @@ from estimator.pipeline import Pipeline, State
 from estimator.readings import Reading
 from estimator.record import TICK_NAMES
 from estimator.recording import RecordingError, RunInfo, RunWriter
-from estimator.salvage import read
+from estimator.recording.salvage import read
 from estimator.settings import Settings
 from tools.command import DONE, FAILED, Parser
 

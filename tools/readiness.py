@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.batch import window_ends
 from estimator.readings import CHANNELS, ENCODERS
-from estimator.salvage import Recording
+from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from estimator.snapshots import played, snapshots
 from estimator.sync import NS

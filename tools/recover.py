@@ -6,9 +6,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimator.mcapfile import McapFile, RecordingError
 from estimator.recording import RECOVERED, sealed
-from estimator.salvage import Recording, read
+from estimator.recording.mcapfile import McapFile, RecordingError
+from estimator.recording.salvage import Recording, read
 from tools.command import DAMAGED, DONE, Parser
 from tools.files import unread, unwritten, vacant
 

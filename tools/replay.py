@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from estimator.batch import estimates
-from estimator.cdr import TIME
 from estimator.config import Configuration, load, loads
 from estimator.course import Course
 from estimator.daemon import TICK_TOPIC, TOPICS
 from estimator.pipeline import TickRecord
-from estimator.playback import RecordedTick, played, settings_for, without_absent
 from estimator.record import TICK_FIELDS, TICK_NAMES, Status
 from estimator.recording import RecordingError, RunWriter, parts
-from estimator.salvage import Recording
+from estimator.recording.cdr import TIME
+from estimator.recording.playback import RecordedTick, played, settings_for, without_absent
+from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools import files
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from estimator import balance
-from estimator.shift import IntegralShift
+from estimator.filter.shift import IntegralShift
 from estimator.situation import ContactLaw
 from estimator.terramechanics import linear, original
 from estimator.terramechanics.original import arc, contact, front_stress, janosi, shear_displacement
@@ -272,7 +272,7 @@ def fitted_soil() -> Lines:
         tan_phi = "".join(f"{x:>{width}.4f}" for (_, x), width in zip(found, (8, 9, 11), strict=True))
         yield f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    {float(soil.tan_phi):>6.4f}{tan_phi}"
     yield "  The linearisation alone moves c by a quarter or more. The effect stress_linearisation removes it, also if"
-    yield "  it was computed from a prior with c 25 % and tan φ 5 % wrong (estimator/shift.py)."
+    yield "  it was computed from a prior with c 25 % and tan φ 5 % wrong (estimator/filter/shift.py)."
 
 
 def fit(soil: Soil, shift: IntegralShift | None = None) -> tuple[float, float]:

@@ -14,12 +14,12 @@ from pathlib import Path
 
 from drivers.build import build_readers
 from drivers.queue import ReadingQueue
-from estimator.clock import Clock
 from estimator.config import Configuration, load
 from estimator.daemon import WARNING, Daemon, DaemonError, locked, real_time, run_path
-from estimator.publish import Publisher, PublishError
+from estimator.daemon.clock import Clock
+from estimator.daemon.publish import Publisher, PublishError
 from estimator.recording import RecordingError, RunInfo
-from estimator.writer import WriterStatus
+from estimator.recording.writer import WriterStatus
 from tools.command import DONE, FAILED, CommandError, Parser, number, whole
 from tools.telemetry import Reporter
 from tools.watcher import Watcher

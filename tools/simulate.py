@@ -13,13 +13,14 @@ import numpy as np
 
 from config import packaged
 from estimator import config, effects, units
+from estimator.config.effects import quantities
+from estimator.config.schema import Quantity
 from estimator.effects.base import Effect
 from estimator.forward import Response, simulate_arrays
 from estimator.measured import measured_run
 from estimator.readings import ENCODERS, WRENCH_FIELDS, Reading
 from estimator.recording import RecordingError, RunInfo, RunWriter
-from estimator.salvage import Recording
-from estimator.schema import Quantity
+from estimator.recording.salvage import Recording
 from estimator.settings import Calibration, Channel, Settings, Wrench
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
@@ -169,7 +170,7 @@ def write_truth(path: Path, settings: Settings, soil: Soil, acting: Sequence[Eff
 def main(argv: Sequence[str]) -> int:
     """Simulate, write the recording and its truth. Raises ConfigError or CommandError."""
     arguments = _parser().parse_args(argv)
-    configuration = config.load(arguments.config, effects.units)
+    configuration = config.load(arguments.config)
     settings, soil = configuration.settings, soil_of(configuration.settings, _soil_changes(arguments.soil))
     acting = _acting(settings, arguments.effect)
     vacant(arguments.output)
@@ -250,7 +251,7 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
     for text in given:
         key, _, value = text.partition("=")
         name, _, parameter = key.partition(".")
-        known = effects.units(name)
+        known = quantities(name)
         if known is None or parameter not in known:
             options = ", ".join(effects.EFFECTS if known is None else known)
             raise CommandError(

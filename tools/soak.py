@@ -27,7 +27,7 @@ import numpy as np
 
 from config import packaged
 from estimator import config
-from estimator.ending import Ending
+from estimator.daemon.ending import Ending
 from estimator.pipeline import Pipeline
 from estimator.readings import ENCODERS, Reading
 from estimator.record import TICK_NAMES

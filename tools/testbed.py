@@ -24,7 +24,7 @@ from config import packaged
 from estimator import config, effects
 from estimator.config import Configuration
 from estimator.daemon import real_time
-from estimator.ending import Ending
+from estimator.daemon.ending import Ending
 from estimator.readings import Reading
 from estimator.terramechanics.soil import Soil
 from tools import plant, rig_config, simulate
@@ -109,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
-    configuration = config.load(arguments.config, effects.units)
+    configuration = config.load(arguments.config)
     prepared = experiment(configuration, arguments.seconds, arguments.plant, arguments.seed)
     write_truth(folder, prepared)
     with Rig(configuration.settings, arguments.can) as rig:

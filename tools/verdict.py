@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.cdr import Rows
 from estimator.config import loads
 from estimator.pipeline import Pipeline
-from estimator.playback import played
 from estimator.record import TICK_NAMES
-from estimator.salvage import Recording
+from estimator.recording.cdr import Rows
+from estimator.recording.playback import played
+from estimator.recording.salvage import Recording
 from tools.plant import PlantKind
 from tools.progress import Progress
 from tools.rig_config import LINEARISATION

@@ -8,14 +8,13 @@ from math import degrees
 
 from drivers.queue import ReadingQueue
 from drivers.reader import Reader, ReaderStats
-from estimator import notify
 from estimator.config import load
-from estimator.daemon import INFO, WARNING, WATCH, Daemon, DaemonError
-from estimator.notify import Notifier
-from estimator.publish import Publisher
+from estimator.config.yamltree import ConfigError
+from estimator.daemon import INFO, WARNING, WATCH, Daemon, DaemonError, notify
+from estimator.daemon.notify import Notifier
+from estimator.daemon.publish import Publisher
 from estimator.record import TICK_NAMES, Flag, Status
-from estimator.retention import trim
-from estimator.yamltree import ConfigError
+from estimator.recording.retention import trim
 
 TIDY = 5.0  # [s] between looks at the disk
 

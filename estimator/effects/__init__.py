@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from estimator.effects.base import STAGES, Effect
-from estimator.schema import Quantity
 from estimator.settings import ConfiguredEffect
 
 
@@ -48,13 +47,6 @@ def make(name: str, values: Mapping[str, float]) -> Effect:
 def configured(effects: Iterable[ConfiguredEffect]) -> tuple[Effect, ...]:
     """Effects of a configuration at their configured values."""
     return tuple(make(e.name, {key: value.value for key, value in e.parameters.items()}) for e in effects)
-
-
-def units(name: str) -> dict[str, Quantity] | None:
-    """What the configuration reads each parameter of an effect as, unit and bounds; None for no such effect."""
-    if name not in EFFECTS:
-        return None
-    return {p.name: Quantity(p.unit, low=p.low, high=p.high) for p in EFFECTS[name].parameters()}
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from config import packaged
-from estimator import config, effects
+from estimator import config
 from estimator.effects.base import Effect
 from estimator.settings import Settings
 from estimator.terramechanics.soil import Soil
@@ -26,7 +26,7 @@ SLIPS = (0.05, 0.2, 0.45)
 
 @cache
 def settings() -> Settings:
-    return replace(config.load(packaged(), effects.units).settings, effects=())
+    return replace(config.load(packaged()).settings, effects=())
 
 
 def plan(

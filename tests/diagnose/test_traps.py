@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from estimator import config, effects
+from estimator import config
 from estimator.effects import make
 from tests.diagnose.campaigns import diagnosed, group, plan, settings, soil
 from tools.diagnose import heldout
@@ -108,9 +108,9 @@ def test_an_applied_effect_is_the_next_baseline() -> None:
     """After --apply the same testbed is consistent, and something new on top of it is what is named."""
     friction = make("viscous_friction", {"damping": 0.8})
     found = diagnosed(plan(), (friction,))
-    document = config.load("config/testbed.yaml", effects.units)
+    document = config.load("config/testbed.yaml")
     text = applied(document, found)
-    calibrated = config.loads(text, "new.yaml", None, effects.units).settings
+    calibrated = config.loads(text, "new.yaml").settings
     again = plan(seed=5)
     rig = WheelRig(record(again, (friction,)), calibrated)
     assert diagnose(rig).verdict == "consistent"

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from estimator import config
-from estimator.salvage import read
+from estimator.recording.salvage import read
 from tools.proof import cases, detect, handover, strata
 from tools.proof.detect import Detector
 from tools.proof.groups import CONFOUNDED, GROUPS, alike

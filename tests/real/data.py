@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from estimator import config, salvage
+from estimator import config
+from estimator.recording import salvage
 from estimator.settings import Settings
 
 REAL = Path(__file__).parents[3] / "shared" / "real"

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from config import packaged
-from estimator import config, effects
+from estimator import config
 from tools import simulate
 from tools.command import CommandError
 from tools.compare import compare, main
@@ -40,7 +40,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def testbed() -> config.Configuration:
-    return config.load(packaged(), effects.units)
+    return config.load(packaged())
 
 
 def test_what_the_model_knows_is_off_by_noise_alone(plain: list[Path], testbed: config.Configuration) -> None:

@@ -23,7 +23,7 @@ from drivers.wire import CanWire, SerialWire
 from estimator import config
 from estimator.daemon import TOPICS
 from estimator.recording import parts
-from estimator.salvage import read
+from estimator.recording.salvage import read
 from tests.drivers_rig import Plug
 from tools import replay, rig_config
 from tools.command import CommandError

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.mcapfile import RecordingError
-from estimator.salvage import read
+from estimator.recording.mcapfile import RecordingError
+from estimator.recording.salvage import read
 from tests.scenarios.rig import (
     ROOT,
     WIRES,
@@ -81,7 +81,7 @@ def test_disk_full(tmp_path, small_disk, seed, figure):
 
 
 SMALL_QUEUE = """
-import estimator.writer as m
+import estimator.recording.writer as m
 m.WriterThread.__init__.__kwdefaults__["capacity"] = 3000
 """
 
@@ -184,10 +184,10 @@ def test_killed_while_logging(tmp_path, seed, figure):
 
 WRITER = """
 import os, sys, time
-from estimator.cdr import Topic
+from estimator.recording.cdr import Topic
 from estimator.readings import Reading
 from estimator.recording import RunInfo
-from estimator.writer import WriterThread
+from estimator.recording.writer import WriterThread
 for number in range(int(sys.argv[2])):
     child = os.fork()
     if not child:

@@ -18,13 +18,13 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 
-import estimator.clock
+import estimator.daemon.clock
 from drivers.queue import ReadingQueue
-from estimator.clock import Clock
 from estimator.daemon import TICK_TOPIC
-from estimator.loop import Loop
+from estimator.daemon.clock import Clock
+from estimator.daemon.loop import Loop
 from estimator.pipeline import Pipeline
-from estimator.salvage import read
+from estimator.recording.salvage import read
 from tests.scenarios.rig import (
     TESTBED,
     WIRES,
@@ -105,7 +105,7 @@ class Due:
 
 
 def ticks_under(steps, readings, monkeypatch):
-    monkeypatch.setattr(estimator.clock, "time", SimulatedTime(steps))
+    monkeypatch.setattr(estimator.daemon.clock, "time", SimulatedTime(steps))
     clock, stop = Clock(), Event()
     sink = Kept(stop, 1000)
     Loop(Pipeline(TESTBED.settings, "plain"), Due(readings, clock), sink, clock).run(stop)
@@ -127,7 +127,7 @@ def test_wall_clock_step(seed, monkeypatch, figure):
 
 
 STEPPING = """
-import time, estimator.clock
+import time, estimator.daemon.clock
 class Stepping:
     monotonic_ns, began = time.monotonic_ns, None
     @classmethod
@@ -137,7 +137,7 @@ class Stepping:
     @classmethod
     def time_ns(cls):
         return time.time_ns() + (10**17 if cls.began and time.monotonic() > cls.began + 2.0 else 0)
-estimator.clock.time = Stepping
+estimator.daemon.clock.time = Stepping
 """
 
 
@@ -288,9 +288,9 @@ def dying(method):
 VICTIMS = {
     "reader": "import drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
     "loop": "import estimator.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
-    "writer": "import estimator.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
-    "writer-sync": "import estimator.writer as m; m._Syncer._sync = dying(m._Syncer._sync)",
-    "publisher": "import estimator.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
+    "writer": "import estimator.recording.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
+    "writer-sync": "import estimator.recording.writer as m; m._Syncer._sync = dying(m._Syncer._sync)",
+    "publisher": "import estimator.daemon.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
 }
 
 

@@ -7,8 +7,8 @@ import random
 
 import pytest
 
-from estimator.mcapfile import RecordingError
-from estimator.salvage import read
+from estimator.recording.mcapfile import RecordingError
+from estimator.recording.salvage import read
 from tests.scenarios.rig import driven, service
 from tests.test_salvage import HOSTILE, probe, write_sample
 from tools import recover

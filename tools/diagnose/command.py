@@ -11,9 +11,9 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimator import config, effects
+from estimator import config
 from estimator.recording import versions
-from estimator.salvage import Recording
+from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
 from tools.diagnose.apply import applied
@@ -33,7 +33,7 @@ FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole."""
     arguments = _parser().parse_args(argv)
-    configuration = config.load(arguments.config, effects.units)
+    configuration = config.load(arguments.config)
     for path in (arguments.json, arguments.report, arguments.apply):
         if path is not None and not path.parent.is_dir():
             raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)

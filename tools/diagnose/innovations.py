@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator import batch, config, effects
-from estimator.measurement import COMPONENTS
-from estimator.salvage import Recording
+from estimator import batch, config
+from estimator.filter.measurement import COMPONENTS
+from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools.diagnose.apply import applied
 from tools.diagnose.result import Diagnosis
@@ -22,7 +22,7 @@ def with_innovations(
     before = innovations(configuration.settings, recordings)
     after = before
     if found.accepted or found.law is not None:
-        improved = config.loads(applied(configuration, found), "improved configuration", None, effects.units)
+        improved = config.loads(applied(configuration, found), "improved configuration")
         after = innovations(improved.settings, recordings)
     return replace(found, fit=replace(found.fit, innovation_before=before, innovation_after=after))
 

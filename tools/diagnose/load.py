@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter
 
 from estimator.recording import RunInfo
-from estimator.salvage import Recording, read
+from estimator.recording.salvage import Recording, read
 from estimator.settings import Calibration, Channel, Settings
 from estimator.terramechanics.soil import Array
 from tools.command import DAMAGED, USAGE, CommandError

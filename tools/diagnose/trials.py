@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from config import packaged
-from estimator import config, effects
+from estimator import config
 from estimator.effects import EFFECTS
 from estimator.effects.base import Effect
 from tools.diagnose import heldout
@@ -91,7 +91,7 @@ def trial(case: Case) -> dict[str, Any]:
 
 def _trial(case: Case) -> dict[str, Any]:
     rng = np.random.default_rng(case.seed)
-    settings = config.load(packaged(), effects.units).settings
+    settings = config.load(packaged()).settings
     own: dict[str, type[Effect]] = {t.__name__: t for t in (*STRANGERS, *COUSINS)}
     types = [EFFECTS.get(n) or own[n] for n in case.truth]
     drawn = _drawn(settings, types, rng)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator import config
-from estimator.mcapfile import reported
 from estimator.readings import CHANNELS, Reading
 from estimator.recording import RunInfo, RunWriter
+from estimator.recording.mcapfile import reported
 from tools.command import USAGE
 from tools.importers._files import Array, RigFileError
 

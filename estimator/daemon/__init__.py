@@ -19,19 +19,19 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Protocol
 
-from estimator.cdr import STRING, TIME, Topic
-from estimator.clock import Clock
 from estimator.config import Configuration
-from estimator.ending import Ending
-from estimator.health import Pulse, silent
-from estimator.loop import Change, Loop, LoopRecord, Source
+from estimator.daemon.clock import Clock
+from estimator.daemon.ending import Ending
+from estimator.daemon.health import Pulse, silent
+from estimator.daemon.loop import Change, Loop, LoopRecord, Source
+from estimator.daemon.reload import needs_restart
 from estimator.pipeline import Pipeline, TickRecord
-from estimator.playback import CHECKPOINT, settings_for
 from estimator.readings import Reading
 from estimator.record import LOOP_FIELDS, TICK_FIELDS
 from estimator.recording import LOG_TOPIC, RunInfo
-from estimator.reload import needs_restart
-from estimator.writer import WriterStatus, WriterThread
+from estimator.recording.cdr import STRING, TIME, Topic
+from estimator.recording.playback import CHECKPOINT, settings_for
+from estimator.recording.writer import WriterStatus, WriterThread
 
 TICK_TOPIC = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
 LOOP_TOPIC = Topic("/loop", "gritd_msgs/msg/Loop", LOOP_FIELDS)

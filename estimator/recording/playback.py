@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from estimator.readings import CHANNELS, Reading
 from estimator.recording import RunInfo
-from estimator.salvage import Message, Recording
+from estimator.recording.salvage import Message, Recording
 from estimator.settings import Place, Settings
 from estimator.sync import NS
 

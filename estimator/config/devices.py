@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from estimator.schema import (
+from estimator.config.schema import (
     ABSENT,
     Choice,
     FilePath,

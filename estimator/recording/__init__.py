@@ -19,9 +19,9 @@ from typing import Any
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from estimator.cdr import ENCAPSULATION, TIME, Field, Topic, Values
-from estimator.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
 from estimator.readings import WRENCH_FIELDS, Reading
+from estimator.recording.cdr import ENCAPSULATION, TIME, Field, Topic, Values
+from estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
 
 __all__ = ["LOG_TOPIC", "RAW_TOPICS", "RecordingError", "RunInfo", "RunWriter", "Topic", "part_path", "parts"]
 

@@ -6,9 +6,9 @@ from math import cos, hypot, log, sin
 from typing import NamedTuple
 
 from estimator.effects.stress_linearisation import StressLinearisation
+from estimator.filter.shift import IntegralShift
 from estimator.online import Chain
 from estimator.settings import Settings
-from estimator.shift import IntegralShift
 from estimator.sync import Measured
 from estimator.terramechanics import linear, scalar
 from estimator.terramechanics.soil import Soil

@@ -13,11 +13,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from estimator.config_devices import NAME, device
-from estimator.effects import EFFECTS
-from estimator.readings import CHANNELS, ENCODERS, REQUIRED
-from estimator.recording import RunInfo
-from estimator.schema import (
+from estimator.config.devices import NAME, device
+from estimator.config.schema import (
     ABSENT,
     NEEDED,
     UNLIMITED,
@@ -34,6 +31,11 @@ from estimator.schema import (
     UncertainQuantity,
     entries,
 )
+from estimator.config.yamltree import Mapping as Tree
+from estimator.config.yamltree import Node, Scalar, describe
+from estimator.effects import EFFECTS
+from estimator.readings import CHANNELS, ENCODERS, REQUIRED
+from estimator.recording import RunInfo
 from estimator.settings import (
     Calibration,
     Channel,
@@ -49,8 +51,6 @@ from estimator.settings import (
     Wrench,
 )
 from estimator.terramechanics.soil import PressureSinkage, Wheel
-from estimator.yamltree import Mapping as Tree
-from estimator.yamltree import Node, Scalar, describe
 
 EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from estimator.filter import Estimate
-from estimator.measurement import Measurement
-from estimator.model import Prediction
+from estimator.filter.measurement import Measurement
+from estimator.filter.model import Prediction
 from estimator.record import NOT_A_NUMBER
 from estimator.wheel_state import WheelState
 

@@ -8,10 +8,10 @@ from threading import Event
 from typing import NamedTuple, Protocol
 
 from estimator.checkpoint import encode
-from estimator.clock import Clock
+from estimator.daemon.clock import Clock
+from estimator.daemon.reload import carried
 from estimator.pipeline import Pipeline, State, TickRecord
 from estimator.readings import Reading
-from estimator.reload import carried
 from estimator.sync import NS
 
 RECENT = 2500  # ticks whose lateness is remembered

@@ -19,7 +19,7 @@ import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
-from estimator.mcapfile import MAGIC, MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, RecordingError, Starts, gather
+from estimator.recording.mcapfile import MAGIC, MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, RecordingError, Starts, gather
 
 MAX_CHUNK = 32 << 20  # [bytes] largest chunk that is unpacked; writers use about 1 MiB
 MAX_RATIO = 1000  # a chunk that claims to unpack to more than this many times its size is a bomb

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 
 from estimator.filter import Estimate
+from estimator.filter.segments import Memory
+from estimator.filter.tracker import TrackState
 from estimator.pipeline import Pipeline, State
-from estimator.segments import Memory
 from estimator.settings import Settings
-from estimator.tracker import TrackState
 
 _FIXED = ("testbed", "wheel", "pulley_radius", "devices", "rates", "place")
 _WIRING = ("device", "signal", "bits", "low", "high")  # of a channel: the reader's decoder was built with them

@@ -22,10 +22,10 @@ from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from estimator.cdr import Topic, Values
-from estimator.mcapfile import RecordingError, sync
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter, part_path
+from estimator.recording.cdr import Topic, Values
+from estimator.recording.mcapfile import RecordingError, sync
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage

@@ -25,11 +25,11 @@ from estimator.filter import (
     project,
     variance,
 )
-from estimator.measurement import Columns, Measurement, selected, soil
+from estimator.filter.measurement import Columns, Measurement, selected, soil
+from estimator.filter.plain import PlainEngine
+from estimator.filter.segments import CAPACITY, Memory, Stretch
 from estimator.online import Context
-from estimator.plain import PlainEngine
 from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
-from estimator.segments import CAPACITY, Memory, Stretch
 from estimator.settings import Settings
 from estimator.sync import NS, Snapshot
 from estimator.wheel_state import REQUIRED_BITS, WheelState, classify

@@ -16,11 +16,22 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from estimator.blocks import MAX_CHUNK, MAX_WASTE, Block, Contents, Damaged, Texts, Walk, records, split, unpack
-from estimator.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
-from estimator.decoding import Chunk, Source, select
-from estimator.mcapfile import LIBRARY, RecordingError, Starts, reported
 from estimator.recording import CHECKSUM, CONFIG, RAW_TOPICS, RECOVERED, RUN, RunInfo, seal_holds
+from estimator.recording.blocks import (
+    MAX_CHUNK,
+    MAX_WASTE,
+    Block,
+    Contents,
+    Damaged,
+    Texts,
+    Walk,
+    records,
+    split,
+    unpack,
+)
+from estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
+from estimator.recording.decoding import Chunk, Source, select
+from estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, reported
 
 MAX_KEPT = 64 << 20  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_LINES = 100

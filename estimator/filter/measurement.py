@@ -7,8 +7,8 @@ from operator import mul
 
 from estimator.effects import configured
 from estimator.filter import KPA, Estimate, Matrix, Update, Vector, dot, variance
-from estimator.model import Prediction, Quantity, WheelModel
-from estimator.nuisance import Sensitivity, nuisances
+from estimator.filter.model import Prediction, Quantity, WheelModel
+from estimator.filter.nuisance import Sensitivity, nuisances
 from estimator.online import Added, Chain, Context, Here, variants
 from estimator.settings import Settings
 from estimator.sync import Snapshot

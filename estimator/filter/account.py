@@ -8,11 +8,11 @@ from __future__ import annotations
 from math import sqrt
 
 from estimator.filter import KPA, LN_K, TAN_PHI, C, Estimate
-from estimator.measurement import COMPONENTS, Measurement, soil
-from estimator.pull import Pull
+from estimator.filter.measurement import COMPONENTS, Measurement, soil
+from estimator.filter.pull import Pull
+from estimator.filter.tracker import Account, Aid, Tracker, TrackState
 from estimator.record import NOT_A_NUMBER
 from estimator.sync import Measured, Snapshot
-from estimator.tracker import Account, Aid, Tracker, TrackState
 from estimator.wheel_state import WheelState
 
 Row = tuple[float, ...]

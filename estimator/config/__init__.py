@@ -1,6 +1,6 @@
 """The configuration file: strict YAML to `Settings`, with the effective text that is saved beside every run.
 
-An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in config_table.py.
+An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in table.py.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from estimator.config_table import EffectSchema, table
-from estimator.effects import units
+from estimator.config.effects import quantities
+from estimator.config.table import EffectSchema, table
+from estimator.config.yamltree import MAX_BYTES, ConfigError, compose, serialise
 from estimator.recording import RunInfo
 from estimator.settings import Settings
-from estimator.yamltree import MAX_BYTES, ConfigError, compose, serialise
 
 __all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text"]
 
@@ -35,13 +35,13 @@ class Configuration:
     run: RunInfo = field(default_factory=RunInfo)
 
 
-def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = units) -> Configuration:
+def load(path: str | os.PathLike[str], effect_schema: EffectSchema | None = quantities) -> Configuration:
     """Read a configuration file; a relative DBC path counts from its folder. Raises ConfigError."""
     return loads(read_text(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
 
 
 def loads(
-    text: str, name: str, folder: Path | None = None, effect_schema: EffectSchema | None = units
+    text: str, name: str, folder: Path | None = None, effect_schema: EffectSchema | None = quantities
 ) -> Configuration:
     """Read configuration text; `name` stands in messages. Without a folder a relative DBC path stays as it is.
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from mcap.records import Channel, Schema
 
-from estimator.cdr import Codec, Rows, Topic
-from estimator.mcapfile import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, Starts, gather
+from estimator.recording.cdr import Codec, Rows, Topic
+from estimator.recording.mcapfile import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, Starts, gather
 
 _PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
 _CDR_LE = 0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number

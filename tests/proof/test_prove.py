@@ -1,7 +1,11 @@
 """The whole way of a trial, with a stub in the diagnosis' place."""
 
 import json
+import signal
+import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -66,6 +70,37 @@ def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(tmp_path: Path) ->
     assert first.done and second.done
     assert first.seal.read_text(encoding="utf-8").strip() == sealed
     assert list(first.folder.glob("given/*.mcap"))
+
+
+def test_cases_are_sealed_now_and_diagnosed_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    output = tmp_path / "batch"
+    assert command.main([*SMALL, "--seal-only", "--output", str(output)], STUB) == 0
+    sealed = (output / "seals.txt").read_text(encoding="utf-8")
+    assert len(sealed.splitlines()) == 2 and not list(output.glob("cases/*/outcome.json"))
+    assert command.main(["--resume", "--jobs", "1", "--output", str(output)], STUB) == 0
+    assert (output / "seals.txt").read_text(encoding="utf-8") == sealed
+    assert len(list(output.glob("cases/*/outcome.json"))) == 2
+
+
+def test_a_batch_that_is_stopped_leaves_nothing_running(tmp_path: Path) -> None:
+    """SIGTERM while a diagnosis runs that would never end."""
+    pid = tmp_path / "pid"
+    endless = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
+    code = "import sys; from tools.proof import command; "
+    code += f"command.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
+    arguments = [*SMALL, "--output", str(tmp_path / "batch")]
+    with subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=ROOT, stdout=subprocess.DEVNULL) as process:
+        wait_for(lambda: pid.exists() and pid.read_text())
+        process.terminate()
+        assert process.wait(60.0) == 128 + signal.SIGTERM
+    wait_for(lambda: not Path(f"/proc/{pid.read_text()}").exists())
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_a_changed_answer_is_noticed(finished: Path) -> None:

@@ -6,11 +6,13 @@ import hashlib
 import json
 import os
 import secrets
+import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
@@ -75,11 +77,28 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
     """Where trials run, and how many at a time. Raises CommandError where the cluster cannot be had."""
     if scheduler is None:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers: cases run side by side
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        with _processes(jobs) as pool:
             yield pool, jobs
         return
     with _cluster(scheduler) as client:
         yield client.get_executor(pure=False), max(len(client.nthreads()), 1)
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[Executor]:
+    """Workers in process groups of their own: when the batch is stopped, their diagnoses stop with them."""
+    ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    try:
+        with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=os.setpgid, initargs=(0, 0)) as pool:
+            try:
+                yield pool
+            except BaseException:
+                for pid in (worker.pid for worker in active_children() if worker.pid):
+                    with suppress(ProcessLookupError):
+                        os.killpg(pid, signal.SIGTERM)
+                raise
+    finally:
+        signal.signal(signal.SIGTERM, ended)
 
 
 @contextmanager
@@ -105,8 +124,9 @@ def run(
     width: int,
     sealed: Callable[[Spec, str], None],
     finished: Callable[[Spec], None],
+    diagnosed: bool = True,
 ) -> None:
-    """Every case that is not done: prepared, its seal told, then diagnosed. A worker's error ends the batch."""
+    """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends the batch."""
     waiting = [spec for spec in specs if not spec.done]
     waiting.reverse()
     active: dict[Future[Any], tuple[Spec, bool]] = {}
@@ -122,4 +142,7 @@ def run(
                 finished(spec)
                 continue
             sealed(spec, value)
+            if not diagnosed:
+                finished(spec)
+                continue
             active[executor.submit(trial.diagnose, spec)] = (spec, True)

@@ -27,6 +27,9 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     print(f"{begun.cases} cases in {output}; sealed before any diagnosis, SHA-256 {begun.sealed}", flush=True)
     specs = begun.specs(arguments.keep, diagnose)
     _run(specs, arguments, output / SEALS)
+    if arguments.seal_only:
+        print(f"all sealed, {output / SEALS}; go on with: gritd prove --resume --output {output}")
+        return DONE
     rows = [row(spec) for spec in specs]
     _tell(rows, begun, output)
     return FAILED if any(each.verdict == "failed" for each in rows) else DONE
@@ -46,6 +49,7 @@ def _strata(text: str) -> tuple[str, ...]:
 
 def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path) -> None:
     left = sum(not spec.done for spec in specs)
+    told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
     with (
         seals.open("a", encoding="utf-8") as published,
         batch.workers(arguments.jobs, arguments.scheduler) as (executor, width),
@@ -53,10 +57,11 @@ def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path
     ):
 
         def sealed(spec: trial.Spec, digest: str) -> None:
-            published.write(f"{spec.name} {digest}\n")
-            published.flush()
+            if digest not in told:
+                published.write(f"{spec.name} {digest}\n")
+                published.flush()
 
-        batch.run(specs, executor, width, sealed, lambda _: progress.advance())
+        batch.run(specs, executor, width, sealed, lambda _: progress.advance(), diagnosed=not arguments.seal_only)
 
 
 def _tell(rows: Sequence[Row], begun: batch.Batch, output: Path) -> None:
@@ -78,6 +83,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--strata", default="", metavar="A,B", help=f"some of {','.join(STRATA)}; default: all")
     parser.add_argument("--output", type=Path, default=OUTPUT, metavar="DIR", help=f"default {OUTPUT}")
     parser.add_argument("--resume", action="store_true", help="go on with the batch in DIR")
+    parser.add_argument(
+        "--seal-only", action="store_true", help="draw and seal all cases; diagnose them later with --resume"
+    )
     parser.add_argument("--keep", action="store_true", help="keep the recordings, about 1 MB a run")
     parser.add_argument("--scheduler", metavar="tcp://…", help="a dask scheduler whose workers see DIR")
     return parser

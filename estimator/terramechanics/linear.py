@@ -54,7 +54,7 @@ class Exponent(NamedTuple):
 
 
 class Shift(NamedTuple):
-    """What another stress distribution adds to A₁ … C₃, and its derivatives (see estimator/correction.py)."""
+    """What another stress distribution adds to A₁ … C₃, and its derivatives (see estimator/filter/shift.py)."""
 
     value: Integrals
     theta_1: Integrals
@@ -148,8 +148,7 @@ def forces_under_load(
     shift: Shift | None = None,
 ) -> Forces:
     """`predict` without gradients: a third of its cost, for a search over slip."""
-    x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], shear_exponent(wheel, k, theta_1, slip, maths).f, maths)
-    x = _added(x, shift.value) if shift else x
+    x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
     return _forces(wheel, x, c * theta_1, tan_phi, _scaled_peak(wheel, x, c, tan_phi, theta_1, load))
 
 
@@ -165,8 +164,7 @@ def forces(
     shift: Shift | None = None,
 ) -> Forces:
     """DP, W, T and resistance for a given peak stress σₘ [Pa]. Eqs. (20)-(22)."""
-    x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], shear_exponent(wheel, k, theta_1, slip, maths).f, maths)
-    x = _added(x, shift.value) if shift else x
+    x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
     return _forces(wheel, x, c * theta_1, tan_phi, sigma_m * theta_1)
 
 
@@ -221,6 +219,15 @@ def _peak_ratio(wheel: Wheel, slip: Value, maths: Maths) -> tuple[Value, Value]:
     free = wheel.c1 + wheel.c2 * slip
     ratio = maths.clip(free, 0.0, 1.0)
     return ratio, wheel.c2 * (ratio == free)
+
+
+def _wheel_integrals(
+    wheel: Wheel, k: Value, theta_1: Value, slip: Value, maths: Maths, shift: Shift | None
+) -> Integrals:
+    """A₁ … C₃ of a wheel, with the shift if there is one."""
+    f = shear_exponent(wheel, k, theta_1, slip, maths).f
+    x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], f, maths)
+    return _added(x, shift.value) if shift else x
 
 
 def _kernels(theta_1: Value, ratio: Value, f: Value, maths: Maths) -> tuple[Kernels, Kernels]:

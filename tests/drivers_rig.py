@@ -15,7 +15,7 @@ from estimator.settings import Channel, Device, Settings, Wrench
 from tests.testbed import SETTINGS, calibration
 
 DBC = str(Path(__file__).parent.parent / "config" / "testbed.dbc")
-FUZZ = settings(derandomize=True, deadline=None, max_examples=200)
+FUZZ = settings(max_examples=200)
 INF = float("inf")
 
 CAN_SIGNALS = {

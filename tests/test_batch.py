@@ -105,7 +105,7 @@ def flat(snapshot):
     return [v for field in snapshot for v in (field if isinstance(field, tuple) else (field,))]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_snapshots_from_arrays_are_those_of_sync(seed):
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from config import packaged
@@ -343,7 +343,7 @@ def _seconds(text: str) -> float:
     return time.thread_time() - start
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
     """Any edit of a good file ends in settings or in a ConfigError of one line, never in another exception."""

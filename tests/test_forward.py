@@ -61,7 +61,7 @@ def test_balance_is_scipys(wheel: Wheel, soil: Soil) -> None:
     slip=st.floats(-0.6, 1.0),
     load=st.floats(1.0, 200.0),
 )
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 def test_balance_carries_the_load_or_says_so(
     cohesion: float, tan_phi: float, exponent: float, modulus: float, k: float, slip: float, load: float
 ) -> None:
@@ -135,7 +135,7 @@ def test_reverse_mirrors_forward() -> None:
 
 
 @given(rim=st.floats(-0.1, 0.1), travel=st.floats(-0.1, 0.1))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 def test_slip_is_bounded_continuous_and_odd(rim: float, travel: float) -> None:
     slip, direction = signed_slip(rim, travel)
     assert -1.0 <= slip <= 1.0 and -1.0 <= direction <= 1.0

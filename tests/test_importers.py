@@ -62,7 +62,7 @@ def test_unknown_rig_is_a_usage_error() -> None:
 
 
 @given(speed=st.floats(0.001, 0.1), quanta=st.integers(1, 50))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_counts_travel_as_far_as_the_speed_says(speed: float, quanta: int) -> None:
     t = np.linspace(0.0, 2.0, 201)
     per_count = speed * 0.01 / quanta

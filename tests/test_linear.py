@@ -67,7 +67,7 @@ def test_forces_agree_with_quadrature_on_2000_random_draws() -> None:
     sign=st.sampled_from([-1.0, 1.0]),
     f=st.one_of(st.floats(0.01, 60.0), st.floats(-12, 1.7).map(lambda e: 10.0**e)),
 )
-@settings(deadline=None, max_examples=500)
+@settings(max_examples=500)
 def test_closed_forms_keep_their_digits_in_every_limit(theta_1: float, ratio: float, sign: float, f: float) -> None:
     """θ₁ → 0, θₘ → 0, θₘ → θ₁, f → 0, f < 0, large f: each of the eight integrals to 1e-12 of itself."""
     np.testing.assert_allclose(integrals(theta_1, ratio, sign * f), by_quadrature(theta_1, ratio, sign * f), rtol=1e-12)
@@ -126,7 +126,7 @@ soil_and_state = st.tuples(
 
 
 @given(x=soil_and_state, wheel=st.sampled_from([WHEEL, SHIFTING]))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_gradients_agree_with_differences(x: tuple[float, ...], wheel: Wheel) -> None:
     c, tan_phi, k, theta_1, slip, load = x
     # where f changes sign the second derivative jumps and differences lose their order
@@ -152,7 +152,7 @@ def test_gradients_are_continuous_where_the_exponent_changes_sign() -> None:
 
 
 @given(x=soil_and_state)
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_peak_stress_carries_the_load(x: tuple[float, ...]) -> None:
     """(21) backward and forward: σₘ from W gives W again, and the same T and DP."""
     prediction = predict(SHIFTING, *x)

@@ -158,7 +158,7 @@ def test_angle_of_maximum_stress() -> None:
     share=st.sampled_from([0.0, 1e-12, 0.5, 1.0 - 1e-12, 1.0]),
     exponent=st.floats(0.3, 2.0),
 )
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_finite_over_the_whole_range(theta_1: float, slip: float, share: float, exponent: float) -> None:
     soil = Soil(1000.0, 0.6, 0.01, exponent, 1e6)
     result = forces(Wheel(0.2, 0.1), soil, theta_1, slip, theta_m=share * theta_1)

@@ -55,7 +55,7 @@ def fields_and_values(draw: st.DrawFn) -> tuple[tuple[tuple[str, str, str], ...]
 
 
 @given(fields_and_values())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_every_message_decodes_to_what_was_encoded(
     drawn: tuple[tuple[tuple[str, str, str], ...], list[object]],
 ) -> None:
@@ -66,7 +66,7 @@ def test_every_message_decodes_to_what_was_encoded(
 
 
 @given(fields_and_values())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_the_ros_library_decodes_our_bytes_by_our_schema(
     drawn: tuple[tuple[tuple[str, str, str], ...], list[object]],
 ) -> None:

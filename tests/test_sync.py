@@ -57,7 +57,7 @@ def test_not_ready_before_a_window_has_filled():
     assert found[-1].ready
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.randoms(use_true_random=False))
 def test_readings_late_within_the_horizon_change_nothing(rng):
     ordered = readings_of(START, seconds=0.6)
@@ -68,7 +68,7 @@ def test_readings_late_within_the_horizon_change_nothing(rng):
     assert counters.late == 0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6))
 def test_duplicates_are_dropped_and_counted(seed):
     rng = random.Random(seed)

@@ -22,7 +22,7 @@ ALL = LISTED | UNLISTED
 READ = ("sinkage", "current", "pull", "load", "torque", "carriage")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.1, 1.2), st.floats(0.0, 0.7), st.floats(0.4, 1.4), st.floats(0.0, 0.5))
 def test_integrals_agree_with_adaptive_quadrature(theta_1: float, slip: float, n: float, rebound: float) -> None:
     ground, r, b = replace(GROUND, exponent=n, modulus=2e5), 0.072, 0.071

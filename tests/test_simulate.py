@@ -15,6 +15,7 @@ from estimator import config, effects
 from estimator.config.yamltree import ConfigError
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter
+from estimator.recording.salvage import read
 from tools import schedule as schedules
 from tools.command import CommandError
 from tools.schedule import Schedule, Segment, motion_of
@@ -181,6 +182,16 @@ def test_bogged_wheel_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     path.write_text("segments:\n  - {duration: 1 s, load: 5 kN, slip: 0.2, speed: 20 mm/s}")
     main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
     assert "exceeds what the soil carries in 250 samples" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("second", "stated"), [(60.0, 60.0), (80.0, None)])
+def test_a_run_at_one_load_states_it(second: float, stated: float | None, tmp_path: Path) -> None:
+    """Else a diagnosis would take the configuration's nominal load for the run's."""
+    path = tmp_path / "schedule.yaml"
+    segment = "  - {{duration: 1 s, load: {} N, slip: 0.1, speed: 20 mm/s}}\n"
+    path.write_text("segments:\n" + segment.format(60) + segment.format(second))
+    assert main(["--schedule", str(path), "-o", str(tmp_path / "run.mcap")]) == 0
+    assert read(tmp_path / "run.mcap").run.nominal_load == stated
 
 
 def test_a_recording_drives_it_again(schedule: Path, tmp_path: Path) -> None:

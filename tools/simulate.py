@@ -195,7 +195,14 @@ def _motion(arguments: argparse.Namespace, configuration: config.Configuration) 
     schedule = schedules.read(arguments.schedule)
     _check_length(arguments.schedule, schedule.duration, settings.rates.tick)
     place = float(info.pass_number), info.start_position
+    info = replace(info, nominal_load=_weights(schedule.segments, info.nominal_load))
     return schedules.motion_of(schedule, settings.wheel.radius, settings.rates.tick, *place), info
+
+
+def _weights(segments: Sequence[schedules.Segment], otherwise: float | None) -> float | None:
+    """The weights of a whole run [N], where they are the same throughout."""
+    loads = {segment.load for segment in segments}
+    return loads.pop() if len(loads) == 1 and loads != {0.0} else otherwise
 
 
 def _driven(recording: Recording, settings: Settings) -> Motion:

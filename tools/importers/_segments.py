@@ -1,7 +1,9 @@
 """Steady-state tables as recordings: every condition a segment of constant speed, a short silence between segments.
 
-A table gives a mean and a standard deviation. Within a segment the readings alternate between one standard deviation
-above and below the mean, so that the segment has both exactly and needs no random numbers.
+A table gives a mean and a standard deviation. Within a segment the readings stay one standard deviation above or below
+the mean for half a second at a time, as often above as below, in an order that differs by channel and segment: the
+segment has both exactly, and its mean is as uncertain as that of INDEPENDENT readings. Were the turns shorter, all
+scatter would average out, and a comparison would take the mean for exact; were they regular, it would find a ripple.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ from tools.importers._files import Array
 from tools.importers._recording import NS, Stream, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
-RATE = 100  # [Hz] even in the filter's window of 100 ms, so that the alternation averages out
+RATE = 100  # [Hz]
 DURATION = 5.0  # [s] of a segment
 PAUSE = 1.0  # [s] between segments
+INDEPENDENT = 10  # half seconds of a segment; even, so that they cancel
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,11 @@ class Counting:
     pot_offset: float  # [m]
 
 
+def scatter_of_mean(value: float, sigma: float) -> Uncertain:
+    """A tabulated value whose own standard deviation is sigma, as readings whose mean is as uncertain."""
+    return Uncertain(value, sigma * INDEPENDENT**0.5)
+
+
 def streams(conditions: Sequence[Condition], counting: Counting) -> list[Stream]:
     """The segments one after the other, as the channels of a recording."""
     seconds = np.arange(round(RATE * DURATION)) / RATE
@@ -54,15 +62,15 @@ def streams(conditions: Sequence[Condition], counting: Counting) -> list[Stream]
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
         Stream("carriage_encoder", times, _travel([c.carriage_speed for c in conditions], counting.carriage)),
         Stream(
-            "sinkage_pot", times, (_all([c.sinkage for c in conditions]) - counting.pot_offset) / counting.pot_scale
+            "sinkage_pot", times, (_all([c.sinkage for c in conditions], 3) - counting.pot_offset) / counting.pot_scale
         ),
     ]
     if any(c.current is not None for c in conditions):
-        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions])))
+        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], 4)))
     axes = np.zeros((len(times), 6))
-    axes[:, 0] = _all([c.drawbar_pull for c in conditions])
-    axes[:, 1] = _all([c.lateral_force for c in conditions])
-    axes[:, 2] = _all([c.load for c in conditions])
+    axes[:, 0] = _all([c.drawbar_pull for c in conditions], 0)
+    axes[:, 1] = _all([c.lateral_force for c in conditions], 1)
+    axes[:, 2] = _all([c.load for c in conditions], 2)
     return [*found, Stream("wrench", times, axes)]
 
 
@@ -74,8 +82,10 @@ def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
     return np.asarray(np.round(travel.ravel() / per_count), dtype=np.int64)
 
 
-def _all(values: Sequence[Uncertain | None]) -> Array:
-    """One array of mean ± standard deviation in turn, segment by segment; zero where nothing was measured."""
-    sign = np.where(np.arange(round(RATE * DURATION)) % 2 == 0, 1.0, -1.0)
+def _all(values: Sequence[Uncertain | None], channel: int) -> Array:
+    """One array of mean ± standard deviation, segment by segment; zero where nothing was measured."""
+    order = np.random.default_rng(channel)
+    turns = np.repeat([1.0, -1.0], INDEPENDENT // 2)
+    length = round(RATE * DURATION / INDEPENDENT)
     known = [value or Uncertain(0.0) for value in values]
-    return np.concatenate([value.value + value.sigma * sign for value in known])
+    return np.concatenate([v.value + v.sigma * np.repeat(order.permutation(turns), length) for v in known])

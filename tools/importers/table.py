@@ -20,7 +20,7 @@ from estimator.settings import Uncertain
 from tools.importers import Progress, positive
 from tools.importers._files import RigFileError, Table, find, number, numbers, read_table, read_text
 from tools.importers._recording import configuration, write
-from tools.importers._segments import Condition, Counting, streams
+from tools.importers._segments import Condition, Counting, scatter_of_mean, streams
 
 NAME = "table"
 SUMMARY = "steady states from a table, one condition a row: slip, load, drawbar pull, sinkage, torque"
@@ -90,10 +90,10 @@ def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Cond
             Condition(
                 rim_speed=args.speed * min(1.0, 1.0 + slip),
                 carriage_speed=args.speed * min(1.0, 1.0 - slip),
-                sinkage=Uncertain(sinkage, args.sinkage_sigma),
+                sinkage=scatter_of_mean(sinkage, args.sinkage_sigma),
                 load=Uncertain(load),
-                drawbar_pull=Uncertain(pull, args.drawbar_pull_sigma),
-                current=Uncertain(torque, args.torque_sigma),
+                drawbar_pull=scatter_of_mean(pull, args.drawbar_pull_sigma),
+                current=scatter_of_mean(torque, args.torque_sigma),
             )
         )
     return conditions

@@ -209,9 +209,9 @@ def _fluctuation(values: Array) -> Array:
 
 
 def _streams(trial: Trial, lag: float, pull: str, concealed: set[str]) -> list[Stream]:
-    """The channels over the span that both logs cover."""
+    """The channels from the start of the wheel, before which there are no forces, to where either log ends."""
     rig, sensor = trial.rig, trial.sensor
-    shared = (rig.t >= lag) & (rig.t <= lag + sensor.t[-1])
+    shared = rig.t <= lag + sensor.t[-1]
     times = stamps(rig.start, rig.t)[shared]
     wheel = counts(rig.t, rig.rim_speed / RADIUS, WHEEL_COUNT)
     carriage = counts(rig.t, rig.carriage_speed, CARRIAGE_COUNT)

@@ -10,6 +10,7 @@ from drivers.decoder import Decoder
 from drivers.errors import DeviceError, one_line
 from drivers.link import Chunk, Link
 from drivers.queue import ReadingQueue
+from estimator.patience import waited
 
 BACKOFF_FIRST = 0.1  # [s]
 BACKOFF_LAST = 5.0  # [s]
@@ -76,8 +77,7 @@ class Reader:
     def stop(self, timeout: float = 0.2) -> bool:
         """End the thread and close the device; False if it did not end within `timeout` [s]."""
         self._stop.set()
-        if self._thread is not None:
-            self._thread.join(timeout)
+        waited(lambda: not self.alive, timeout)
         return not self.alive
 
     def stats(self) -> ReaderStats:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import pty
+import select
 import time
 import tty
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,14 +86,24 @@ class Plug:
         self._master = -1
 
     def send(self, data: bytes) -> None:
+        """Now or never, as on a wire: BlockingIOError if nobody reads."""
         os.write(self._master, data)
+
+    def deliver(self, data: bytes) -> None:
+        """All of it, however slow the reader is."""
+        view = memoryview(data)
+        while view:
+            _, writable, _ = select.select([], [self._master], [], 0.01)
+            if writable:
+                with suppress(BlockingIOError):
+                    view = view[os.write(self._master, view) :]
 
     def close(self) -> None:
         if self._master >= 0:
             os.close(self._master)
 
 
-def wait_until(condition, limit=10.0) -> bool:
+def wait_until(condition, limit=120.0) -> bool:
     """Poll until the condition holds; the limit only ends a test that fails."""
     end = time.monotonic() + limit
     while not condition():

@@ -37,7 +37,7 @@ def children(folder):
 def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
     folder = tmp_path / "run"
     command = [*GRITD, "demo", "--seconds", "5", "--plant", "linear", "--output", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     lines = done.stdout.splitlines()
     assert any(re.match(r" +\d+ s \S+ +slip +-?\d+\.\d% W +\d+\.\d N c +\d+ ± +\d+ Pa tan φ", line) for line in lines)
@@ -58,9 +58,9 @@ def test_a_demo_that_is_stopped_leaves_no_process_behind(number, tmp_path):
     with subprocess.Popen(
         [*GRITD, "demo", "--output", str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        assert wait_until(lambda: len(children(tmp_path)) == 2 or process.poll() is not None, 30.0)
+        assert wait_until(lambda: len(children(tmp_path)) == 2 or process.poll() is not None)
         process.send_signal(number)
-        assert process.wait(30) == 130
+        assert process.wait(120) == 130
         assert process.stderr.read() == ""
     assert not children(tmp_path)
 
@@ -70,7 +70,7 @@ def test_a_child_that_dies_is_named_with_its_last_words():
         pytest.raises(CommandError, match=r"the daemon ended early \(exit 2\): gritd: nowhere.yaml: .*"),
         demo.Child(Ending(), "daemon", "tools.cli", "run", "--config", "nowhere.yaml") as child,
     ):
-        child.wait_for("device ", 30.0)
+        child.wait_for("device ", 120.0)
 
 
 def test_an_impossible_length_is_one_line():

@@ -36,7 +36,7 @@ class Rig:
         assert wait_until(lambda: self.reader.stats().state == "OPEN")
 
     def send(self, count, device_us=None):
-        self.plug.send(self.wire.encode("wheel_encoder", [count], device_us))
+        self.plug.deliver(self.wire.encode("wheel_encoder", [count], device_us))
 
     def receive(self, readings):
         got = []
@@ -59,7 +59,7 @@ def test_values_arrive_stamped_and_in_order(rig):
     rig.open()
     for n in range(20):
         rig.send(n, 1000 * n)
-        rig.plug.send(rig.wire.encode("sinkage_pot", [0.1 * n], 1000 * n))
+        rig.plug.deliver(rig.wire.encode("sinkage_pot", [0.1 * n], 1000 * n))
     got = rig.receive(40)
     assert [r.value for r in got if r.channel == "wheel_encoder"] == list(range(20))
     assert [r.value for r in got if r.channel == "sinkage_pot"] == [0.1 * n for n in range(20)]
@@ -79,13 +79,13 @@ def test_without_device_time_the_stamp_is_the_receive_time(rig):
 
 def test_garbage_bad_values_duplicates_and_strangers_are_counted(rig):
     rig.open()
-    rig.plug.send(random.Random(4).randbytes(300) + b"\n\0")
+    rig.plug.deliver(random.Random(4).randbytes(300) + b"\n\0")
     rig.send(5, 100)
-    rig.plug.send(rig.wire.encode("sinkage_pot", [float("nan")], 200))
-    rig.plug.send(rig.wire.encode("sinkage_pot", [5.1], 300))
-    rig.plug.send(rig.wire.encode("stranger", [1], 300))
+    rig.plug.deliver(rig.wire.encode("sinkage_pot", [float("nan")], 200))
+    rig.plug.deliver(rig.wire.encode("sinkage_pot", [5.1], 300))
+    rig.plug.deliver(rig.wire.encode("stranger", [1], 300))
     twice = rig.wire.encode("wheel_encoder", [6], 400)
-    rig.plug.send(twice + twice)
+    rig.plug.deliver(twice + twice)
     assert [r.value for r in rig.receive(2)] == [5, 6]
     assert wait_until(lambda: rig.reader.stats().frames == 6)
     stats = rig.reader.stats()
@@ -118,7 +118,7 @@ def test_unplugged_and_back_many_times_without_losing_a_descriptor(tmp_path):
         start = time.monotonic()
         assert wait_until(lambda: rig.reader.stats().state == "OPEN")
         back.append(time.monotonic() - start)
-    assert descriptors() == before
+    assert descriptors() <= before
     assert rig.reader.stats().reopened == 10
     assert "tty" in rig.reader.stats().last_error
     print(f"noticed within {max(noticed) * 1e3:.1f} ms, back within {max(back) * 1e3:.0f} ms of plugging in")
@@ -136,7 +136,7 @@ def test_a_hundred_unpluggings(tmp_path):
         assert wait_until(lambda: rig.reader.stats().state == "WAITING")
         rig.plug.plug_in()
         assert wait_until(lambda: rig.reader.stats().state == "OPEN")
-    assert descriptors() == before and rig.reader.stats().reopened == 100
+    assert descriptors() <= before and rig.reader.stats().reopened == 100
     rig.close()
 
 
@@ -182,9 +182,8 @@ def test_stop_ends_the_thread_in_a_fifth_of_a_second(tmp_path, plugged):
         rig.plug.unplug()
     rig.reader.start()
     assert wait_until(lambda: rig.reader.stats().state == "OPEN" or not plugged)
-    before = threading.active_count()
     assert rig.reader.stop(5.0)
-    assert threading.active_count() == before - 1
+    assert not any(thread.name == "reader encoders" for thread in threading.enumerate())
     assert rig.reader.stats().state == "ENDED"
     rig.close()
 
@@ -287,7 +286,7 @@ def test_the_thread_survives_any_byte_stream(framing):
     chunks = [rng.randbytes(64) if n % 2 else bytes(rng.choices(alphabet, k=64)) for n in range(20_000)]
     reader = Reader("dev", NoiseLink(chunks), built.decoder, ReadingQueue())
     reader.start()
-    assert wait_until(lambda: not reader.alive, 30.0)
+    assert wait_until(lambda: not reader.alive)
     stats = reader.stats()
     assert stats.state == "ENDED" and stats.bytes == 64 * 20_000
     assert stats.last_error == "" and stats.bad > 1000

@@ -8,13 +8,14 @@ from threading import Thread
 
 from estimator.daemon.ending import Ending
 
-SIGNALS = 3000  # a threading.Event hangs within the first few hundred
+SIGNALS = 1000  # a threading.Event hangs within the first few hundred
 MANY = f"""
 import faulthandler, random, signal
 from estimator.daemon.ending import Ending
-faulthandler.dump_traceback_later(60.0, exit=True)
 rng = random.Random(1)
-for _ in range({SIGNALS}):
+for number in range({SIGNALS}):
+    if number % 100 == 0:
+        faulthandler.dump_traceback_later(300.0, exit=True)
     ending = Ending()
     signal.signal(signal.SIGALRM, lambda *_: ending.set())
     signal.setitimer(signal.ITIMER_REAL, rng.uniform(20e-6, 300e-6))

@@ -5,21 +5,31 @@ from __future__ import annotations
 import json
 import math
 import os
+import pty
 import re
+import signal
 import socket
 import stat
+import subprocess
+import sys
+import termios
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
+from estimator import patience
 from estimator.daemon import notify
 from estimator.daemon.health import Pulse, silent
 from estimator.daemon.notify import Notifier
 from estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
-from estimator.recording.retention import trim
+from estimator.record import CHANNEL_BITS
+from estimator.recording.retention import sweep, trim
 from tools import monitor, status
 from tools.command import CommandError
 
+ROOT = Path(__file__).parent.parent
 REPORT = {
     "pid": 1,
     "uptime": 3.0,
@@ -48,7 +58,7 @@ def manager(tmp_path):
     """A service manager's socket, and the environment it gives."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(tmp_path / "notify"))
-        listener.settimeout(5.0)
+        listener.settimeout(60.0)
         yield listener, {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "3000000"}
 
 
@@ -60,6 +70,29 @@ def test_messages_reach_the_service_manager(manager):
     assert listener.recv(1000) == b"READY=1\nSTATUS=two lines"
     notifier.tell(notify.reloading())
     assert re.fullmatch(rb"RELOADING=1\nMONOTONIC_USEC=\d+", listener.recv(1000))
+
+
+def test_a_state_is_told_again_to_a_manager_that_was_behind(manager):
+    """Its socket takes a few datagrams; strokes and status are passed over, a state is not."""
+    listener, environment = manager
+    notifier = Notifier(environment)
+    for _ in range(1000):
+        notifier.tell(notify.WATCHDOG)
+    notifier.tell(notify.READY)
+    taken = drained(listener)
+    assert 0 < len(taken) < 1000 and set(taken) == {b"WATCHDOG=1"}
+    notifier.tell(notify.WATCHDOG)
+    assert drained(listener) == [b"READY=1", b"WATCHDOG=1"]
+
+
+def drained(listener):
+    """All datagrams that wait."""
+    listener.setblocking(False)
+    taken = []
+    with suppress(BlockingIOError):
+        while True:
+            taken.append(listener.recv(1000))
+    return taken
 
 
 @pytest.mark.parametrize(
@@ -86,6 +119,22 @@ def test_a_pulse_is_lost_after_its_patience_and_found_again():
     assert [silent([pulse]) for _ in range(4)] == ["", "", "loop", "loop"]
     beats[0] += 1
     assert silent([pulse]) == ""
+
+
+def test_patience_counts_looks_not_the_time_in_which_it_was_held_up(monkeypatch):
+    looks = []
+    monkeypatch.setattr(patience.time, "sleep", looks.append)
+    assert patience.waited(lambda: False, 1.0) == 0.0 and len(looks) == 100 and sum(looks) == pytest.approx(1.0)
+    looks.clear()
+    assert patience.waited(lambda: len(looks) == 25, 1.0) == pytest.approx(0.75)
+    assert patience.waited(lambda: True, 1.0) == 1.0 and patience.waited(lambda: True, 0.0) == 0.0
+
+
+def test_what_a_killed_daemon_had_only_begun_is_swept_away(tmp_path):
+    for name in (".a.mcap.new", "a.mcap", ".gritd.lock", "b.new"):
+        (tmp_path / name).touch()
+    sweep(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".gritd.lock", "a.mcap", "b.new"]
 
 
 def test_the_oldest_closed_recordings_go_first(tmp_path):
@@ -123,12 +172,13 @@ def test_reports_are_lines_of_strict_json_ten_a_second_at_most(publisher):
 
 
 def test_a_client_that_does_not_read_is_left_and_others_are_served(publisher, monkeypatch):
-    lines = {"text": "x" * 100_000, **REPORT}
+    lines = {"text": "x" * 40_000, **REPORT}
     monkeypatch.setattr(publisher, "_report", lambda: lines)
     with status.connected(str(publisher.path)), status.connected(str(publisher.path)) as eager:
-        for _, report in zip(range(10), status.reports(eager), strict=False):
-            assert report["pid"] == 1
-        assert publisher.alive and len(publisher._clients) == 1
+        served = iter(status.reports(eager))
+        while len(publisher._clients) != 1:
+            assert next(served)["pid"] == 1
+        assert next(served)["pid"] == 1 and publisher.alive
 
 
 def test_more_clients_than_there_is_room_for_are_turned_away(publisher):
@@ -195,3 +245,50 @@ def test_the_monitor_shows_channels_devices_and_log(publisher, capsys):
     out = capsys.readouterr().out
     for words in ("wheel_encoder stale", "WAITING", "cannot open", "7 ticks, 2 missed", "run.mcap"):
         assert words in out
+
+
+TICK = {
+    **{key: 12345.678 for _, name, sigma, *_ in monitor.SHOWN for key in (name, sigma)},
+    **{"separability": 1.0, "consistency": 1.0, "updates": 10**6, "resets": 10},
+    **dict.fromkeys(("late", "duplicates", "invalid", "jumps"), 10**5),
+}
+LATE = dict.fromkeys(("late_50", "late_99", "late_999", "late_max"), 0.01234)
+DEVICE = {**REPORT["devices"]['a"b'], "state": "OPEN", "rate": 1000.0, "last_error": ""}
+HEALTHY = {
+    **REPORT,
+    **{"status": "STANDSTILL", "flags": ["NOT_SEPARABLE", "K_ESTIMATED"], "uptime": 1e6, "tick": TICK},
+    "channels": dict.fromkeys(CHANNEL_BITS, "stale"),
+    "loop": {**REPORT["loop"], **LATE, "ticks": 10**8, "missed": 10**5},
+    "devices": {"encoders": DEVICE, "bus": DEVICE},
+}
+
+
+def test_the_monitor_fits_a_terminal_of_80_by_24_and_tells_of_trouble_first():
+    picture = list(monitor.lines(HEALTHY))
+    assert len(picture) <= 24 and max(map(len, picture)) <= 80
+    log = {**REPORT["log"], "state": "degraded", "error": "run.mcap: cannot write: No space left on device"}
+    sick = list(monitor.lines({**REPORT, "hanging": "loop", "log": log}))
+    assert sick[1:4] == [
+        "! hanging: loop",
+        '! a"b WAITING cannot open',
+        "! log degraded run.mcap: cannot write: No space left on device",
+    ]
+
+
+def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
+    """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never wrapped."""
+    master, slave = pty.openpty()
+    termios.tcsetwinsize(slave, (10, 40))
+    command = [sys.executable, "-m", "tools.cli", "monitor", "--socket", str(publisher.path)]
+    child = subprocess.Popen(command, stdout=slave, cwd=ROOT, env={**os.environ, "TERM": "xterm"})
+    os.close(slave)
+    seen = ""
+    while seen.count(monitor.HOME) < 3:
+        seen += os.read(master, 4096).decode(errors="replace")
+    child.send_signal(signal.SIGINT)
+    assert child.wait(120) == 130
+    seen += os.read(master, 4096).decode(errors="replace")
+    os.close(master)
+    assert seen.startswith(monitor.OPEN) and seen.endswith(monitor.CLOSE)
+    picture = re.sub(r"\033\[[?\d]*[A-Za-z]", "", seen.split(monitor.HOME)[2]).splitlines()
+    assert len(picture) == 10 and max(map(len, picture)) <= 40 and picture[1] == '! a"b WAITING cannot open'

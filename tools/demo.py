@@ -26,8 +26,8 @@ from tools.plant import PlantKind
 from tools.testbed import NAME, PLAYED, SHORTEST
 from tools.wires import CanKind
 
-READY = 30.0  # [s] the longest that testbed or daemon may take to start
-STOP = 5.0  # [s] the longest a child may take to end
+READY = 60.0  # [s] the longest that testbed or daemon may take to start
+STOP = 20.0  # [s] the longest a child may take to end
 DEVICES = 2  # of the packaged testbed
 
 

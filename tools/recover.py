@@ -44,7 +44,7 @@ def recover(recording: Recording, target: Path) -> None:
     the file cannot be written; it is then removed.
     """
     file = McapFile(target, library=LIBRARY)
-    with file.discarding():
+    with file.beginning():
         for source in recording.sources.values():
             file.define(source.schema, source.channel)
         for name, entries in recording.metadata.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -23,22 +24,30 @@ Figure = dict[str, Any]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run every scenario and write the page; exit 1, and no page, if one fails."""
+    """Run every scenario and write the page. Exit 1 if one fails, without a page, or a figure is above its limit."""
     parser = Parser(prog="python -m tools.reliability", description="Run the scenarios and write docs/reliability.md.")
     parser.add_argument("--quick", action="store_true", help="without the long ones")
     parser.add_argument("--figures", metavar="FILE", help="write the page from figures measured before")
     arguments = parser.parse_args(argv)
     if arguments.figures:
-        PAGE.write_text(page(_read(Path(arguments.figures))), encoding="utf-8")
-        return DONE
+        return _write(Path(arguments.figures))
     with tempfile.TemporaryDirectory() as folder:
         figures = Path(folder) / "figures.jsonl"
         began = time.monotonic()
         if _run(figures, arguments.quick):
             return FAILED
         print(f"all scenarios in {time.monotonic() - began:.0f} s")
-        PAGE.write_text(page(_read(figures)), encoding="utf-8")
-    return DONE
+        return _write(figures)
+
+
+def _write(path: Path) -> int:
+    """The page from collected figures; the exit code."""
+    figures = _read(path)
+    PAGE.write_text(page(figures), encoding="utf-8")
+    above = [figure for figure in figures if _above(figure)]
+    for f in above:
+        print(f"{f['row']}: {f['name']}: {f['value']:.3g} {f['unit']}, limit {f['limit']:g}", file=sys.stderr)
+    return FAILED if above else DONE
 
 
 def _run(figures: Path, quick: bool) -> int:
@@ -54,7 +63,19 @@ def _read(path: Path) -> list[Figure]:
 def page(figures: Sequence[Figure]) -> str:
     """The page: its hand-written head, then one row for each fault and thing measured."""
     head = PAGE.read_text(encoding="utf-8").partition(BEGIN)[0]
-    return head + BEGIN + "\n".join(["", *_table(figures)]) + "\n"
+    return head + BEGIN + "\n".join(["", *_circumstances(figures), "", *_table(figures)]) + "\n"
+
+
+def _circumstances(figures: Sequence[Figure]) -> Iterator[str]:
+    loads = [figure["load"] for figure in figures]
+    yield (
+        f"Measured on {os.cpu_count()} cores with a load average of {statistics.median(loads):.1f} (median; largest"
+        f" {max(loads):.1f}); what is above its limit stands in bold."
+    )
+
+
+def _above(figure: Figure) -> bool:
+    return figure["limit"] is not None and figure["value"] > figure["limit"]
 
 
 def _table(figures: Sequence[Figure]) -> Iterator[str]:
@@ -66,8 +87,9 @@ def _table(figures: Sequence[Figure]) -> Iterator[str]:
     for row, name, level in sorted(groups, key=lambda key: key[0].lower()):
         found = groups[row, name, level]
         worst, limit, unit = max(f["value"] for f in found), found[0]["limit"], found[0]["unit"]
-        bound = "" if limit is None else f"{limit:g} {unit}".strip()
-        yield f"| {row} | {name} | {worst:.3g} {unit} | {bound} | {len(found)} | {level} |".replace("  ", " ")
+        bound, shown = "" if limit is None else f"{limit:g} {unit}".strip(), f"{worst:.3g} {unit}".strip()
+        shown = f"**{shown}**" if any(map(_above, found)) else shown
+        yield f"| {row} | {name} | {shown} | {bound} | {len(found)} | {level} |".replace("  ", " ")
 
 
 if __name__ == "__main__":

@@ -2,40 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 import os
-import signal
-import sys
-import threading
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from drivers.build import build_readers
-from drivers.queue import ReadingQueue
-from estimator.config import Configuration, load
-from estimator.daemon import WARNING, Daemon, DaemonError, locked, real_time, run_path
-from estimator.daemon.clock import Clock
-from estimator.daemon.publish import Publisher, PublishError
-from estimator.recording import RecordingError, RunInfo
-from estimator.recording.writer import WriterStatus
-from tools.command import DONE, FAILED, CommandError, Parser, number, whole
-from tools.telemetry import Reporter
-from tools.watcher import Watcher
+from estimator.config import load
+from estimator.lock import LockError, locked
+from estimator.recording import RunInfo
+from tools.command import FAILED, CommandError, Parser, number, whole
 
 SOCKET = "gritd.sock"
-
-
-class QueueSource:
-    """The reading queue as the loop sees it."""
-
-    def __init__(self, queue: ReadingQueue) -> None:
-        self._queue = queue
-        self.drain = queue.drain
-
-    def dropped(self) -> int:
-        return self._queue.counts().dropped
 
 
 def main(argv: Sequence[str]) -> int:
@@ -46,54 +23,16 @@ def main(argv: Sequence[str]) -> int:
     folder = Path(arguments.directory or configuration.settings.logging.directory)
     try:
         with locked(folder):
-            return _serve(configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status)
-    except (DaemonError, RecordingError, PublishError) as error:
+            from tools.serve import serve  # takes a second: whoever is refused need not wait for it
+
+            return serve(configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status)
+    except LockError as error:
         raise CommandError(error, FAILED) from None
-
-
-def _serve(configuration: Configuration, folder: Path, run: RunInfo, socket: Path, status_every: float) -> int:
-    clock, queue = Clock(), ReadingQueue()
-    notice = real_time()
-    readers = build_readers(configuration.settings, clock.now, queue)
-    path = run_path(folder, run.name, clock.now())
-    daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock)
-    publisher = Publisher(socket, Reporter(daemon, readers, queue, notice))
-    watcher = Watcher(configuration.source, readers, queue, publisher, status_every)
-    for ending in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(ending, lambda *_: daemon.stop())
-    signal.signal(signal.SIGHUP, lambda *_: watcher.ask_reload())
-    print(f"logging to {path}", flush=True)
-    if notice:
-        print(notice, file=sys.stderr, flush=True)
-        daemon.say(WARNING, notice)
-    threading.excepthook = _say_in_a_line
-    logging.getLogger("can").setLevel(logging.CRITICAL)  # a reader says the same, once
-    with closing(publisher):
-        publisher.start()
-        last = daemon.serve(watcher)
-    watcher.report(daemon)
-    print(closing_line(last), flush=True)
-    return DONE if last.state == "closed" else FAILED
-
-
-def _say_in_a_line(died: threading.ExceptHookArgs) -> None:
-    """What kills a thread, without a traceback; the daemon notices and ends with a reason."""
-    name = died.thread.name if died.thread else "a thread"
-    print(f"{name}: {died.exc_type.__name__}: {died.exc_value}", file=sys.stderr, flush=True)
 
 
 def _socket_path(folder: Path, given: str | None) -> Path:
     """The given path; under a service manager its runtime directory, otherwise beside the logs."""
     return Path(given) if given else Path(os.environ.get("RUNTIME_DIRECTORY", folder)) / SOCKET
-
-
-def closing_line(status: WriterStatus) -> str:
-    files = ", ".join(map(str, status.files))
-    line = (
-        f"log {status.state}: accepted {status.accepted} = written {status.written} + dropped {status.dropped}"
-        f" + queued {status.queued}; {files}"
-    )
-    return f"{line}; {status.error}" if status.error else line
 
 
 def _run_info(run: RunInfo, arguments: object) -> RunInfo:

@@ -33,6 +33,7 @@ from estimator.readings import ENCODERS, Reading
 from estimator.record import TICK_NAMES
 from estimator.settings import Rates
 from estimator.sync import NS
+from tools.cli import guarded
 from tools.command import DONE, FAILED, Parser
 from tools.demo import Child
 from tools.status import connected, reports
@@ -40,6 +41,7 @@ from tools.testbed import experiment
 
 LAP = 300.0  # [s] the simulated run that is driven again and again
 SLOPE = 1.0  # [MB/h] largest growth of memory
+PREPARED, READY = 1200.0, 120.0  # [s] the longest it may take to simulate the run, and to open the devices
 SETTLED = 0.2  # share of the time after which memory has settled
 READ = [
     TICK_NAMES.index(name) for name in ("cohesion", "tan_phi", "cohesion_sigma", "tan_phi_sigma", "resets", "updates")
@@ -142,12 +144,12 @@ def on_wires(arguments: Namespace) -> list[str]:
     with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
         told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
         with Child(Ending(), "testbed", "tools.testbed", *told) as testbed:
-            path = testbed.wait_for("configuration ", 120.0).split(" ", 1)[1]
+            path = testbed.wait_for("configuration ", PREPARED).split(" ", 1)[1]
             with Child(
                 Ending(), "daemon", "tools.cli", "run", "--config", path, "--name", "soak", "--status", "0"
             ) as daemon:
-                daemon.wait_for("device ", 60.0)
-                daemon.wait_for("device ", 60.0)
+                daemon.wait_for("device ", READY)
+                daemon.wait_for("device ", READY)
                 testbed.tell("play")
                 looks = list(watched(Path(name) / "gritd.sock", seconds))
                 words = daemon.stop()
@@ -175,6 +177,7 @@ def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
         report["memory"] = resident(pid)
         report["descriptors"] = len(os.listdir(f"/proc/{pid}/fd"))
         report["threads"] = len(os.listdir(f"/proc/{pid}/task"))
+        report["load"] = os.getloadavg()[0]
         yield report
         time.sleep(min(5.0, seconds / 50))
 
@@ -186,7 +189,8 @@ def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Nam
     print(
         f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
         f" memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
-        f" {last['descriptors']} descriptors, {last['threads']} threads"
+        f" {last['descriptors']} descriptors, {last['threads']} threads, real time: {last['real_time']},"
+        f" load average {np.median([look['load'] for look in looks]):.1f} (median)"
     )
     print(f"lost on the wires: {json.dumps({name: device['lost'] for name, device in last['devices'].items()})}")
     for name in ("late_50", "late_99", "late_999", "late_max"):
@@ -205,4 +209,4 @@ def more(what: str, looks: Sequence[dict[str, Any]]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(guarded(main))

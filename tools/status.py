@@ -14,7 +14,7 @@ from tools.command import DONE, FAILED, CommandError, Parser
 from tools.run import SOCKET
 
 PLACES = (Path("/run/gritd") / SOCKET, Path("runs") / SOCKET)
-PATIENCE = 2.0  # [s]
+PATIENCE = 10.0  # [s] with a daemon, or a computer, that is held up
 MAX_LINE = 1 << 20  # [bytes] of a report
 
 Report = dict[str, Any]
@@ -138,12 +138,17 @@ def prometheus(report: Report) -> Iterator[str]:
     for name, (kind, text, path) in METRICS.items():
         value = looked_up(report, path)
         if value is not None:
-            yield from (f"# HELP {name} {text}", f"# TYPE {name} {kind}", f"{name} {float(value):.17g}")
+            yield from (f"# HELP {name} {text}", f"# TYPE {name} {kind}", f"{name} {_value(value)}")
     for counter in PER_DEVICE:
         name = f"gritd_device_{counter}_total"
-        yield f"# TYPE {name} counter"
+        yield from (f"# HELP {name} {counter} of a device", f"# TYPE {name} counter")
         for device, stats in report["devices"].items():
-            yield f'{name}{{device="{_label(device)}"}} {float(stats[counter]):.17g}'
+            yield f'{name}{{device="{_label(device)}"}} {_value(stats[counter])}'
+
+
+def _value(value: float) -> str:
+    """The shortest digits that read back as the same number."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def _label(text: str) -> str:

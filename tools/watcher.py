@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from math import degrees
+from typing import TextIO
 
 from drivers.queue import ReadingQueue
 from drivers.reader import Reader, ReaderStats
@@ -49,7 +51,7 @@ class Watcher:
             self._tidy(daemon)
         self._notify(daemon)
         if self._due(self._every):
-            print(status_line(daemon), flush=True)
+            say(status_line(daemon))
         self._calls += 1
 
     def _due(self, period: float) -> bool:
@@ -85,7 +87,7 @@ class Watcher:
             self._tell(daemon, WARNING if daemon.health else INFO, text)
 
     def _tell(self, daemon: Daemon, level: int, text: str) -> None:
-        print(text.strip(), file=sys.stderr if level > INFO else sys.stdout, flush=True)
+        say(text.strip(), sys.stderr if level > INFO else sys.stdout)
         daemon.say(level, text.strip())
 
     def _notify(self, daemon: Daemon) -> None:
@@ -127,18 +129,27 @@ class Watcher:
         """Every counter, once, at the end."""
         self._notifier.tell(notify.STOPPING)
         counts = self._queue.counts()
-        print(
+        say(
             f"queue: received {counts.received} = processed {counts.processed} + dropped {counts.dropped}"
             f" + queued {counts.queued}"
         )
         for reader in self._readers:
             s = reader.stats()
-            print(
+            say(
                 f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, {s.garbage} garbage bytes,"
                 f" {s.lost} lost, {s.duplicates} duplicates, {s.quarantined} quarantined, {s.incomplete} incomplete,"
                 f" {s.unknown} unknown, {s.errors} bus errors, reopened {s.reopened} times"
             )
-        print(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")
+        say(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")
+
+
+def say(text: str, stream: TextIO | None = None) -> None:
+    """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon goes on."""
+    out = stream or sys.stdout
+    try:
+        print(text, file=out, flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
 
 
 def status_line(daemon: Daemon) -> str:

@@ -7,7 +7,6 @@ one hangs, `health` names it and the watchdog is no longer stroked.
 
 from __future__ import annotations
 
-import fcntl
 import gc
 import os
 import sys
@@ -25,6 +24,7 @@ from estimator.daemon.ending import Ending
 from estimator.daemon.health import Pulse, silent
 from estimator.daemon.loop import Change, Loop, LoopRecord, Source
 from estimator.daemon.reload import needs_restart
+from estimator.patience import waited
 from estimator.pipeline import Pipeline, TickRecord
 from estimator.readings import Reading
 from estimator.record import LOOP_FIELDS, TICK_FIELDS
@@ -163,20 +163,30 @@ class Daemon:
         with _undisturbed():
             loop.start()
             while not self._ending.wait(WATCH):
-                self._check(loop)
-                self._rotate()
-                watch(self)
-            end = time.monotonic() + STOP
-            for reader in self.readers:
-                reader.stop(max(end - STOP / 2 - time.monotonic(), 0.0))
-            self._loop_stop.set()
-            loop.join(max(end - STOP / 4 - time.monotonic(), 0.0))
-        return self._close(end)
+                self._look(loop, watch)
+            left = self._drained(loop)
+        return self._close(left)
+
+    def _drained(self, loop: Thread) -> float:
+        """End the readers, then the loop, which takes what they left; what remains of STOP for the writer [s]."""
+        for reader in self.readers:
+            reader.stop(0.0)
+        left = STOP / 2 + waited(lambda: not any(reader.alive for reader in self.readers), STOP / 2)
+        self._loop_stop.set()
+        return left / 2 + waited(lambda: not loop.is_alive(), left / 2)
 
     def fail(self, reason: str) -> None:
         """Stop, with a reason; the first one given is the one told."""
         self._failure = self._failure or reason
         self._ending.set()
+
+    def _look(self, loop: Thread, watch: Callable[[Daemon], None]) -> None:
+        try:
+            self._check(loop)
+            self._rotate()
+            watch(self)
+        except Exception as error:  # a fault of ours: named, and the log is closed all the same
+            self.fail(f"the watch failed: {type(error).__name__}: {error}")
 
     def _run_loop(self) -> None:
         try:
@@ -207,10 +217,10 @@ class Daemon:
             self.loop.ask(Change(self.configuration.text))
             self._part_began = time.monotonic()
 
-    def _close(self, end: float) -> WriterStatus:
+    def _close(self, patience: float) -> WriterStatus:
         if self._failure:
             self.say(ERROR, self._failure)
-        status = self.writer.stop(max(end - time.monotonic(), 0.0))
+        status = self.writer.stop(patience)
         if self._failure:
             raise DaemonError(self._failure)
         return status
@@ -260,22 +270,6 @@ def real_time() -> str:
         return ""
     except (OSError, AttributeError) as error:
         return f"no real-time scheduling ({getattr(error, 'strerror', None) or error}): ticks may be late under load"
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Only one daemon writes into a log folder. Raises DaemonError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = open(folder / ".gritd.lock", "w")  # noqa: SIM115  held for the life of the daemon
-    except OSError as error:
-        raise DaemonError(f"{folder}: cannot keep logs here: {error.strerror}") from None
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise DaemonError(f"{folder}: another gritd is logging here") from None
-        yield
 
 
 def run_path(folder: Path, name: str, started: int) -> Path:

@@ -8,10 +8,12 @@ from __future__ import annotations
 import os
 import socket
 import time
+from collections import deque
 from collections.abc import Mapping
-from contextlib import suppress
 
 READY, STOPPING, WATCHDOG = "READY=1", "STOPPING=1", "WATCHDOG=1"
+_PASSING = ("STATUS=", WATCHDOG)  # soon said again; anything else is a state the manager waits for
+_MOST = 16  # states that wait for a manager who is behind
 
 
 def reloading() -> str:
@@ -33,11 +35,23 @@ class Notifier:
         wanted = environment.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         timeout = environment.get("WATCHDOG_USEC", "0")
         self.interval = int(timeout) * 1e-6 / 3 if wanted and timeout.isdecimal() else 0.0
+        self._waiting: deque[str] = deque(maxlen=_MOST)
 
     def tell(self, *messages: str) -> None:
         """Send what there is to say, as one datagram. Never waits and never raises: a manager that is gone is no
-        reason to stop."""
-        if not self._address:
-            return
-        with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
-            out.sendto("\n".join(messages).encode(), self._address)
+        reason to stop. A state that one who is behind could not take goes out first the next time."""
+        if self._address:
+            self._waiting.append("\n".join(messages))
+            self._send()
+
+    def _send(self) -> None:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
+            try:
+                while self._waiting:
+                    out.sendto(self._waiting[0].encode(), self._address)
+                    self._waiting.popleft()
+            except BlockingIOError:
+                states = [text for text in self._waiting if not text.startswith(_PASSING)]
+                self._waiting = deque(states, _MOST)
+            except OSError:
+                self._waiting.clear()

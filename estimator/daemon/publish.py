@@ -19,6 +19,8 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+from estimator.patience import waited
+
 INTERVAL = 0.1  # [s] between lines
 MAX_CLIENTS = 16
 STOP = 0.5  # [s] the longest a stop waits
@@ -53,8 +55,7 @@ class Publisher:
     def close(self) -> None:
         """End the thread, close every connection and remove the socket file."""
         self._stop.set()
-        if self.alive:
-            self._thread.join(STOP)
+        waited(lambda: not self.alive, STOP)
         for connection in (*self._clients, self._listener):
             connection.close()
         with suppress(OSError):

@@ -174,7 +174,7 @@ class RunWriter:
         self._pending = _Pending()
         self._file = McapFile(self.path, compression)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
-        with self._file.discarding():
+        with self._file.beginning():
             self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **versions()}))
             self._file.add_metadata(RUN, sealed(RUN, run.entries()))
 

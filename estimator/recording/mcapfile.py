@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
 LIBRARY = "gritd"
+DRAFT = ".new"  # ends the name of a file that is being begun
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of what follows
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
 MESSAGE_DTYPE = np.dtype(
@@ -120,19 +121,29 @@ class McapFile:
         self._span: tuple[int, int] | None = None  # first and last log_time [ns]
         self._length = 0
         self._crc = 0
+        self._draft = path.with_name(f".{path.name}{DRAFT}")
         with reported(path, "create"):
-            self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - it lives as long as the run
-        with self.discarding():
+            if path.exists():
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+            self._file = open(self._draft, "wb", buffering=0)  # noqa: SIM115 - it lives as long as the run
+        with self._discarding():
             self._append(MAGIC + record_bytes(Header(PROFILE, library)))
 
     @contextmanager
-    def discarding(self) -> Iterator[None]:
-        """While a file is begun: if that fails, leave none behind."""
+    def beginning(self) -> Iterator[None]:
+        """What has to stand in the file before anybody may find it: it gets its name then, and none if that fails."""
+        with self._discarding():
+            yield
+            with reported(self.path, "create"):
+                self._draft.rename(self.path)
+
+    @contextmanager
+    def _discarding(self) -> Iterator[None]:
         try:
             yield
         except RecordingError:
             self.abandon()
-            self.path.unlink(missing_ok=True)
+            self._draft.unlink(missing_ok=True)
             raise
 
     def fileno(self) -> int:

@@ -5,6 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from estimator.recording.mcapfile import DRAFT
+
+
+def sweep(folder: Path) -> None:
+    """Delete what a killed daemon had just begun: drafts, without a message in them. Raises OSError."""
+    for draft in folder.glob(f".*.mcap{DRAFT}"):
+        draft.unlink()
+
 
 def trim(folder: Path, cap: float, open_files: Collection[Path]) -> list[Path]:
     """Delete the oldest recordings until all of them take no more than `cap` [bytes]; what was deleted.

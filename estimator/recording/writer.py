@@ -22,6 +22,7 @@ from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from estimator.patience import waited
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter, part_path
 from estimator.recording.cdr import Topic, Values
@@ -121,13 +122,11 @@ class WriterThread:
         A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or an error says that the
         medium has not confirmed what it was given.
         """
-        end = time.monotonic() + timeout
         self._stopping.set()
         if self._thread.ident is None:  # never started
             self._attempt(self._finish)
-        else:
-            self._thread.join(timeout)
-        if not self._sync.stop(max(end - time.monotonic(), 0.0)) and self._state == "closed":
+        left = waited(lambda: not self._thread.is_alive(), timeout)
+        if not self._sync.stop(left) and self._state == "closed":
             self._error = f"{self._parts.files[-1]}: the medium has not confirmed the last of it"
         return self.status()
 
@@ -341,8 +340,7 @@ class _Syncer:
         self._wake.set()
         if self._thread.ident is None:
             self._sync()
-        else:
-            self._thread.join(timeout)
+        waited(lambda: not self.alive, timeout)
         return not self.alive
 
     def request(self, fileno: int) -> None:

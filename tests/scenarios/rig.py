@@ -35,12 +35,13 @@ ROOT = Path(__file__).parents[2]
 TESTBED = config.load(packaged())
 BUS = "udp_multicast" if has_multicast() else "slcan"
 BECOMING = """
-import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast, tools.run
+import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast
+import tools.run, tools.serve
 from drivers.build import build_readers
 build_readers(tools.run.load({config!r}).settings, lambda: 0, None)
 os.setgroups([]); os.setgid({user}); os.setuid({user})
 """
-LIMIT = 30.0  # [s] ends a scenario that has failed
+LIMIT = 120.0  # [s] ends a scenario that has failed
 WIRES = "daemon on wires"
 
 
@@ -129,8 +130,49 @@ class Wires(Rig):
     def __exit__(self, *error):
         self._stop.set()
         if self._player is not None:
-            self._player.join(5.0)
+            self._player.join(LIMIT)
         super().__exit__(*error)
+
+
+class Manager:
+    """The service manager's socket, always read: it holds only a few messages, and what does not fit is lost."""
+
+    def __init__(self, path):
+        self.path = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(str(path))
+        os.chmod(path, 0o777)
+        self._heard, self._seen = [], 0
+        self._thread = Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def _listen(self):
+        while text := self._socket.recv(65536).decode():
+            self._heard.append((time.monotonic(), text))
+
+    def after(self, words):
+        """[when] the next message with these words came, of those not yet asked for; [] if none has."""
+        for number in range(self._seen, len(self._heard)):
+            if words in self._heard[number][1]:
+                self._seen = number + 1
+                return [self._heard[number][0]]
+        return []
+
+    def count(self, words):
+        """Of the messages sent until now, how many have these words."""
+        mark = f"mark {len(self._heard)}"
+        self._send(mark)
+        until(lambda: any(text == mark for _, text in list(self._heard)))
+        return sum(words in text for _, text in list(self._heard))
+
+    def _send(self, text):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.sendto(text.encode(), str(self.path))
+
+    def close(self):
+        self._send("")
+        self._thread.join(LIMIT)
+        self._socket.close()
 
 
 class DaemonProcess:
@@ -144,15 +186,13 @@ class DaemonProcess:
         self._box = tempfile.TemporaryDirectory(prefix="gritd")
         self.folder = config.parent
         self.socket = str(Path(self._box.name) / "gritd.sock")
-        self._notices = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self._notices.bind(str(Path(self._box.name) / "notify"))
+        self._manager = Manager(Path(self._box.name) / "notify")
         os.chmod(self._box.name, 0o777)
-        os.chmod(Path(self._box.name) / "notify", 0o777)
-        environment = {**os.environ, "NOTIFY_SOCKET": str(Path(self._box.name) / "notify"), "PYTHONPATH": str(ROOT)}
+        environment = {**os.environ, "NOTIFY_SOCKET": str(self._manager.path), "PYTHONPATH": str(ROOT)}
         if watchdog:
             environment["WATCHDOG_USEC"] = str(int(watchdog * 1e6))
         becoming = "" if user is None else BECOMING.format(user=user, config=str(config))
-        code = f"{becoming}\n{prelude}\nimport sys, tools.run, tools.cli\nprint('loaded', flush=True)\n"
+        code = f"{becoming}\n{prelude}\nimport sys, tools.run, tools.serve, tools.cli\nprint('loaded', flush=True)\n"
         code += "sys.exit(tools.cli.main(sys.argv[1:]))"
         command = ["--config", str(config), "--socket", self.socket, "--status", "0"]
         self.process = subprocess.Popen(
@@ -181,36 +221,47 @@ class DaemonProcess:
                 os.kill(self.pid, signal.SIGCONT)
             self.process.kill()
         self.process.wait()
-        self._listener.join(5.0)
-        self._notices.close()
+        self._listener.join(LIMIT)
+        self._manager.close()
         self._box.cleanup()
 
     def ready(self):
         """Wait for READY=1 and for both devices to be open."""
         self.notified("READY=1")
-        until(lambda: len(self.lines(" OPEN")) >= 2, lambda: f"devices did not open: {self.text}")
+        self.until(lambda: len(self.lines(" OPEN")) >= 2, "devices did not open")
         return self
 
+    def until(self, condition, complaint, limit=LIMIT):
+        """Wait for the condition, which a daemon that has ended cannot bring about any more."""
+
+        def settled():
+            if self.process.poll() is not None:
+                self._listener.join(LIMIT)
+                assert condition(), f"{complaint}, and has ended: {self.text}"
+            return condition()
+
+        until(settled, lambda: f"{complaint}: {self.text}", limit)
+
     def notified(self, message, limit=LIMIT):
-        """Wait for a message to the service manager that contains this; when it came."""
-        end = time.monotonic() + limit
-        while (left := end - time.monotonic()) > 0:
-            self._notices.settimeout(left)
-            try:
-                if message in self._notices.recv(65536).decode():
-                    return time.monotonic()
-            except TimeoutError:
-                break
-        raise AssertionError(f"no {message} within {limit:g} s: {self.text}")
+        """Wait for the next message to the service manager that contains this; when it came."""
+        found = []
+        self.until(lambda: found or found.extend(self._manager.after(message)) or found, f"no {message}", limit)
+        return found[0]
 
     def strokes(self, seconds):
-        """How often the watchdog is stroked in a time."""
-        end, count = time.monotonic() + seconds, 0
-        while (left := end - time.monotonic()) > 0:
-            self._notices.settimeout(left)
-            with suppress(TimeoutError):
-                count += "WATCHDOG=1" in self._notices.recv(65536).decode()
-        return count
+        """How often the watchdog is stroked in a time from now."""
+        before = self._manager.count("WATCHDOG=1")
+        time.sleep(seconds)
+        return self._manager.count("WATCHDOG=1") - before
+
+    def datagrams(self, port):
+        """Of the daemon's socket on a UDP port: bytes that wait in it, datagrams that the kernel threw away."""
+        held = {os.path.basename(name) for name in map(link_of, Path(f"/proc/{self.pid}/fd").iterdir())}
+        for line in Path("/proc/net/udp").read_text().splitlines()[1:]:
+            words = line.split()
+            if int(words[1].partition(":")[2], 16) == port and f"socket:[{words[9]}]" in held:
+                return int(words[4].partition(":")[2], 16), int(words[12])
+        raise AssertionError(f"no socket on port {port}")
 
     @property
     def text(self):
@@ -221,7 +272,7 @@ class DaemonProcess:
 
     def heard(self, words, count=1, limit=LIMIT):
         """Wait until it has said this so often; when it did for that time."""
-        until(lambda: len(self.lines(words)) >= count, lambda: f"did not say {words!r}: {self.text}", limit)
+        self.until(lambda: len(self.lines(words)) >= count, f"did not say {words!r}", limit)
         return self.lines(words)[count - 1][0]
 
     def status(self):
@@ -242,14 +293,15 @@ class DaemonProcess:
         return time.monotonic()
 
     def descriptors(self):
-        return len(os.listdir(f"/proc/{self.pid}/fd"))
+        """How many are open for long: the fewest of some looks, for a file that is being synced counts twice."""
+        return min(len(os.listdir(f"/proc/{self.pid}/fd")) for _ in range(20) if not time.sleep(0.02))
 
     def threads(self):
         return len(os.listdir(f"/proc/{self.pid}/task"))
 
     def exit_code(self, limit=LIMIT):
         code = self.process.wait(limit)
-        self._listener.join(5.0)
+        self._listener.join(LIMIT)
         return code
 
     def stop(self):
@@ -267,6 +319,14 @@ class DaemonProcess:
         """accepted, written, dropped and queued of its last line."""
         (line,) = [line for _, line in self.said if line.startswith("log closed")]
         return [int(word) for word in line.replace(";", " ").split() if word.isdigit()][:4]
+
+
+def link_of(path):
+    """What a descriptor is, '' if it has just been closed."""
+    try:
+        return os.readlink(path)
+    except OSError:
+        return ""
 
 
 def until(condition, complaint=lambda: "waited in vain", limit=LIMIT):

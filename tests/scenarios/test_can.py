@@ -21,6 +21,7 @@ FAILING = "CAN error frame or failing bus"
 HOSTILE = "hostile CAN or UDP datagram"
 FLOOD = "bus flood"
 UNWANTED = 0x7F0
+WAITING = 50_000  # [bytes] in the socket before a sender waits
 
 multicast = pytest.mark.skipif(not has_multicast(), reason="no interface takes multicast")
 
@@ -28,7 +29,7 @@ multicast = pytest.mark.skipif(not has_multicast(), reason="no interface takes m
 def test_a_bus_that_goes_away_and_comes_back(tmp_path, seed, figure):
     """A serial CAN adapter (slcan) that is pulled out and put back."""
     rng = random.Random(seed)
-    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="slcan") as (wires, daemon):
+    with service(tmp_path, driven(40.0, seed, skip=2.0), bus="slcan") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         time.sleep(rng.uniform(0.0, 0.3))
         wires.bus.plug.unplug()
@@ -37,7 +38,7 @@ def test_a_bus_that_goes_away_and_comes_back(tmp_path, seed, figure):
         wires.bus.plug.plug_in()
         back = time.monotonic()
         daemon.heard("device bus OPEN", 2)
-        figure(FAILING, WIRES, "back after the adapter was put back", time.monotonic() - back, "s", 5.5)
+        figure(FAILING, WIRES, "back after the adapter was put back", time.monotonic() - back, "s", 5.5, real=True)
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         daemon.stop()
     assert verified(daemon.path())
@@ -53,16 +54,22 @@ def daemon_ids():
 def test_error_frames_are_counted_and_survived(tmp_path, seed, figure):
     """python-can filters this bus itself and takes an error frame for a message: so they carry a wanted id."""
     frames, wanted = 50, daemon_ids()[0]
-    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
+    with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         for _ in range(frames):
             wires.bus._bus.send(can.Message(is_error_frame=True, arbitration_id=wanted, is_extended_id=False))
             time.sleep(0.005)
-        daemon.wait_status(lambda report: report["devices"]["bus"]["errors"] >= frames)
-        report = daemon.wait_status(lambda report: report["status"] == "TRACKING")
-        figure(FAILING, WIRES, "error frames not counted", frames - report["devices"]["bus"]["errors"], "", 0)
+        arrived = frames - dropped(wires, daemon)
+        report = daemon.wait_status(lambda report: report["devices"]["bus"]["errors"] >= arrived)
+        figure(FAILING, WIRES, "error frames not counted", arrived - report["devices"]["bus"]["errors"], "", 0)
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
         daemon.stop()
     assert verified(daemon.path())
+
+
+def dropped(wires, daemon):
+    """Datagrams the kernel threw away before the daemon could read them, on a computer that was too slow."""
+    return daemon.datagrams(wires.bus.device.options["port"])[1]
 
 
 @multicast
@@ -77,15 +84,15 @@ def test_hostile_datagrams(tmp_path, seed, figure):
             out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
             for number in range(cases):
                 out.sendto(hostile(rng), address)
-                if number % 20 == 0:
-                    time.sleep(0.003)
-        wires.play(driven(30.0, seed, skip=2.0))
+                while number % 20 == 0 and daemon.datagrams(address[1])[0] > WAITING:
+                    time.sleep(0.001)
+        wires.play(driven(40.0, seed, skip=2.0))
         report = daemon.wait_status(lambda report: report["status"] == "TRACKING")
         counted = report["devices"]["bus"]["bad"] + report["devices"]["bus"]["unknown"]
         figure(HOSTILE, WIRES, "datagrams sent", cases, "")
         figure(HOSTILE, WIRES, "threads lost", threads - daemon.threads(), "", 0)
         figure(HOSTILE, WIRES, "times the bus had to be reopened", report["devices"]["bus"]["reopened"], "", 0)
-        assert counted > 0.9 * cases, f"{counted} of {cases} counted"
+        assert counted > 0.9 * (cases - dropped(wires, daemon)), f"{counted} of {cases} counted"
         daemon.stop()
     assert verified(daemon.path())
 
@@ -113,28 +120,29 @@ GOOD = good_datagram()
 @pytest.mark.parametrize(("rate", "seconds"), [(5_000, 3.0), (12_000, 1.0)])
 def test_bus_flood(tmp_path, seed, rate, seconds, figure):
     """Unwanted frames between the wanted ones: paced, none of those is lost; in a burst every loss is counted."""
-    with service(tmp_path, driven(30.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
+    with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         flood(wires.bus._bus, rate, seconds)
         time.sleep(0.5)
-        report = daemon.status()
-        stats = report["devices"]["bus"]
+        lost, no_room = daemon.status()["devices"]["bus"]["lost"], dropped(wires, daemon)
         daemon.stop()
     gaps = missing_samples(rows(daemon.path(), "/raw/sinkage_pot")["stamp"])
     name = f"wanted frames lost at {rate / 1000:g} k unwanted frames/s"
-    figure(FLOOD, WIRES, name, stats["lost"], "", 0 if rate <= 5000 else None)
-    assert gaps <= stats["lost"], f"{gaps} samples missing, {stats['lost']} frames counted as lost"
+    figure(FLOOD, WIRES, name, lost, "", 0 if rate <= 5000 else None, real=True)
+    figure(FLOOD, WIRES, f"{name} without the kernel's doing", max(lost - no_room, 0), "", 0)
+    assert gaps <= max(lost, no_room), f"{gaps} samples missing, {lost} frames counted as lost"
     assert verified(daemon.path())
 
 
 def flood(bus, rate, seconds):
-    """Frames of an id that nobody wants, in packets of 5 ms."""
+    """Frames of an id that nobody wants, in packets of 5 ms; time that the sender lost is not made up for."""
     message = can.Message(arbitration_id=UNWANTED, data=bytes(8), is_extended_id=False)
-    start, sent = time.monotonic(), 0
-    while (elapsed := time.monotonic() - start) < seconds:
-        while sent < elapsed * rate:
+    end, before, due = time.monotonic() + seconds, time.monotonic(), 0.0
+    while (now := time.monotonic()) < end:
+        due, before = due + min(now - before, 0.02) * rate, now
+        while due >= 1.0:
             bus.send(message)
-            sent += 1
+            due -= 1.0
         time.sleep(0.005)
 
 

@@ -133,7 +133,7 @@ def test_hostile_and_misread_files(name, figure):
     tracemalloc.stop()
     assert "\n" not in str(error.value) and (words in str(error.value) or name in MISREAD)
     spent = min(processor_time(text) for _ in range(3))
-    figure(BOMB, "configuration reader", "processor time to the refusal", spent * 1e3, "ms", 100, slack=3)
+    figure(BOMB, "configuration reader", "processor time to the refusal", spent * 1e3, "ms", 100, real=True)
     figure(BOMB, "configuration reader", "memory", peak / 1e6, "MB", 16)
 
 

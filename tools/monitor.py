@@ -129,7 +129,7 @@ def _belief(tick: Report) -> Iterator[str]:
     )
     yield (
         f"readings      {tick['late']} late, {tick['duplicates']} duplicates, {tick['invalid']} invalid,"
-        f" {tick['jumps']} encoder jumps"
+        f" {tick['jumps']} jumps"
     )
 
 

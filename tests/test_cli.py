@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -143,6 +144,13 @@ def test_reader_that_leaves_is_no_error() -> None:
     command = f"{sys.executable} -m tools.cli check-config | true; exit ${{PIPESTATUS[0]}}"
     run = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True)
     assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_a_terminal_without_greek_letters_gets_question_marks() -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    command = [sys.executable, "-m", "tools.cli", "check-config"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
+    assert (run.returncode, run.stderr) == (0, "") and "tan ?" in run.stdout
 
 
 def test_reference_is_current() -> None:

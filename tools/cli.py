@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -34,6 +35,7 @@ COMMANDS = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
+    _speak_as_the_terminal_does()
     parser = _parser()
     given = sys.argv[1:] if argv is None else argv
     if not given:
@@ -54,6 +56,13 @@ def guarded(command: Callable[[], int | None]) -> int:
         return _leave_pipe()
     except Exception as error:
         return _fail(error)
+
+
+def _speak_as_the_terminal_does() -> None:
+    """A terminal that knows no Greek gets a question mark: nothing fails for it, least of all the daemon."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _parser() -> argparse.ArgumentParser:

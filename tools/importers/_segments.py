@@ -1,9 +1,9 @@
 """Steady-state tables as recordings: every condition a segment of constant speed, a short silence between segments.
 
-A table gives a mean and a standard deviation. Within a segment the readings stay one standard deviation above or below
-the mean for half a second at a time, as often above as below, in an order that differs by channel and segment: the
-segment has both exactly, and its mean is as uncertain as that of INDEPENDENT readings. Were the turns shorter, all
-scatter would average out, and a comparison would take the mean for exact; were they regular, it would find a ripple.
+A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of a normal
+distribution, a tenth of a second each, in an order that differs by channel, segment and run: the segment has mean and
+deviation exactly, and its mean is as uncertain as that of INDEPENDENT readings. Did they change faster, all scatter
+would average out, and a comparison would take the mean for exact.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from estimator.settings import Uncertain
 from tools.importers._files import Array
@@ -22,7 +23,7 @@ START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]
 DURATION = 5.0  # [s] of a segment
 PAUSE = 1.0  # [s] between segments
-INDEPENDENT = 10  # half seconds of a segment; even, so that they cancel
+INDEPENDENT = 50  # tenths of a second in a segment
 
 
 @dataclass(frozen=True)
@@ -53,24 +54,23 @@ def scatter_of_mean(value: float, sigma: float) -> Uncertain:
     return Uncertain(value, sigma * INDEPENDENT**0.5)
 
 
-def streams(conditions: Sequence[Condition], counting: Counting) -> list[Stream]:
-    """The segments one after the other, as the channels of a recording."""
+def streams(conditions: Sequence[Condition], counting: Counting, run: int = 1) -> list[Stream]:
+    """The segments one after the other, as the channels of a recording. Scatter has another order in every run."""
     seconds = np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
     times = np.concatenate([stamps(START, seconds + spacing * number) for number in range(len(conditions))])
+    sinkage = _all([c.sinkage for c in conditions], run, 3)
     found = [
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
         Stream("carriage_encoder", times, _travel([c.carriage_speed for c in conditions], counting.carriage)),
-        Stream(
-            "sinkage_pot", times, (_all([c.sinkage for c in conditions], 3) - counting.pot_offset) / counting.pot_scale
-        ),
+        Stream("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
     if any(c.current is not None for c in conditions):
-        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], 4)))
+        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], run, 4)))
     axes = np.zeros((len(times), 6))
-    axes[:, 0] = _all([c.drawbar_pull for c in conditions], 0)
-    axes[:, 1] = _all([c.lateral_force for c in conditions], 1)
-    axes[:, 2] = _all([c.load for c in conditions], 2)
+    axes[:, 0] = _all([c.drawbar_pull for c in conditions], run, 0)
+    axes[:, 1] = _all([c.lateral_force for c in conditions], run, 1)
+    axes[:, 2] = _all([c.load for c in conditions], run, 2)
     return [*found, Stream("wrench", times, axes)]
 
 
@@ -82,10 +82,11 @@ def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
     return np.asarray(np.round(travel.ravel() / per_count), dtype=np.int64)
 
 
-def _all(values: Sequence[Uncertain | None], channel: int) -> Array:
+def _all(values: Sequence[Uncertain | None], *seed: int) -> Array:
     """One array of mean ± standard deviation, segment by segment; zero where nothing was measured."""
-    order = np.random.default_rng(channel)
-    turns = np.repeat([1.0, -1.0], INDEPENDENT // 2)
+    order = np.random.default_rng(seed)
+    scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
+    scores /= scores.std()
     length = round(RATE * DURATION / INDEPENDENT)
     known = [value or Uncertain(0.0) for value in values]
-    return np.concatenate([v.value + v.sigma * np.repeat(order.permutation(turns), length) for v in known])
+    return np.concatenate([v.value + v.sigma * np.repeat(order.permutation(scores), length) for v in known])

@@ -17,17 +17,18 @@ import numpy as np
 from estimator import config
 from estimator.recording import RunInfo
 from estimator.settings import Uncertain
+from tools.command import number as number_of
 from tools.importers import Progress
 from tools.importers._files import Array, RigFileError, find, increasing, matrix, number, numbers, read_table, read_text
 from tools.importers._recording import NS, Stream, configuration, counts, stamps, write
-from tools.importers._segments import Condition, Counting, streams
+from tools.importers._segments import Condition, Counting, scatter_of_mean, streams
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
 
 COUNT = 1e-6  # [m] of rim and of carriage travel; 0.01 mm/s, the speeds' last digit, over a sample is 0.14 of it
 START_HEIGHT = 31.5  # [mm] of the wheel above the sand where a log begins
-LEAST_SCATTER = 5e-6  # [m] half a digit of the height: a table's own deviation can be less than the log can tell
+REPEATABLE = 0.7e-3  # [m] by which the sinkage of the smooth wheel's repeats differs, far more than within one
 TRUSTED_MATCH = 0.4  # residual under which a log is known to belong to a table row
 CONTACT = 2.0  # [N] force at which a plate has met the sand
 
@@ -44,6 +45,14 @@ COUNTING = Counting(COUNT, COUNT, pot_scale=-1e-3, pot_offset=-START_HEIGHT * 1e
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both")
+    parser.add_argument(
+        "--rim-speed",
+        type=number_of(low=0.0),
+        action="append",
+        default=[],
+        metavar="MM/S",
+        help="only steady states of this commanded rim speed (the carriage has 10); may be repeated; default: all",
+    )
 
 
 def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
@@ -57,7 +66,7 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     written = [args.output / "cmu.yaml"]
     for file, match in tables:
         if match[1] in wheels:
-            written += _import_table(file, match[1], args.output, configured, progress)
+            written += _import_table(file, match[1], args.rim_speed, args.output, configured, progress)
     loads = {name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()}
     for file, match in logs:
         wheel = "smooth" if match[1] == "vx_10" else "grouser"
@@ -72,10 +81,17 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
 
 
 def _import_table(
-    path: Path, wheel: str, output: Path, configured: config.Configuration, progress: Progress
+    path: Path,
+    wheel: str,
+    speeds: list[float],
+    output: Path,
+    configured: config.Configuration,
+    progress: Progress,
 ) -> list[Path]:
     """The k-th repeat of every commanded speed is recording k."""
-    repeats = _repeats(_straight(path))
+    repeats = _repeats([row for row in _straight(path) if not speeds or row[0] in speeds])
+    if not repeats:
+        raise RigFileError(f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0")
     written = []
     progress("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
     for number_, conditions in enumerate(repeats, start=1):
@@ -85,7 +101,7 @@ def _import_table(
         load = float(np.mean([condition.load.value for condition in conditions]))
         info = RunInfo(name=name, nominal_load=round(load, 2), notes=f"{wheel} wheel; {len(conditions)} steady states")
         folder = output / f"{wheel}-table"
-        written.append(write(folder / f"{name}.mcap", streams(conditions, COUNTING), configured, info))
+        written.append(write(folder / f"{name}.mcap", streams(conditions, COUNTING, number_), configured, info))
     return written
 
 
@@ -106,7 +122,7 @@ def _condition(row: dict[str, float]) -> Condition:
     return Condition(
         rim_speed=row["avg_Vry"] * 1e-3,
         carriage_speed=row["avg_Vx"] * 1e-3,
-        sinkage=Uncertain(-row["avg_Z"] * 1e-3, max(row["std_Z"] * 1e-3, LEAST_SCATTER)),
+        sinkage=scatter_of_mean(-row["avg_Z"] * 1e-3, REPEATABLE),
         load=Uncertain(-row["avg_Fz"], row["std_Fz"]),
         drawbar_pull=Uncertain(-row["avg_Fy"], row["std_Fy"]),
         lateral_force=Uncertain(row["avg_Fx"], row["std_Fx"]),

@@ -89,6 +89,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave a channel out of the recordings; may be repeated",
     )
     parser.add_argument(
+        "--begin",
+        type=positive,
+        metavar="SECONDS",
+        help="leave out what comes before this time of the rig's log",
+    )
+    parser.add_argument(
         "--lag", type=positive, metavar="SECONDS", help="of the force/torque log behind the rig's; default: correlate"
     )
 
@@ -109,7 +115,7 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
                 f"{trial.name}: found a lag of {lag:g} s; expected less, the log has {trial.rig.t[-1]:.1f} s"
             )
         progress(_row(trial, lag, correlation))
-        streams = _streams(trial, lag, args.drawbar_pull, set(args.conceal))
+        streams = _streams(trial, lag, args.begin or 0.0, args.drawbar_pull, set(args.conceal))
         info = _info(trial, lag, args.drawbar_pull, args.conceal)
         written.append(write(args.output / f"{trial.name}.mcap", streams, configured, info))
     return written
@@ -208,10 +214,10 @@ def _fluctuation(values: Array) -> Array:
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
-def _streams(trial: Trial, lag: float, pull: str, concealed: set[str]) -> list[Stream]:
-    """The channels from the start of the wheel, before which there are no forces, to where either log ends."""
+def _streams(trial: Trial, lag: float, begin: float, pull: str, concealed: set[str]) -> list[Stream]:
+    """The channels from `begin` (0 is the start of the wheel, a little before the first force) to where a log ends."""
     rig, sensor = trial.rig, trial.sensor
-    shared = rig.t <= lag + sensor.t[-1]
+    shared = (rig.t >= begin) & (rig.t <= lag + sensor.t[-1])
     times = stamps(rig.start, rig.t)[shared]
     wheel = counts(rig.t, rig.rim_speed / RADIUS, WHEEL_COUNT)
     carriage = counts(rig.t, rig.carriage_speed, CARRIAGE_COUNT)
@@ -222,7 +228,7 @@ def _streams(trial: Trial, lag: float, pull: str, concealed: set[str]) -> list[S
         "motor_shunt": rig.current,
     }
     streams = [Stream(name, times, values[shared]) for name, values in logged.items()]
-    inside = sensor.t + lag <= rig.t[-1]
+    inside = (sensor.t + lag >= begin) & (sensor.t + lag <= rig.t[-1])
     sensed = stamps(rig.start, sensor.t + lag)[inside]
     streams.append(Stream("wrench", sensed, _wrench(sensor, pull, concealed)[inside]))
     return [stream for stream in streams if stream.channel not in concealed]

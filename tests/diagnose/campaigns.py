@@ -32,6 +32,7 @@ def settings() -> Settings:
 def plan(
     loads: Sequence[float] = LOADS, seconds: float = 16.0, standstill: bool = True, wrench: bool = True,
     slow: float = 0.0, slow_time: float = 1.0, noise: float = 1.0, seed: int = 1, reverse: bool = False,
+    stop: bool = False,
 ) -> Plan:  # fmt: skip
     """One run a load; three slips and speeds each, in another order each run."""
     motions = []
@@ -42,9 +43,12 @@ def plan(
         speeds = np.roll((0.015, 0.03, 0.022), number // 2)
         driven = [Segment(each, load, float(s), float(v)) for s, v in zip(order, speeds, strict=True)]
         back = [Segment(each, load, 0.2, -0.02)] if reverse else []
-        motion = motion_of(Schedule((*rest, *driven, *back), 0.5), settings().wheel.radius, RATE)
+        end = [Segment(1.5, load, 0.2, 0.0)] if stop else []
+        motion = motion_of(Schedule((*rest, *driven, *back, *end), 0.5), settings().wheel.radius, RATE)
         motions.append(replace(motion, time=np.asarray(motion.time) + 40.0 * number))
-    return Plan(settings(), soil(), tuple(motions), tuple(loads), noise, slow, slow_time, wrench, seed)
+    return Plan(
+        settings(), soil(), tuple(motions), tuple(loads), noise, slow, slow_time, wrench, {}, (0.0,) * len(loads), seed
+    )
 
 
 def soil() -> Soil:

@@ -16,7 +16,7 @@ from estimator.effects.base import Effect
 from estimator.forward import simulate_arrays
 from estimator.history import delayed
 from estimator.recording import RunInfo
-from estimator.settings import Settings, Uncertain
+from estimator.settings import Calibration, Settings, Uncertain
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
 from tools.diagnose.load import Signals, block_mean, slope
@@ -43,6 +43,8 @@ class Plan:
     slow: float  # size of coloured noise relative to white, one reading
     slow_time: float  # [s]
     wrench: bool
+    errors: dict[str, tuple[float, float]]  # of calibration, by channel: relative error of the scale, zero error
+    plates: tuple[float, ...]  # relative error of each run's weights
     seed: int
 
 
@@ -65,6 +67,8 @@ def draw(settings: Settings, rng: np.random.Generator, runs: int | None = None, 
         float(rng.choice([0.0, 0.1, 0.3])),
         float(rng.choice([0.05, 0.3, 1.0, 3.0])),
         bool(rng.random() < 0.8) if wrench is None else wrench,
+        _errors(settings, rng),
+        tuple((rng.standard_normal() + rng.standard_normal(count)) * np.sqrt(0.5) * _relative(settings.load.nominal)),
         int(rng.integers(1 << 31)),
     )
 
@@ -86,6 +90,24 @@ def _known(settings: Settings, rng: np.random.Generator) -> Settings:
     return replace(settings, wheel=wheel, soil=soil, effects=())
 
 
+def _errors(settings: Settings, rng: np.random.Generator) -> dict[str, tuple[float, float]]:
+    """Calibrations off within what the configuration says of them."""
+    known: dict[str, Calibration] = {
+        "sinkage": settings.channels["sinkage_pot"].calibration,
+        "current": settings.channels["motor_shunt"].calibration,
+    }
+    if (wrench := settings.wrench) is not None:
+        known |= {"drawbar_pull": wrench.drawbar_pull, "load": wrench.load, "axle_torque": wrench.torque}
+    return {
+        name: (float(_relative(c.scale) * rng.standard_normal()), float(c.offset.sigma * rng.standard_normal()))
+        for name, c in known.items()
+    }
+
+
+def _relative(known: Uncertain) -> float:
+    return known.sigma / abs(known.value) if known.value else 0.0
+
+
 def _soil(settings: Settings, rng: np.random.Generator) -> Soil:
     prior = settings.soil
     values = {
@@ -98,11 +120,15 @@ def _soil(settings: Settings, rng: np.random.Generator) -> Soil:
 
 def _motion(settings: Settings, rng: np.random.Generator, load: float, speed: float, began: float) -> Motion:
     slips = rng.permutation([0.05, 0.15, 0.3, 0.45, 0.6])[: int(rng.integers(3, 6))]
-    rest = 2.0
-    each = (SECONDS - rest) / len(slips)
+    rest = Segment(2.0, load, float(slips[0]), 0.0)
+    each = (SECONDS - rest.duration) / len(slips)
     driven = [Segment(each, load, float(s), float(speed * rng.choice([0.5, 1.0, 1.6]))) for s in slips]
+    if rng.random() < 0.5:  # it stops at the end, and at times on the way
+        driven.append(replace(rest, duration=1.5))
+        if rng.random() < 0.4:
+            driven.insert(len(driven) // 2, replace(rest, duration=1.5))
     motion = motion_of(
-        Schedule((Segment(rest, load, float(slips[0]), 0.0), *driven), 0.5),
+        Schedule((rest, *driven), float(rng.uniform(0.3, 0.9))),
         settings.wheel.radius, RATE, float(rng.integers(1, 4)), float(rng.choice([0.0, 0.15, 0.3])),
     )  # fmt: skip
     return replace(motion, time=np.asarray(motion.time) + began)
@@ -116,7 +142,7 @@ def record(plan: Plan, acting: Sequence[Effect], noisy: bool = True) -> list[Sig
 
 def _recorded(plan: Plan, number: int, acting: Sequence[Effect], rng: np.random.Generator, noisy: bool) -> Signals:
     motion, settings = plan.motions[number], plan.settings
-    servo = _servo(motion, rng)
+    servo = replace(_servo(motion, rng), load=np.asarray(motion.load) * (1.0 + plan.plates[number]))
     response = simulate_arrays(
         settings.wheel, plan.soil, servo, acting, torque_constant=settings.drive.torque_constant.value
     )
@@ -144,10 +170,12 @@ def _recorded(plan: Plan, number: int, acting: Sequence[Effect], rng: np.random.
 
 
 def _servo(motion: Motion, rng: np.random.Generator) -> Motion:
-    """Speeds follow what is asked with a lag, as a servo's do."""
-    lag = float(rng.uniform(0.01, 0.06))
+    """Speeds follow what is asked, wheel and carriage each with a lag of its own, as servos do."""
     time = np.asarray(motion.time)
-    wheel, carriage = (np.asarray(delayed(time, v, lag)) for v in (motion.wheel_speed, motion.carriage_speed))
+    wheel, carriage = (
+        np.asarray(delayed(time, speed, float(rng.uniform(0.01, 0.06))))
+        for speed in (motion.wheel_speed, motion.carriage_speed)
+    )
     step = 1.0 / RATE
     return replace(
         motion,
@@ -170,7 +198,8 @@ def _read(plan: Plan, name: str, values: Array, rng: np.random.Generator, noisy:
     gaps = np.full(values.size, 1.0 / RATE)
     gaps[0] = np.inf
     slow = coloured(gaps, 1, Colour(plan.slow * sigma, plan.slow_time, 1.0), rng)[:, 0] if plan.slow else 0.0
-    noise = sigma * rng.standard_normal(values.size) + slow
+    scale, offset = plan.errors.get(name, (0.0, 0.0))
+    noise = sigma * rng.standard_normal(values.size) + slow + scale * values + offset
     return np.asarray(np.rint((values + noise) / QUANTUM[name]) * QUANTUM[name])
 
 

@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from estimator.effects.base import Effect, Fingerprint, strength, turning
-from estimator.situation import ContactLaw, Reaction, Situation
-from estimator.terramechanics.soil import Scalar, Soil
+from estimator.situation import ContactLaw, Reaction, Sensed, Situation
+from estimator.terramechanics.soil import Array, Scalar, Soil
 
 
 def _size(typical: float, low: float = 0.0) -> float:
@@ -126,7 +126,73 @@ class QuadraticHeating(Cousin):
         return 1.0 / (1.0 + self.size * np.cumsum(situation.current**2 * step) / 30.0)
 
 
+@dataclass(frozen=True)
+class HumpedShear(Cousin):
+    """A peak of the shear strength whose excess decays over three shear moduli."""
+
+    size: float = _size(0.4)
+    stage = "contact"
+    stands_for = "shear_peak"
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        settled = law.mobilisation
+
+        def humped(x: Array) -> Array:
+            return np.asarray(settled(x) * (1.0 + self.size * np.exp(-np.abs(x) / 3.0)))
+
+        return replace(law, mobilisation=humped)
+
+
+@dataclass(frozen=True)
+class SlippingRearContact(Cousin):
+    """Contact behind the wheel that slip digs away."""
+
+    size: float = _size(0.25)
+    stage = "contact"
+    stands_for = "rear_contact"
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        return replace(law, theta_2_ratio=law.theta_2_ratio + self.size * (1.0 - 0.7 * np.abs(situation.slip)))
+
+
+@dataclass(frozen=True)
+class StiffeningFrame(Cousin):
+    """A frame with play, that yields as W^0.6."""
+
+    size: float = _size(1e-3)
+    stage = "testbed"
+    stands_for = "frame_compliance"
+
+    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
+        return replace(sensed, sinkage=sensed.sinkage + self.size * (np.abs(situation.carried) / 70.0) ** 0.6)
+
+
+@dataclass(frozen=True)
+class SaturatingRateSinkage(Cousin):
+    """Stiffening with speed that levels off."""
+
+    size: float = _size(0.15, low=-1.0)
+    stage = "soil"
+    stands_for = "rate_dependent_sinkage"
+
+    def soil(self, soil: Soil, situation: Situation) -> Soil:
+        rim = situation.radius * np.abs(situation.wheel_speed)
+        return replace(soil, modulus=soil.modulus * (1.0 + self.size * (rim - 0.02) / (rim + 0.02)))
+
+
+@dataclass(frozen=True)
+class LevellingPeakShift(Cousin):
+    """θₘ/θ₁ that grows with slip and levels off."""
+
+    size: float = _size(0.1, low=-1.0)
+    stage = "contact"
+    stands_for = "stress_peak_shift"
+
+    def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
+        return replace(law, theta_m_ratio=law.theta_m_ratio + self.size * (0.5 + np.tanh(3.0 * situation.slip)))
+
+
 COUSINS: tuple[type[Cousin], ...] = (
     ReeceSlipSinkage, LorentzStribeck, PowerViscous, PowerRateShear, LinearDrying, LogMultipass, PlainBulldozing,
-    QuadraticHeating,
+    QuadraticHeating, HumpedShear, SlippingRearContact, StiffeningFrame, SaturatingRateSinkage, LevellingPeakShift,
 )  # fmt: skip

@@ -1,9 +1,9 @@
 """From fitted models to a verdict, probabilities and groups.
 
-Probabilities are Bayes weights of all fitted models, softened: evidence is divided by a temperature that grows with
-what the best model leaves unexplained, because a model whose form is wrong is overconfident (tempered posterior,
-Holmes and Walker 2017, Biometrika 104, 497-503). An effect has the weight of all models that hold it. What no listed
-effect explains takes the share UNLISTED gives it.
+Every explanation has an evidence: listed effects, with a discrepancy for forms other than ours (discrepancy.py);
+smooth functions without a name instead of them; such functions beside the best of them. `calibration.py` makes
+probabilities of these. An effect has the weight of all models that hold it; both kinds of nameless functions together
+are `unlisted`.
 """
 
 from __future__ import annotations
@@ -12,24 +12,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 
 from estimator.terramechanics.soil import Array
+from tools.diagnose import discrepancy
+from tools.diagnose.calibration import Calibration, learnt
 from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.rig import Index
 from tools.diagnose.screen import Screen, whitened
-from tools.diagnose.select import Model, Search, form, rescreen
+from tools.diagnose.select import Model, Search, rescreen
 
-TEMPERATURE = 2.0  # of evidence where nothing remains
-LEFTOVER = 0.15  # further temperature per nat left unexplained
-ALIKE = 4.0  # [nats] effects whose evidence differs less, temperature taken off, cannot be told apart
-LISTED = 5.0  # [nats] head start of the library over functions without a name
-SHAPE = 0.08  # and this share of its evidence, since a form's details may differ
+ALIKE = 2.0  # log odds: effects that are less apart cannot be told apart
 PAIR = 3.0  # [nats] a second function must gain
+FORM, FORM_MOST = 0.08, 25.0  # and this share of what the first gained, at most so many nats
 SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, LEFT = 2, 4  # functions without a name that may act together; that count what is left
-TAKEN, ABOUT = 0.9, 0.04  # share of the explainable misfit a listed explanation must take
+WEIGHED, NEAR, FAR = 10, 0.5, 60.0  # models weighed at most: within this share of the best gain, or so many nats of it
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
+QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A model and its log evidence above the base model's for each degree of difference (discrepancy.FORMS,)."""
+
+    model: Model
+    evidence: Array
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,8 @@ class Decision:
     probability: dict[str, float]
     unlisted: float
     groups: dict[str, tuple[str, ...]]
+    weighed: tuple[Weighed, ...] = ()
+    nameless: tuple[float, float] = (-np.inf, -np.inf)  # evidence of functions without a name: alone, beside the best
 
 
 def decide(search: Search) -> Decision:
@@ -49,32 +60,65 @@ def decide(search: Search) -> Decision:
     if not found.alarmed:
         verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
         return Decision(verdict, base, 1.0, 0.0, False, _quiet(found), 0.0, {})
-    best, share, left, significant = _explanation(search)
-    temperature = TEMPERATURE + LEFTOVER * left
-    gained = best.evidence - base.evidence
-    ahead = refitted(search, base) - gained - LISTED - SHAPE * max(gained, 0.0)
-    unlisted = max(_unlisted(share, significant, bool(best.names)), float(1.0 / (1.0 + np.exp(-ahead / TEMPERATURE))))
-    listed = bool(best.names) and unlisted < 0.5
-    probability = {n: p * (1.0 - unlisted) for n, p in probabilities(search.models, temperature).items()}
+    weighed = weigh(search)
+    alone, beside = nameless_evidence(search, weighed)
+    return judged(search, weighed, alone, beside, learnt())
+
+
+def judged(
+    search: Search, weighed: Sequence[Weighed], alone: float, beside: float, calibration: Calibration
+) -> Decision:
+    """The decision from the evidence of all explanations [nats above the base model]."""
+    weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
+    unnamed = calibration.unlisted(alone, beside)
+    total = float(np.logaddexp(logsumexp(weights), unnamed)) if weighed else unnamed
+    unlisted = float(np.exp(unnamed - total))
+    best = _best(weighed, weights) if weighed else search.models[0]
+    left, significant = remaining(search, best)
+    gained = 0.5 * (search.models[0].fitted.objective - best.fitted.objective)
     return Decision(
-        "explained" if listed else "unlisted",
-        best, share, left, significant, probability, unlisted, groups(search, best, temperature),
+        "explained" if weighed and unlisted < 0.5 else "unlisted",
+        best, gained / max(gained + left, 1e-9), left, significant,
+        _probabilities(weighed, weights - total), unlisted, _groups(weighed, weights, best),
+        tuple(weighed), (alone, beside),
     )  # fmt: skip
 
 
-def _explanation(search: Search) -> tuple[Model, float, float, bool]:
-    """The fewest effects that take (nearly) all, else the most probable model."""
+def _best(weighed: Sequence[Weighed], weights: Array) -> Model:
+    """The likeliest model of the likeliest number of effects: many alike sets of two weigh together against one."""
+    sizes = np.array([len(w.model.names) for w in weighed])
+    size = max(np.unique(sizes).tolist(), key=lambda n: float(logsumexp(weights[sizes == n])))
+    return weighed[int(np.argmax(np.where(sizes == size, weights, -np.inf)))].model
+
+
+def weigh(search: Search) -> list[Weighed]:
+    """The models that may count, the most evident first."""
     base = search.models[0]
-    best = search.best()
-    left, significant = remaining(search, best)
-    gained = 0.5 * (base.fitted.objective - best.fitted.objective)
-    return best, gained / max(gained + left, 1e-9), left, significant
+    gains = {id(m): m.fitted.log_evidence - base.fitted.log_evidence for m in search.models if m.names}
+    if not gains:
+        return []
+    top = max(gains.values())
+    near = [m for m in search.models if m.names and gains[id(m)] > top - max(NEAR * top, FAR)]
+    near.sort(key=lambda m: -gains[id(m)])
+    start = base.fitted.log_evidence
+    return [Weighed(m, discrepancy.evidence(search.problem, m.fitted) - start) for m in near[:WEIGHED]]
+
+
+def nameless_evidence(search: Search, weighed: Sequence[Weighed]) -> tuple[float, float]:
+    """Evidence above the base model's [nats] of functions without a name: alone, and beside the best effects."""
+    base = search.models[0]
+    alone = refitted(search, base)
+    if not weighed:
+        return alone, -np.inf
+    best = max(weighed, key=lambda w: w.evidence[0])
+    more = nameless(search, best.model, LEFT)
+    return alone, float(best.evidence[0]) + more if more > 0.0 else -np.inf
 
 
 def remaining(search: Search, model: Model) -> tuple[float, bool]:
     """Nats that smooth functions of the covariates would still gain; whether any of them stands out of the noise."""
     found = search.screens.get(model.names) or rescreen(search, model)
-    standing = [e for n, e in found.evidence.items() if "~" in n and e > found.threshold]
+    standing = [n for n in found.evidence if "~" in n and found.surprise(n) > found.threshold]
     return (nameless(search, model, LEFT) if standing else 0.0), bool(standing)
 
 
@@ -94,7 +138,7 @@ def refitted(search: Search, model: Model) -> float:
     for scale in SIZES:
         fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
         gain = fitted.log_evidence - found.log_evidence
-        gains.append(gain - (PAIR + form(gain)) * (len(chosen) - 1))
+        gains.append(gain - (PAIR + _form(gain)) * (len(chosen) - 1))
     return max(gains)
 
 
@@ -110,7 +154,7 @@ def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]
     for _ in range(most):
         tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
         best = int(np.argmax(tried))
-        price = PAIR + form(total) if chosen else 0.0
+        price = PAIR + _form(total) if chosen else 0.0
         if best in chosen or tried[best] - price <= total:
             break
         total, chosen = tried[best] - price, [*chosen, best]
@@ -122,46 +166,39 @@ def _together(a: Array, b: Array, parts: list[Index]) -> float:
     return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
-def _unlisted(share: float, significant: bool, any_effect: bool) -> float:
-    """Probability that the physics is not in the library."""
-    if not any_effect:
-        return 0.95
-    if not significant:
-        return 0.02
-    return float(1.0 / (1.0 + np.exp((share - TAKEN) / ABOUT)))
+def _form(gained: float) -> float:
+    return float(np.clip(FORM * gained, 0.0, FORM_MOST))
 
 
-def probabilities(models: Sequence[Model], temperature: float) -> dict[str, float]:
+def _probabilities(weighed: Sequence[Weighed], log_share: Array) -> dict[str, float]:
     """Weight of all models that hold an effect."""
-    evidence = np.array([m.evidence for m in models]) / temperature
-    weight = np.exp(evidence - evidence.max())
-    weight /= weight.sum()
     out: dict[str, float] = {}
-    for model, w in zip(models, weight, strict=True):
-        for name in model.names:
-            out[name] = out.get(name, 0.0) + float(w)
+    for w, share in zip(weighed, np.exp(log_share).tolist(), strict=True):
+        for name in w.model.names:
+            out[name] = out.get(name, 0.0) + share
     return out
 
 
 def _quiet(found: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
     listed = {n: e for n, e in found.evidence.items() if "~" not in n}
-    weight = {n: float(np.exp(min(e, 20.0) / TEMPERATURE)) / max(len(listed), 1) for n, e in listed.items()}
+    weight = {n: float(np.exp(min(e, 20.0) / QUIET)) / max(len(listed), 1) for n, e in listed.items()}
     total = 20.0 + sum(weight.values())
     return {n: w / total for n, w in weight.items()}
 
 
-def groups(search: Search, best: Model, temperature: float) -> dict[str, tuple[str, ...]]:
+def _groups(weighed: Sequence[Weighed], weights: Array, best: Model) -> dict[str, tuple[str, ...]]:
     """For each effect of the best model, those that could stand in its place."""
     out: dict[str, tuple[str, ...]] = {}
+    order = np.argsort(-weights)
+    top = max((w for m, w in zip(weighed, weights.tolist(), strict=True) if m.model is best), default=0.0)
     for name in best.names:
         rest = set(best.names) - {name}
         rivals = [
-            m for m in search.models
-            if len(m.names) == len(best.names) and rest <= set(m.names) and m is not best
-            and best.evidence - m.evidence < ALIKE * temperature / TEMPERATURE
+            weighed[i].model for i in order
+            if len(weighed[i].model.names) == len(best.names) and rest <= set(weighed[i].model.names)
+            and weighed[i].model is not best and top - weights[i] < ALIKE
         ]  # fmt: skip
-        rivals.sort(key=lambda m: -m.evidence)
         out[name] = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in rest))
     return out
 
@@ -174,5 +211,5 @@ def power(search: Search, found: Screen) -> float:
         if "~" not in name:
             a, _ = base.projected(ready.columns)
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(gain > found.threshold)
+            seen.append(found.surprise(name, float(gain)) > found.threshold)
     return float(np.mean(seen)) if seen else 0.0

@@ -30,7 +30,7 @@ class Signature:
     columns: Array
     sign: tuple[int, ...]
     shape: dict[str, float]
-    prior: float = 0.0  # log weight among the signatures of the same name
+    prior: float = 0.0  # log share among the shapes of the same name, those not tried included
 
 
 class Base:

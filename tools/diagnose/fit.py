@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from estimator.effects.base import Effect, Parameter
 from estimator.terramechanics.soil import Array
@@ -72,9 +73,21 @@ class Fitted:
     def log_evidence(self) -> float:
         """Laplace's approximation (MacKay 2003, ch. 27), up to a constant that all models of one problem share."""
         gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
-        sided = sum(f.parameter.role == "strength" and f.parameter.low >= f.parameter.off for f in self.free)
         spread = np.linalg.slogdet(gram)[1] - 2.0 * np.log(self.penalty).sum()
-        return float(-0.5 * (self.objective + spread) + sided * np.log(2.0))
+        return float(-0.5 * (self.objective + spread) + self._one_sided(gram))
+
+    def _one_sided(self, gram: Array) -> float:
+        """ln of twice the posterior share on the allowed side, for each strength that is bounded at its off value."""
+        bounded = [
+            i for i, f in enumerate(self.free) if f.parameter.role == "strength" and f.parameter.low >= f.parameter.off
+        ]
+        if not bounded:
+            return 0.0
+        centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
+        inverse = np.linalg.inv(gram)
+        best = centre + inverse @ (self.jacobian.T @ self.residual - self.penalty**2 * centre)
+        at = np.array(bounded) + len(self.u)
+        return float(np.sum(log_ndtr(best[at] / np.sqrt(np.diag(inverse)[at])) + np.log(2.0)))
 
     def base(self) -> Base:
         """The neighbourhood of this fit, for signatures of further effects."""
@@ -113,14 +126,15 @@ class Problem:
         penalty = np.concatenate((np.ones(q), [f.weight for f in free], np.ones(self.tolerance.shape[1])))
         centre = np.concatenate((u, x))
         state = self._at(effects, free, centre, q)
-        best = self._state(effects, free, centre, q, state, penalty)
+        return self.refine(self._state(effects, free, centre, q, state, penalty), rounds)
+
+    def refine(self, best: Fitted, rounds: int = ROUNDS) -> Fitted:
+        """The nearest optimum from a fit that was not finished."""
         for _ in range(rounds):
-            step = self._step(best)
-            found = self._search(effects, free, best, step, q, penalty)
+            found = self._search(best.effects, best.free, best, self._step(best), len(best.u), best.penalty)
             if found is None:
                 break
-            gained = best.objective - found.objective
-            best = found
+            gained, best = best.objective - found.objective, found
             if gained < ENOUGH:
                 break
         return best

@@ -17,6 +17,8 @@ from tools.diagnose.rig import Bools, Stack
 SIZE = 0.03  # of the channel's size: the expected size of a misfit; a third and three times of it are tried too
 WAVES = 4  # cosines along time or place
 LEVELS = 1e-3  # relative spread below which a covariate does not vary
+TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
+BENDS = 2  # cosines by which a share of an effect may vary along time or place
 ORDERS = (1.0, 2.0)  # ripples a turn that a smooth term could not take; higher ones belong to listed effects
 
 
@@ -34,15 +36,24 @@ def signatures(stack: Stack) -> list[Signature]:
 
 
 def tolerance(stack: Stack, share: float) -> Array:
-    """Smooth columns (N, t), each one standard deviation of what the model may be off by: a share of the channel."""
+    """Smooth columns (N, t) by which the model may be off, together a share of the channel; each one its own σ."""
     columns = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
         size = share * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
-        for name, family in _families(stack):
-            if name in ("constant", "slip", "speed", "load", "sinkage") or "·" in name:
-                columns.append(_scaled(np.where(own[:, None], family, 0.0), own, size))
+        families = [f for name, f in _families(stack) if name in TOLERATED or "·" in name]
+        found = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
+        columns.append(found * size / np.sqrt(max(found.shape[1], 1)))
     return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def shares(stack: Stack, own: Bools) -> Array:
+    """Smooth functions (N, m) of unit size on some values: of slip, speed, load, sinkage, time, place, heat; and 1."""
+    columns = []
+    for name, family in _families(stack):
+        if name not in ("run", "wheel_angle", "acceleration", "direction"):
+            columns.append(family[:, :BENDS] if name in ("position", "time", "heat") else family)
+    return _scaled(np.column_stack(columns), own, 1.0)
 
 
 def _families(stack: Stack) -> Iterator[tuple[str, Array]]:

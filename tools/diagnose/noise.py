@@ -30,7 +30,8 @@ SURROGATE_COLOURS = 20  # drawn from the posterior of the colour
 RIDGE = 1e-9
 NEGLIGIBLE = 1e-5  # weight of a value long past in an innovation
 STEADY = 1.3  # values noisier than this share of their channel's, for blur, say nothing of the noise
-CAREFUL = 0.8
+CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
+RARE = 0.5  # prior: density of a colour falls as its slow power to this, since instruments drift less than they hiss
 COLUMNS = 40  # of the saturated mean, at most
 
 
@@ -73,15 +74,27 @@ class Noise:
 
 
 BLUR = 0.5  # of the bend between neighbours: speeds are slopes over three intervals, corners are cut
+SHALLOW = 1e-3  # [m] a sinkage below which its changes mean little
+LAG = 0.015  # [s] by which an axle sinks later than in the balance: its damping carries or adds load meanwhile
 
 
 def blur(stack: Stack, predicted: Array) -> Array:
-    """Error (N,) made by averaging: a share of the second difference of the prediction, its neighbours' included."""
+    """Error (N,) where things change: averaging takes a share of the second difference, a value's or its neighbours';
+    and a lagging axle shifts all forces by the share by which the sinkage changes within the lag.
+    """
+    gaps = np.where(np.isfinite(stack.gaps), stack.gaps, np.inf)
     bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
     edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))
-    bend = np.where(edge, 0.0, bend)
-    near = np.maximum(bend, np.maximum(np.roll(bend, 1), np.roll(bend, -1)))
-    return BLUR * near
+    late = np.abs(np.diff(predicted, prepend=predicted[:1])) / gaps
+    if "sinkage" in stack.rig.runs[0].covariates:
+        depth = np.log(np.maximum(stack.covariate("sinkage"), SHALLOW))
+        late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / gaps
+    return np.asarray(np.hypot(BLUR * _nearby(np.where(edge, 0.0, bend)), LAG * _nearby(late)))
+
+
+def _nearby(values: Array) -> Array:
+    """The largest of each value and its neighbours."""
+    return np.maximum(values, np.maximum(np.roll(values, 1), np.roll(values, -1)))
 
 
 SPIKE = 6.0  # [σ] from the median of its neighbours: such a value counts as much less certain
@@ -144,19 +157,26 @@ def _fit_channel(
     colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
     colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
     likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
-    weight = np.exp(likelihood - likelihood.max())
+    step = _step(stack.gaps)
+    posterior = likelihood - RARE * np.log([_slow_power(c, step) for c in colours])
+    weight = np.exp(posterior - posterior.max())
     least = _least(stack, channel)
     sized = [replace(c, sigma=max(float(np.sqrt(v)), least)) for c, v in zip(colours, variance, strict=True)]
     chosen = rng.choice(len(sized), SURROGATE_COLOURS, p=weight / weight.sum())
-    return _careful(sized, weight / weight.sum(), _step(stack.gaps)), *(sized[i] for i in chosen)
+    return _careful(sized, weight / weight.sum(), step), *(sized[i] for i in chosen)
 
 
 def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
     """The colour whose slow power is at quantile CAREFUL of the posterior: few data cannot tell slow noise."""
-    power = np.array([c.sigma**2 * (1.0 - c.slow + 2.0 * c.slow * c.time / step) for c in colours])
+    power = np.array([c.sigma**2 * _slow_power(c, step) for c in colours])
     order = np.argsort(power)
     at = int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))
     return colours[int(order[min(at, len(colours) - 1)])]
+
+
+def _slow_power(colour: Colour, step: float) -> float:
+    """Spectral density towards zero frequency, relative to that of white noise of the same variance."""
+    return 1.0 - colour.slow + 2.0 * colour.slow * colour.time / step
 
 
 def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from tools.diagnose.rig import Rig, Stack
 from tools.diagnose.screen import noise_draws
 from tools.diagnose.signatures import raw_signatures, ripple_columns
 
-TOLERANCE = 2e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
+TOLERANCE = 3e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
 
 
@@ -39,6 +39,15 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     saturated = np.column_stack([*explained, rough.raw]), ripple_columns(stack, stack.measured - rough.predicted)
     found = noise.fit(stack, rough.predicted, saturated, replicates.cells(stack), first, rng)
     spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
-    problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))
+    loose = (tolerance, replicates.run_columns(stack, spread), _plates(stack, rough))
+    problem = Problem(stack, found, np.column_stack(loose))
     base = problem.descend((), (), rough.u, np.zeros(0))
     return Prepared(problem, base, generics, noise_draws(found, base.jacobian.shape[1], rng))
+
+
+def _plates(stack: Stack, rough: Fitted) -> Array:
+    """Errors of each run's own weights (N, m), where the rig has weights."""
+    names = [known.name for known in stack.rig.constants]
+    if "weights" not in names:
+        return np.zeros((stack.size, 0))
+    return replicates.plate_columns(stack, rough.raw[:, names.index("weights")])

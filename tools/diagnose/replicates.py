@@ -18,6 +18,7 @@ from tools.diagnose.rig import Index, Stack
 WIDTHS = {"slip": 0.04, "speed": 0.08, "load": 0.05}  # of a cell; of speed and load relative to their largest
 FEW, MANY = 10, 60  # values a cell must hold; cells a channel may have
 EQUAL = 1e-3  # difference of pass or start at which two runs are no replicates
+SAME, OWN = 0.02, 0.7  # relative distance at which weights are others; share of a common error that is each one's own
 PAIRS = 2  # comparisons of replicates at least
 
 
@@ -68,6 +69,17 @@ def between_runs(stack: Stack, residual: Array, colours: tuple[Colour, ...]) -> 
         if len(squares) >= PAIRS:
             out[number] = np.sqrt(max(float(np.mean(squares)), 0.0))
     return out
+
+
+def plate_columns(stack: Stack, change: Array) -> Array:
+    """What each set of weights may be off by, for itself (N, m), each one standard deviation.
+
+    change: (N,) derivative of the prediction by a common error of all weights, per prior σ.
+    """
+    load = stack.covariate("load")
+    level = np.rint(np.log(np.maximum(load, 1e-9)) / SAME).astype(int)
+    columns = [np.where(level == one, OWN * change, 0.0) for one in np.unique(level)]
+    return np.column_stack(columns) if 1 < len(columns) <= MANY else np.zeros((stack.size, 0))
 
 
 def _terms(stack: Stack) -> Array:

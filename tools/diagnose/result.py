@@ -27,7 +27,7 @@ class Test:
     """The alarm: is there a mismatch at all? Its threshold is a quantile of nulls simulated from the data's own noise.
 
     name:      what was largest: "omnibus", "strain", or the name of an effect whose signature stood out.
-    statistic: its value, and the threshold it had to pass [nats].
+    statistic: its evidence [nats] beyond what noise shows, and the threshold it had to pass.
     p:         share of the nulls that exceed it, (1 + exceeded)/(1 + nulls).
     level:     the false-alarm rate at which the threshold was set.
     """

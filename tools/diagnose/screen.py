@@ -1,8 +1,11 @@
 """The screen: evidence of every effect and of every smooth misfit at once, against what noise alone would show.
 
 Nulls are surrogates of the recordings' own noise (size and colour drawn from their posterior) together with constants
-drawn from their priors; each goes through the same linear algebra, so the threshold is a quantile of the largest of
-*all* statistics, however many were tried and however alike they are.
+drawn from their priors; each goes through the same linear algebra. What noise alone shows differs from name to name: a
+function of time takes slow noise for a drift, a ripple does not. So each evidence is counted from where the last tenth
+of its own nulls begins, in units of how far they reach beyond (never less than a nat), and the alarm is a quantile of
+the largest of *all* these surprises in every null, however many were tried and however alike they are (Westfall and
+Young 1993, Resampling-Based Multiple Testing).
 """
 
 from __future__ import annotations
@@ -19,7 +22,8 @@ from tools.diagnose.noise import Noise, surrogates, whiten
 
 LEVEL = 0.01  # false alarms aimed at, half of what is allowed
 NULLS = 300
-LEAST = 2.0  # [nats] no evidence below this is an alarm, however quiet the nulls
+LEAST = 2.0  # no surprise below this is an alarm, however quiet the nulls
+TENTH = 0.9  # quantile from which evidence is counted
 
 
 @dataclass(frozen=True)
@@ -32,21 +36,28 @@ class Whitened:
 
 @dataclass(frozen=True)
 class Screen:
-    """Log Bayes factors by name, the best shape of each, and the largest of each null."""
+    """Log Bayes factors by name, the best shape of each, and the largest surprise of each null."""
 
     evidence: dict[str, float]
+    usual: dict[str, tuple[float, float]]  # of each name: where the last tenth of its nulls begins, how far they reach
     best: dict[str, Whitened]
     shapes: dict[str, list[dict[str, float]]]  # of each name, the most likely first
-    nulls: Array  # (draws,) the largest of all names
+    nulls: Array  # (draws,) the largest surprise of all names
 
     @property
     def threshold(self) -> float:
         return max(float(tail_quantile(self.nulls, LEVEL)), LEAST)
 
+    def surprise(self, name: str, evidence: float | None = None) -> float:
+        """How far evidence (that of the recordings if not given) lies beyond what noise shows under this name."""
+        start, reach = self.usual[name]
+        return ((self.evidence[name] if evidence is None else evidence) - start) / reach
+
     @property
     def largest(self) -> tuple[str, float]:
-        name = max(self.evidence, key=lambda n: self.evidence[n])
-        return name, self.evidence[name]
+        """The most surprising name, and its surprise."""
+        name = max(self.evidence, key=self.surprise)
+        return name, self.surprise(name)
 
     @property
     def p(self) -> float:
@@ -81,22 +92,35 @@ def noise_draws(noise: Noise, size: int, rng: np.random.Generator) -> tuple[Arra
 def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array]) -> Screen:
     """Evidence of each name (averaged over its shapes) and its largest in every null."""
     if not signatures:
-        return Screen({"none": 0.0}, {}, {}, np.zeros(2))
+        return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2))
     columns = np.column_stack([s.columns for s in signatures])
     a, b = base.projected(columns)
     null_b = base.scores(columns, *draws)
     ends = np.cumsum([s.columns.shape[1] for s in signatures])
-    found: dict[str, list[tuple[float, Array, Whitened]]] = {}
+    found: dict[str, list[tuple[Array, Whitened]]] = {}
     for s, end in zip(signatures, ends, strict=True):
         own = slice(end - s.columns.shape[1], end)
-        both = np.column_stack((b[own], null_b[own]))
-        value = log_evidence(a[own, own], both, s.signature.sign)
-        found.setdefault(s.signature.name, []).append((float(value[0]), value[1:], s))
-    evidence, best, order, nulls = {}, {}, {}, []
+        value = log_evidence(a[own, own], np.column_stack((b[own], null_b[own])), s.signature.sign)
+        found.setdefault(s.signature.name, []).append((value, s))
+    return _ranked(found)
+
+
+def _ranked(found: dict[str, list[tuple[Array, Whitened]]]) -> Screen:
+    """From the log Bayes factors of every shape (1 + draws,), the recordings' first."""
+    evidence, usual, best, order, nulls = {}, {}, {}, {}, []
     for name, shapes in found.items():
-        shapes.sort(key=lambda item: -item[0])
-        order[name] = [s.signature.shape for _, _, s in shapes]
-        evidence[name] = float(logsumexp([v for v, _, _ in shapes]) - np.log(len(shapes)))
-        best[name] = shapes[0][2]
-        nulls.append(logsumexp(np.stack([n for _, n, _ in shapes]), axis=0) - np.log(len(shapes)))
-    return Screen(evidence, best, order, np.max(nulls, axis=0))
+        shapes.sort(key=lambda item: -item[0][0])
+        order[name] = [s.signature.shape for _, s in shapes]
+        best[name] = shapes[0][1]
+        prior = np.array([s.signature.prior for _, s in shapes])[:, None]
+        mean = logsumexp(np.stack([v for v, _ in shapes]) + prior, axis=0)
+        evidence[name], usual[name] = float(mean[0]), _usual(mean[1:])
+        nulls.append((mean[1:] - usual[name][0]) / usual[name][1])
+    return Screen(evidence, usual, best, order, np.max(nulls, axis=0))
+
+
+def _usual(nulls: Array) -> tuple[float, float]:
+    """Where the last tenth of nulls begins (0 at least), and their mean reach beyond (1 nat at least)."""
+    start = max(float(np.quantile(nulls, TENTH)), 0.0)
+    beyond = nulls[nulls > start] - start
+    return start, max(float(beyond.mean()) if beyond.size else 0.0, 1.0)

@@ -12,6 +12,7 @@ from estimator.terramechanics.soil import Array
 from tools.diagnose.evidence import Base, Signature
 from tools.diagnose.fit import Fitted, Free, Maker, Problem, free_of
 from tools.diagnose.parallel import each
+from tools.diagnose.ripples import LOUDEST, loudest, order_of
 from tools.diagnose.screen import Screen, Whitened, screen, whitened
 from tools.diagnose.signatures import shape_grid, signature, strengths
 
@@ -22,7 +23,7 @@ SECOND = 5  # effects fitted at each further step
 STEPS = 3  # effects at most
 AGAIN = 4  # shapes of an effect that a later screen tries
 QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
-HOPELESS = 12.0  # [nats] behind the best after the first fit
+HOPELESS, BEHIND = 12.0, 0.15  # [nats] behind the best after the first fit, or this share of what the best gained
 PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
 FORM, FORM_MOST = (
     0.08,
@@ -80,10 +81,23 @@ def _beside(search: Search, model: Model) -> Iterator[Signature]:
         if name in model.names:
             continue
         shapes = list(shape_grid(stack.rig, effect)) if first is None else first.shapes.get(name, [])[:AGAIN]
-        for shape in shapes:
+        prior = -np.log(max(len(shapes), 1))
+        for shape in _worth(search, model, effect, shapes):
             made = signature(stack, fitted.u, fitted.predicted, effect, shape, fitted.acting)
             if made is not None:
-                yield made
+                yield replace(made, prior=prior)
+
+
+def _worth(
+    search: Search, model: Model, effect: type[Effect], shapes: list[dict[str, float]]
+) -> list[dict[str, float]]:
+    """The shapes to simulate: of ripples only those that the residual holds, the others' evidence being nil."""
+    order = order_of(effect)
+    if order is None or len(shapes) <= LOUDEST:
+        return shapes
+    problem = search.problem
+    loud = loudest(problem.stack, problem.noise, model.fitted.residual, sorted({s[order] for s in shapes}))
+    return [s for s in shapes if s[order] in loud]
 
 
 def _resized(strain: Array, base: Base) -> Array:
@@ -111,16 +125,20 @@ def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model
     made = each(search.jobs, lambda name: _fitted(search, model, effects[name], found.best[name]), names)
     if made:
         top = max(max(m.evidence for m in made), search.best().evidence)
-        close = [m for m in made if m.evidence > top - HOPELESS]
+        close = [m for m in made if m.evidence > top - _hopeless(search, top)]
         done = iter(each(search.jobs, lambda m: _finished(search.problem, m), close))
         made = [next(done) if m in close else m for m in made]
     search.models += made
     return made
 
 
+def _hopeless(search: Search, top: float) -> float:
+    """How far behind the best evidence a model may be and still win: rivals for a strong effect differ by much."""
+    return max(HOPELESS, BEHIND * (top - search.models[0].evidence))
+
+
 def _finished(problem: Problem, model: Model) -> Model:
-    f = model.fitted
-    return replace(model, fitted=problem.descend(f.effects, f.free, f.u, f.x, THOROUGH))
+    return replace(model, fitted=problem.refine(model.fitted, THOROUGH))
 
 
 def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) -> Model:
@@ -167,7 +185,8 @@ def run(search: Search, first: Model, step: Callable[[str], None] = lambda _: No
     extend(search, first, found, MOST)
     for size in range(1, STEPS):
         here = sorted((m for m in search.models if len(m.names) == size), key=lambda m: -m.evidence)
-        here = [m for m in here[:PAIRS] if m.evidence > search.best().evidence - HOPELESS]
+        best = search.best().evidence
+        here = [m for m in here[:PAIRS] if m.evidence > best - _hopeless(search, best)]
         if not here:
             return
         for model in here:

@@ -29,7 +29,7 @@ from estimator.effects.base import Effect
 from tools.diagnose import heldout
 from tools.diagnose.cases import Plan, draw, record, scaled
 from tools.diagnose.cousins import COUSINS
-from tools.diagnose.decide import decide, refitted
+from tools.diagnose.decide import Decision, decide
 from tools.diagnose.engine import said
 from tools.diagnose.fit import free_of
 from tools.diagnose.prepare import Prepared, prepare
@@ -44,7 +44,10 @@ STRONG, STRANGE = (3.0, 5.0), (8.0, 15.0)  # times the limit; a stranger that a 
 LARGEST = 3.0  # expected sizes
 DRAWS = 6  # campaigns tried for an effect
 PAIRS = (("coulomb_friction", "slip_sinkage"), ("bulldozing", "viscous_friction"), ("rear_contact", "current_offset"))
-ORDER = ("none", "effect", "effect", "cousin", "unlisted", "effect", "none", "pair", "effect", "unlisted")
+ORDER = (
+    "none", "effect", "cousin", "unlisted", "effect", "pair",
+    "none", "effect", "cousin", "unlisted", "effect", "cousin",
+)  # fmt: skip
 LISTED = tuple(n for n, e in EFFECTS.items() if not e.filter_only and n != "empirical_law")
 
 
@@ -53,10 +56,13 @@ class Case:
     stratum: str  # none, effect, pair, unlisted
     truth: tuple[str, ...]
     seed: int
+    strength: tuple[float, float] | None = None  # times the limit; the stratum's own if not given
 
 
-def cases(count: int, seed: int, only: Sequence[str] = ()) -> Iterator[Case]:
-    """Strata in turn: a fifth without effect, single effects, other forms, pairs, strangers."""
+def cases(
+    count: int, seed: int, only: Sequence[str] = (), strength: tuple[float, float] | None = None
+) -> Iterator[Case]:
+    """Strata in turn: a sixth without effect, single effects, other forms, pairs, strangers."""
     rng = np.random.default_rng(seed)
     for number in range(count):
         stratum = ORDER[number % len(ORDER)]
@@ -71,7 +77,7 @@ def cases(count: int, seed: int, only: Sequence[str] = ()) -> Iterator[Case]:
             truth = PAIRS[int(rng.integers(len(PAIRS)))]
         if only and stratum not in only and not set(only) & set(truth):
             continue
-        yield Case(stratum, truth, int(rng.integers(1 << 31)))
+        yield Case(stratum, truth, int(rng.integers(1 << 31)), strength)
 
 
 def trial(case: Case) -> dict[str, Any]:
@@ -94,7 +100,7 @@ def _trial(case: Case) -> dict[str, Any]:
     settings = config.load(packaged()).settings
     own: dict[str, type[Effect]] = {t.__name__: t for t in (*STRANGERS, *COUSINS)}
     types = [EFFECTS.get(n) or own[n] for n in case.truth]
-    drawn = _drawn(settings, types, rng)
+    drawn = _drawn(settings, types, case.strength, rng)
     if drawn is None:
         return {"skipped": True}
     plan, acting = drawn
@@ -102,32 +108,33 @@ def _trial(case: Case) -> dict[str, Any]:
     prepared = prepare(rig, np.random.default_rng(0))
     search = Search(prepared.problem, prepared.generics, prepared.draws)
     run(search, Model(prepared.base, (), 0.0))
-    found = said(rig, search, decide(search), {}, 0)
-    return _scored(case, plan, acting, found) | _oracle(case, types, acting, search, found) | _work(search)
-
-
-def _work(search: Search) -> dict[str, Any]:
-    """What the search weighed, to find the reason of a miss."""
-    base, first = search.models[0], search.screens[()]
     decision = decide(search)
-    models = sorted(search.models, key=lambda m: -m.evidence)[:6]
+    found = said(rig, search, decision, {}, 0)
+    return _scored(case, plan, acting, found) | _oracle(case, types, acting, search, found) | work(search, decision)
+
+
+def work(search: Search, decision: Decision) -> dict[str, Any]:
+    """What the search weighed: to learn the calibration from, and to find the reason of a miss."""
+    first = search.screens[()]
     return {
         "screen": dict(sorted(((n, round(e, 1)) for n, e in first.evidence.items()), key=lambda i: -i[1])[:8]),
-        "models": [["+".join(m.names), round(m.evidence - base.evidence, 1)] for m in models],
-        "nameless": refitted(search, base) if first.alarmed else 0.0,
+        "weighed": [[list(w.model.names), [round(float(e), 2) for e in w.evidence]] for w in decision.weighed],
+        "nameless": [round(max(e, -1e6), 2) for e in decision.nameless],
         "share": decision.share,
         "left": decision.left,
         "unlisted": decision.unlisted,
     }
 
 
-def _drawn(settings: Any, types: list[type[Effect]], rng: np.random.Generator) -> tuple[Plan, list[Effect]] | None:
+def _drawn(
+    settings: Any, types: list[type[Effect]], strength: tuple[float, float] | None, rng: np.random.Generator
+) -> tuple[Plan, list[Effect]] | None:
     for _ in range(DRAWS):
         plan = draw(settings, rng)
         if not types:
             return plan, []
         prepared = prepare(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
-        span = STRANGE if types[0] in STRANGERS else STRONG
+        span = strength or (STRANGE if types[0] in STRANGERS else STRONG)
         acting = [_strong(prepared, t, span, rng) for t in types]
         if all(a is not None for a in acting):
             return plan, [a for a in acting if a is not None]
@@ -142,7 +149,7 @@ def _strong(
     limit = _limit(prepared, trial)
     if limit is None:
         return None
-    size = limit * rng.uniform(*span)
+    size = limit * float(np.exp(rng.uniform(*np.log(span))))
     if size > LARGEST:
         return None
     values = {
@@ -221,9 +228,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", nargs="*", default=[], help="strata or effects")
+    parser.add_argument("--strength", nargs=2, type=float, metavar=("LOW", "HIGH"), help="times the limit, all strata")
     parser.add_argument("--out", type=Path, help="one JSON line a case")
     arguments = parser.parse_args(argv)
-    chosen = list(cases(arguments.cases, arguments.seed, arguments.only))
+    strength = tuple(arguments.strength) if arguments.strength else None
+    chosen = list(cases(arguments.cases, arguments.seed, arguments.only, strength))
     results = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for number, result in enumerate(pool.map(trial, chosen), 1):

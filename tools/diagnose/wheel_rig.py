@@ -12,21 +12,18 @@ from estimator.effects.base import Effect
 from estimator.forward import simulate_arrays
 from estimator.history import rate_of
 from estimator.settings import Calibration, Settings, Uncertain
-from estimator.situation import Motion, Sensed, situation_of
+from estimator.situation import Motion, situation_of
 from estimator.terramechanics.soil import Array, Soil
 from tools.diagnose.load import Signals
+from tools.diagnose.physics import ORDER, Campaign, sensed_as
 from tools.diagnose.proposals import proposed
-from tools.diagnose.rig import Bools, Known, Run
+from tools.diagnose.rig import Known, Run
+from tools.diagnose.states import at_rest, states
 from tools.diagnose.weights import weights_of
 
-ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
 HELD = 0.05  # of the driving torque: current at rest that differs by more holds something
 EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
-CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
-SETTLING, LONGEST = 0.5, 5.0  # [s] after the wheel starts, before the comparison counts: at least, at most
-ANGLE = 0.7  # [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
-RESTING = 0.4  # [s] the wheel must have stood before its current counts as the reading at rest
 TIMING = 5e-3  # [s] by which a channel's stamps may be off
 BLUR = 0.3  # second differences by which speeds, slopes over three intervals, cut corners that a channel does not
 FLOORS = {
@@ -75,64 +72,47 @@ class WheelRig:
         ]
         self.baseline = configured(settings.effects)
         self.constants = (*_soil(settings, self.caveats), *self._calibrations(), *_configured(settings))
-        self.effects = {
-            n: e for n, e in EFFECTS.items()
-            if not e.filter_only and n not in LEFT_OUT and n not in {b.name for b in self.baseline}
-        }  # fmt: skip
-        self._starts: list[Array | None] = [None] * len(signals)
-        self._kept: list[dict[tuple[object, ...], Array]] = [{} for _ in signals]
-        self._steps = [float(np.median(np.diff(s.time))) for s in signals]
+        out = {*LEFT_OUT, *(b.name for b in self.baseline)}
+        if not all(w.known for w in self._weights):
+            out.add("load_axis_friction")  # the measured load that drives the balance holds it already
+        self.effects = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in out}
+        self._campaign = Campaign(self._motions, settings, self.channels)
+        self._kept: dict[tuple[object, ...], Array] = {}
+        lengths = np.concatenate([np.full(s.time.size, np.median(np.diff(s.time))) for s in signals])
+        self._step: Array = lengths  # [s] grid interval of each value (N,)
+        self._inner = np.ones(lengths.size, bool)  # (N,) with a neighbour of the same run on either side
+        for part in self._campaign.parts:
+            self._inner[[part.start, part.stop - 1]] = False
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
 
     # ---- prediction --------------------------------------------------------------------------------------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
-        acting = (*self._baseline(value), *effects)
-        return [self._predict(number, value, acting) for number in range(len(self._motions))]
+        read = self._read(self._true(value, (*self._baseline(value), *effects)), value)
+        return [dict(zip(self.channels, read[:, part], strict=True)) for part in self._campaign.parts]
 
-    def _predict(self, number: int, value: Mapping[str, float], effects: tuple[Effect, ...]) -> dict[str, Array]:
+    def _true(self, value: Mapping[str, float], effects: tuple[Effect, ...]) -> Array:
+        """True readings (channels, N) before scale, offset and delay; the last few are kept."""
         physics = (*(value[name] for name in PHYSICS), *effects)
-        kept = self._kept[number]
-        if physics not in kept:
-            if len(kept) >= KEPT:
-                kept.pop(next(iter(kept)))
-            kept[physics] = self._simulated(number, value, effects)
-        return self._read(number, kept[physics], value)
+        if physics not in self._kept:
+            if len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
+            self._kept[physics] = self._campaign.readings(
+                soil, 1.0 + value["weights"], 1.0 + value["carriage_scale"], effects
+            )
+        return self._kept[physics]
 
-    def _simulated(self, number: int, value: Mapping[str, float], effects: Sequence[Effect]) -> Array:
-        """True readings (channels, n) before scale, offset and delay."""
-        motion = self._motions[number]
-        travelled = 1.0 + value["carriage_scale"]
-        motion = replace(
-            motion,
-            load=motion.load * (1.0 + value["weights"]),
-            carriage_speed=motion.carriage_speed * travelled,
-            carriage_position=motion.carriage_position * travelled,
-        )
-        soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
-        response = simulate_arrays(
-            self.settings.wheel, soil, motion, effects,
-            torque_constant=self._constant, theta_1=self._starts[number], order=ORDER,
-        )  # fmt: skip
-        self._starts[number] = response.theta_1
-        return np.stack([self._sensed(response.sensed, channel) for channel in self.channels])
-
-    def _read(self, number: int, true: Array, value: Mapping[str, float]) -> dict[str, Array]:
+    def _read(self, true: Array, value: Mapping[str, float]) -> Array:
         scale, offset, delay, blur = (
             np.array([value[f"{c}_{what}"] for c in self.channels])[:, None]
             for what in ("scale", "offset", "delay", "blur")
         )
         read = true * (1.0 + scale) + offset
-        rate, bend = np.zeros_like(read), np.zeros_like(read)
-        rate[:, 1:-1] = (read[:, 2:] - read[:, :-2]) / (2.0 * self._steps[number])
-        bend[:, 1:-1] = read[:, 2:] + read[:, :-2] - 2.0 * read[:, 1:-1]
-        return dict(zip(self.channels, read - delay * rate + blur * bend, strict=True))
-
-    def _sensed(self, sensed: Sensed, channel: str) -> Array:
-        if channel == "torque":
-            return np.asarray(self._constant * sensed.current)
-        return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))
+        before, after = np.roll(read, 1, axis=1), np.roll(read, -1, axis=1)
+        rate, bend = (after - before) / (2.0 * self._step), after + before - 2.0 * read
+        return np.asarray(np.where(self._inner, read - delay * rate + blur * bend, read))
 
     def _baseline(self, value: Mapping[str, float]) -> tuple[Effect, ...]:
         return tuple(
@@ -156,7 +136,7 @@ class WheelRig:
         sensed = simulate_arrays(
             self.settings.wheel, soil, motion, acting, torque_constant=self._constant, order=ORDER
         ).sensed
-        return {c: self._sensed(sensed, c) + value[f"{c}_offset"] for c in self.channels}
+        return {c: sensed_as(sensed, c, self.settings) + value[f"{c}_offset"] for c in self.channels}
 
     # ---- what is known -----------------------------------------------------------------------------------------------
 
@@ -181,7 +161,7 @@ class WheelRig:
         motion = self._motions[number]
         measured = {c: _measured(signals, c, self._constant) for c in self.channels}
         covariates = self._covariates(signals, motion) | {"sinkage": self._depth(number)}
-        driving, resting, lifted = _states(motion, self.settings)
+        driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
         known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
         known[:EDGE] = known[-EDGE:] = False
@@ -310,7 +290,7 @@ def _configured(settings: Settings) -> tuple[Known, ...]:
 def _motion(signals: Signals, weights: Array, settings: Settings, began: float) -> Motion:
     angle, travel = _filled(signals.wheel_angle), _filled(signals.carriage_angle) * settings.pulley_radius
     wheel_speed, carriage_speed = _filled(signals.wheel_speed), _filled(signals.carriage_rate) * settings.pulley_radius
-    rest = _rest(settings.wheel.radius * wheel_speed, carriage_speed)
+    rest = at_rest(settings.wheel.radius * wheel_speed, carriage_speed)
     temperature = signals.analogue.get("temperature")
     return Motion(
         time=signals.time + began,
@@ -323,38 +303,6 @@ def _motion(signals: Signals, weights: Array, settings: Settings, began: float) 
         start_position=signals.info.start_position,
         temperature=None if temperature is None else _filled(temperature),
     )
-
-
-def _states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
-    """Driving on the soil and settled; at rest for a while; lifted off the soil."""
-    rim = settings.wheel.radius * np.abs(np.asarray(motion.wheel_speed))
-    turning = rim[rim > 1e-3]
-    usual = float(np.median(turning)) if turning.size else 1e-3
-    moving = rim > CREEP * usual
-    load = np.asarray(motion.load)
-    carrying = load >= settings.load.minimum
-    step = float(np.median(np.diff(np.asarray(motion.time))))
-    passing = ANGLE / max(usual / settings.wheel.radius, 1e-6)
-    settled = _lasting(moving, round(float(np.clip(passing, SETTLING, LONGEST)) / step))
-    rest = _rest(np.asarray(motion.wheel_speed) * settings.wheel.radius, np.asarray(motion.carriage_speed))
-    resting = _lasting(rest, round(RESTING / step)) & _lasting(rest[::-1], 2)[::-1]
-    return settled & carrying, resting & carrying, settled & (load < 0.2 * settings.load.minimum)
-
-
-def _rest(rim_speed: Array, carriage_speed: Array) -> Bools:
-    """Both stand still but for the encoders' noise; a standing wheel's slip means nothing, so both speeds become 0."""
-    turning = np.abs(rim_speed)[np.abs(rim_speed) > 1e-3]
-    least = 0.01 * float(np.median(turning)) if turning.size else 1e-4
-    rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
-    return rest
-
-
-def _lasting(state: Bools, count: int) -> Bools:
-    """Where the state has lasted for `count` intervals already; from the very start of a run it counts at once."""
-    since = np.arange(state.size)
-    broken = np.maximum.accumulate(np.where(~state, since, -count - 1))
-    lasting: Bools = state & (since - broken > count)
-    return lasting
 
 
 def _filled(values: Array) -> Array:

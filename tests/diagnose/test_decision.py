@@ -1,0 +1,78 @@
+"""From evidence to what is said: alarms by name, other published forms, learnt probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimator.effects import EFFECTS, make
+from estimator.effects.base import Effect
+from tests.diagnose.campaigns import plan, settings
+from tools.diagnose import discrepancy
+from tools.diagnose.calibrate import learn, log_truth, tabled
+from tools.diagnose.calibration import Calibration, learnt
+from tools.diagnose.cases import record
+from tools.diagnose.cousins import LorentzStribeck
+from tools.diagnose.fit import free_of
+from tools.diagnose.prepare import prepare
+from tools.diagnose.screen import Screen
+from tools.diagnose.wheel_rig import WheelRig
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:
+    """Six nats on a function that slow noise imitates say less than five on one that it cannot."""
+    found = Screen(
+        {"drift": 6.0, "friction": 5.0}, {"drift": (4.0, 5.0), "friction": (0.2, 1.0)}, {}, {}, np.zeros(300)
+    )
+    assert found.largest[0] == "friction"
+    assert found.surprise("drift") < 1.0 < found.threshold < found.surprise("friction")
+
+
+def _evidence(acting: Sequence[Effect], name: str) -> Any:
+    """Evidence of a listed effect above the base model, for each degree to which forms may differ."""
+    prepared = prepare(WheelRig(record(plan(seconds=12.0), acting), settings()), np.random.default_rng(0))
+    effect = EFFECTS[name]
+    free = free_of((effect,))
+    x = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
+    fitted = prepared.problem.descend((effect,), free, prepared.base.u, x)
+    return discrepancy.evidence(prepared.problem, fitted) - prepared.base.log_evidence
+
+
+def test_another_published_form_keeps_its_name() -> None:
+    """Lorentz's break-away friction is not our Gaussian: with a discrepancy it is evident, ours needs none."""
+    ours = _evidence((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
+    other = _evidence((LorentzStribeck(size=1.5),), "stribeck_friction")
+    assert np.argmax(ours) == 0
+    assert np.argmax(other) > 0
+    assert other.max() > other[0] + 3.0
+
+
+def test_the_calibration_is_learnt_from_what_was_true() -> None:
+    """Rivals whose evidence is three times too large: the temperature comes out as three."""
+    rng, cases = np.random.default_rng(0), []
+    for _ in range(400):
+        evidence = rng.normal(20.0, 6.0, 3)
+        share = np.exp((evidence - evidence.max()) / 3.0)
+        truth = rng.choice(["a", "b", "c"], p=share / share.sum())
+        weighed = [[[n], [e] * discrepancy.FORMS] for n, e in zip("abc", evidence.tolist(), strict=True)]
+        cases.append({"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": [-1e6, -1e6]})
+    by, score = learn(cases)
+    assert by.temperature == pytest.approx(3.0, rel=0.25)
+    overconfident = Calibration(0.5, by.forms, by.more, by.nameless, by.beside)
+    assert score > log_truth(tabled(cases), overconfident).mean()
+
+
+def test_the_learnt_table_is_sound() -> None:
+    by = learnt()
+    assert 0.5 < by.temperature < 50.0
+    assert np.exp(by.forms).sum() == pytest.approx(1.0, abs=0.05)
+    assert max(by.more, by.nameless, by.beside) < 3.0

@@ -1,0 +1,113 @@
+"""`python -m tools.diagnose.calibrate FILE… --out OUT`: learn how far evidence is to be trusted.
+
+Each FILE holds trials (`python -m tools.diagnose.trials --out FILE`). The temperature, the weights of how far forms may
+differ, and the two kinds of odds are those that give the truth of every case the largest probability, on average: the
+logarithmic score, which only stated probabilities that are true maximise (Good 1952). A weak prior (PRIOR) keeps what
+the cases do not tell. The truth of a case is any set of effects that holds a true one, weighted by how many of its
+effects are true; of a stranger, functions without a name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose.calibration import Calibration
+from tools.diagnose.discrepancy import FORMS
+
+START = np.array([np.log(2.0), *([0.0] * (FORMS - 1)), -3.0, -3.0, -3.0])  # ln T, forms after the first, odds
+PRIOR = np.array([0.5, *([2.0] * (FORMS - 1)), 2.0, 3.0, 3.0])  # standard deviations about START
+FLOOR = 1e-3  # probability no miss is charged below: one case must not decide
+NEVER = -1e9
+
+
+@dataclass(frozen=True)
+class Table:
+    """Trials as arrays: n cases, k explanations at most."""
+
+    evidence: Array  # (n, k, FORMS) [nats above the base model]; NEVER where there is none
+    more: Array  # (n, k) effects beyond the first
+    right: Array  # (n, k) how much of the explanation is true
+    nameless: Array  # (n, 2) alone, beside
+    strange: Array  # (n,) 1 where functions without a name are the truth
+
+
+def tabled(cases: Sequence[dict[str, Any]]) -> Table:
+    most = max(len(c["weighed"]) for c in cases)
+    evidence = np.full((len(cases), most, FORMS), NEVER)
+    more, right = np.zeros((len(cases), most)), np.zeros((len(cases), most))
+    for i, case in enumerate(cases):
+        for j, (names, values) in enumerate(case["weighed"]):
+            evidence[i, j], more[i, j] = values, len(names) - 1
+            right[i, j] = _true(names, case["truth"])
+    strange = np.array([float(c["stratum"] == "unlisted") for c in cases])
+    return Table(evidence, more, right, np.maximum([c["nameless"] for c in cases], NEVER), strange)
+
+
+def _true(names: Sequence[str], truth: Sequence[str]) -> float:
+    """How much of a set of effects is right: what both share over all that either holds."""
+    return len(set(names) & set(truth)) / len(set(names) | set(truth))
+
+
+def log_truth(table: Table, by: Calibration) -> Array:
+    """Log probability of the truth of every case (n,)."""
+    listed = logsumexp(table.evidence / by.temperature + np.array(by.forms), axis=2) + by.more * table.more
+    unnamed = logsumexp(table.nameless / by.temperature + np.array([by.nameless, by.beside]), axis=1)
+    total = np.logaddexp(logsumexp(listed, axis=1), unnamed)
+    right = np.sum(np.exp(listed - total[:, None]) * table.right, axis=1)
+    return np.asarray(np.log(FLOOR + np.where(table.strange > 0.0, np.exp(unnamed - total), right)))
+
+
+def calibration(x: Array) -> Calibration:
+    forms = np.concatenate(([0.0], x[1:FORMS]))
+    forms = forms - logsumexp(forms)
+    more, nameless, beside = x[FORMS:].tolist()
+    return Calibration(float(np.exp(x[0])), tuple(forms.tolist()), more, nameless, beside)
+
+
+def learn(cases: Sequence[dict[str, Any]]) -> tuple[Calibration, float]:
+    """The calibration, and its mean log score over the cases [nats]."""
+    table = tabled(cases)
+
+    def loss(x: Array) -> float:
+        return float(0.5 * np.sum(((x - START) / PRIOR) ** 2) - log_truth(table, calibration(x)).sum())
+
+    found = minimize(loss, START, method="L-BFGS-B")
+    by = calibration(found.x)
+    return by, float(log_truth(table, by).mean())
+
+
+def usable(cases: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Trials that alarmed, rightly: the others say nothing of names."""
+    return [c for c in cases if c.get("weighed") and c["stratum"] != "none"]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tools.diagnose.calibrate", description=__doc__)
+    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--trials", default="", help="the command that made the files, to be kept with the table")
+    arguments = parser.parse_args(argv)
+    lines = [line for path in arguments.files for line in path.read_text(encoding="utf-8").splitlines()]
+    cases = usable([json.loads(line) for line in lines])
+    by, score = learn(cases)
+    table = {**by.__dict__, "cases": len(cases), "score": score, "trials": arguments.trials}
+    text = json.dumps(table, indent=1) + "\n"
+    if arguments.out is not None:
+        arguments.out.write_text(text, encoding="utf-8")
+    print(text, end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

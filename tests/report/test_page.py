@@ -129,7 +129,7 @@ def test_explained_says_everything_it_was_given() -> None:
         "2.3 σ away from what was known",  # strain
         "0.0630 mm",  # sinkage in millimetres
         "4.2 → 1.1",  # innovations
-        "Changes at 12.4 s.",
+        "Torque rises late in the runs. 12.4 s",  # where it starts
         "Not told apart by these recordings; together 98 %",
         "Stand still for some seconds with the drive powered. It would tell Coulomb friction and current offset apart",
         "2 other effects tried, each below 1 %",
@@ -214,6 +214,22 @@ def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
     assert all(run in labels for run in ("40 N", "120 N"))
     means = [p for p in pictures[0].iter("path") if p.get("class") == "line mean"]
     assert len(means) == len(cases.LOADS)
+
+
+def test_change_points_are_drawn_and_named() -> None:
+    """A line where the misfit starts; of runs between the two, with the name of the first beyond."""
+    found = cases.explained()
+    place = replace(found.location[1], changes=(0.3,))
+    page = parsed(diagnosis.render(replace(found, location=(place,))))
+    lines = [line for line in page.iter("line") if line.get("class") == "change"]
+    assert len(lines) == 2  # without and with
+    runs = replace(place, covariate="run", changes=(3.0,))
+    scatter = replace(found.scatters[0], covariate="run", x=[float(r) for r in found.scatters[0].run])
+    page = parsed(diagnosis.render(replace(found, location=(runs,), scatters=(scatter,))))
+    assert "70 N" in [" ".join(td.itertext()) for td in page.iter("td")]
+    line = next(line for line in page.iter("line") if line.get("class") == "change")
+    labels = {t.text: float(t.get("x") or 0) for t in page.iter("text") if t.text in ("55 N", "70 N")}
+    assert labels["55 N"] < float(line.get("x1") or 0) < labels["70 N"]
 
 
 def test_keys_of_effects_and_channels_are_said_in_words() -> None:

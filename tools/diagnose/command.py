@@ -75,9 +75,11 @@ def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, floa
     if is_drive(recordings):
         series = [drive_series(r, settings) for r in recordings]
         return DriveRig(series, [r.run.name or r.path.stem for r in recordings], settings), DRIVE_RATE
-    length = sum(float(signals(r, settings, FIRST).time[-1]) for r in recordings)
+    coarse = [signals(r, settings, FIRST) for r in recordings]
+    length = sum(float(s.time[-1]) for s in coarse)
     rate = next(hertz for limit, hertz in RATES if length <= limit)
-    return WheelRig([signals(r, settings, rate) for r in recordings], settings), rate
+    in_time = sorted(zip(recordings, coarse, strict=True), key=lambda pair: pair[1].start)
+    return WheelRig([signals(r, settings, rate) for r, _ in in_time], settings), rate
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -104,7 +106,7 @@ def text(found: Diagnosis) -> str:
     """The verdict for a person."""
     lines = [f"verdict: {found.verdict}", found.summary]
     for place in found.location[:4]:
-        lines.append(f"  where: {place.where} (share {place.share:.0%}, p {place.p:.2g})")
+        lines.append(f"  where: {place.where} (p {place.p:.2g})")
     for h in found.hypotheses[:4]:
         values = ", ".join(f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in h.parameters.items())
         alike = f"; like {', '.join(h.indistinguishable_from)}" if h.indistinguishable_from else ""

@@ -1,15 +1,22 @@
-"""Where the misfit lives: channel by covariate, with its share, its chance, and a sentence with numbers."""
+"""Where the misfit lives: channel by covariate, with its share, its chance, where it starts or stops, and a sentence.
+
+In each channel covariates are taken up by evidence, one beside the others, so that one place of the misfit is not told
+once for every covariate that varies along with it.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose.noise import whiten
+from tools.diagnose import changes, heldout, where
+from tools.diagnose.evidence import log_bayes
 from tools.diagnose.result import Location
-from tools.diagnose.rig import Stack
-from tools.diagnose.screen import whitened
+from tools.diagnose.rig import Index, Stack
+from tools.diagnose.scores import Beside, Scores
 from tools.diagnose.select import Model, Search
 from tools.diagnose.signatures import highest_order
 
@@ -17,105 +24,108 @@ DISCOVERY = 0.05  # false-discovery rate of the list
 MOST = 8
 RIPPLE = 0.01  # chance of the strongest order by noise alone
 FAR = 3.0  # [σ]
-STRAINED = {
-    "scale": "constant",
-    "offset": "constant",
-}  # what of a channel's calibration, and the covariate it stands for
+STRAINED = {"scale": "constant", "offset": "constant"}  # of a channel's calibration, and the covariate it stands for
 LEAST = 0.05  # share below which a place is not worth naming
-WORDS = {
-    "slip": "slip", "speed": "rim speed [m/s]", "load": "load [N]", "sinkage": "sinkage [m]", "position": "place [m]",
-    "time": "time [s]", "heat": "∫I² [A²s]", "acceleration": "acceleration [rad/s²]", "wheel_angle": "wheel angle",
-}  # fmt: skip
+BESIDE = 3.0  # [nats] that a covariate gains beside those already named, and the LEAST share of what they gain
+
+Found = tuple[float, Location]  # with the nats that it takes
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A smooth function of a covariate in one channel: its columns, nats beyond chance and the chance of as many."""
+
+    channel: str
+    name: str
+    own: Index
+    nats: float
+    p: float
 
 
 def locate(search: Search, model: Model) -> tuple[Location, ...]:
     """Places of the misfit of a model, by share; only those that survive false-discovery control."""
     stack = search.problem.stack
-    base, (noise, strain) = model.fitted.base(), search.draws
-    ready = whitened(search.problem.noise, search.generics)
-    columns = np.column_stack([w.columns for w in ready])
-    a, b = base.projected(columns)
-    null = base.scores(columns, noise, np.resize(strain, (base.jacobian.shape[1], strain.shape[1])))
-    ends = np.cumsum([w.columns.shape[1] for w in ready])
-    own = [slice(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
-    gain = [_gain(a[s, s], b[s], null[s]) for s in own]
-    names = [w.signature.name.partition("~") for w in ready]
-    channels = [channel for channel, _, _ in names]
-    whole = {c: _whole(a, b, null, [s for s, d in zip(own, channels, strict=True) if d == c]) for c in set(channels)}
-    alone = {(c, n): g[0] for (c, _, n), g in zip(names, gain, strict=True)}
-    q = _false_discovery(np.array([g[1] for g in gain]))
-    found = []
-    for (channel, _, name), (value, p_i), q_i in zip(names, gain, q, strict=True):
-        share = float(np.clip(value / max(whole[channel], 1e-9), 0.0, 1.0))
-        if q_i <= DISCOVERY and share >= LEAST:
-            covariate = max(name.split("·"), key=lambda n: alone.get((channel, n), 0.0))
-            where = sentence(stack, model, channel, name)
-            found.append((value, Location(channel, covariate, share, float(p_i), float(q_i), where)))
-    found += _strains(stack, model) + ripples(search, model)
+    residual = stack.measured - heldout.held_out(model.fitted, heldout.run_folds(stack)).predicted
+    points = changes.find(search, model)
+    names, columns = _columns(search, points)
+    beside = Beside(search, model)
+    board = beside.scores(np.column_stack(columns), np.ones(stack.size, bool))
+    ends = np.cumsum([0, *(c.shape[1] for c in columns)])
+    families = [
+        _family(board, name, np.arange(start, end)) for name, start, end in zip(names, ends[:-1], ends[1:], strict=True)
+    ]
+    q = dict(zip(families, _false_discovery(np.array([f.p for f in families])), strict=True))
+    found: list[Found] = []
+    for channel in stack.rig.channels:
+        here = [f for f in families if f.channel == channel]
+        whole = _gain(board, np.concatenate([f.own for f in here]))[0] if here else 0.0
+        for family in _taken_up(board, here, {c for (of, c) in points if of == channel}):
+            share = float(np.clip(family.nats / max(whole, 1e-9), 0.0, 1.0))
+            if q[family] <= DISCOVERY and share >= LEAST:
+                found.append((family.nats, _place(stack, residual, family, here, points, share, float(q[family]))))
+    found += _strains(stack, model) + ripples(search, beside, board, families)
     found.sort(key=lambda item: -item[0])
     return tuple({(place.channel, place.covariate): place for _, place in reversed(found)}.values())[::-1][:MOST]
 
 
-def ripples(search: Search, model: Model) -> list[tuple[float, Location]]:
-    """The strongest order of the wheel angle in each channel, against the strongest of every surrogate."""
-    stack = search.problem.stack
-    orders = np.arange(3.0, highest_order(stack))
-    if not orders.size:
-        return []
-    phase = np.outer(stack.covariate("wheel_angle"), orders)
-    moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)[:, None]
-    waves = moving * np.exp(1j * phase)
-    found = []
-    for channel in stack.rig.channels:
-        own = stack.of(channel)[:, None]
-        both = [whiten(search.problem.noise, np.where(own, part, 0.0)) for part in (waves.real, waves.imag)]
-        size = np.maximum(sum(np.sum(part**2, axis=0) for part in both), 1e-12)
-        gain, nulls = (
-            sum((part.T @ values) ** 2 for part in both) / (size if values.ndim == 1 else size[:, None])
-            for values in (model.fitted.residual, search.draws[0])
-        )
-        best = int(np.argmax(gain))
-        p = float((1 + np.sum(nulls.max(axis=0) >= gain[best])) / (1 + nulls.shape[1]))
-        if p <= RIPPLE:
-            found.append((float(gain[best]), _ripple(stack, model, channel, float(orders[best]), p)))
-    return found
+def _columns(search: Search, points: changes.Changes) -> tuple[list[str], list[Array]]:
+    """Names and columns of all smooth functions, steps at the change points of a covariate among them."""
+    names, columns = [], []
+    for signature in search.generics:
+        channel, _, covariate = signature.name.partition("~")
+        steps = points.get((channel, covariate), ())
+        more = [changes.columns(search.problem.stack, channel, covariate, steps)] if steps else []
+        names.append(signature.name)
+        columns.append(np.column_stack((signature.columns, *more)))
+    return names, columns
 
 
-def _ripple(stack: Stack, model: Model, channel: str, order: float, p: float) -> Location:
-    own = stack.of(channel)
-    residual = (stack.measured - model.fitted.predicted)[own]
-    angle = stack.covariate("wheel_angle")[own]
-    amplitude = 2.0 * abs(np.mean((residual - residual.mean()) * np.exp(-1j * order * angle)))
-    share = float(np.clip(0.5 * amplitude**2 / max(float(np.var(residual)), 1e-300), 0.0, 1.0))
-    where = f"{channel}: ripples {order:.0f} times a turn, ± {amplitude:.2g} {stack.rig.units[channel]}"
-    return Location(channel, "wheel_angle", share, p, p, where)
+def _place(
+    stack: Stack, residual: Array, family: Family, here: list[Family], points: changes.Changes, share: float, q: float
+) -> Location:
+    """A product of covariates is filed under the one that takes most alone."""
+    alone = {f.name: f.nats for f in here}
+    covariate = max(family.name.split("·"), key=lambda n: alone.get(n, 0.0))
+    places = points.get((family.channel, covariate), ())
+    if covariate == "run" and places and not where.shows(stack, residual, family.channel, places):
+        places = ()
+    said = where.sentence(stack, residual, family.channel, family.name, places, share)
+    first = tuple(float(np.ceil(place)) for place in places) if covariate == "run" else places
+    return Location(family.channel, covariate, share, family.p, q, said, first)
 
 
-def _strains(stack: Stack, model: Model) -> list[tuple[float, Location]]:
-    """Calibration constants pulled far off what is known: a misfit that hides there leaves no residual."""
-    nats = 0.5 * model.fitted.u**2
-    found = []
-    for known, u, value in zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True):
-        channel, _, what = known.name.rpartition("_")
-        if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
-            to = f"{known.of(u):+.3g} {known.unit}"
-            where = f"{channel}: the fit pulls its {what} {u:+.1f} σ off the calibration, to {to}"
-            p = float(2.0 * norm.sf(abs(u)))
-            place = Location(channel, STRAINED[what], value / float(nats.sum()), p, p, where.rstrip())
-            found.append((value, place))
-    return found
+# ---- which covariates ----------------------------------------------------------------------------------------------
 
 
-def _gain(a: Array, b: Array, null: Array) -> tuple[float, float]:
-    """Nats gained beyond chance, and the chance of as much."""
-    smooth = np.linalg.inv(a + np.eye(len(b)))
-    value, nulls = 0.5 * float(b @ smooth @ b), 0.5 * np.sum(null * (smooth @ null), axis=0)
+def _family(board: Scores, name: str, own: Index) -> Family:
+    channel, _, covariate = name.partition("~")
+    return Family(channel, covariate, own, *_gain(board, own))
+
+
+def _gain(board: Scores, own: Index) -> tuple[float, float]:
+    """Nats gained beyond chance, and the chance of as many."""
+    smooth = np.linalg.inv(board.a[np.ix_(own, own)] + np.eye(own.size))
+    nats = 0.5 * np.sum(board.b[own] * (smooth @ board.b[own]), axis=0)
+    value, nulls = float(nats[0]), nats[1:]
     return max(value - float(nulls.mean()), 0.0), float((1 + np.sum(nulls >= value)) / (1 + nulls.size))
 
 
-def _whole(a: Array, b: Array, null: Array, parts: list[slice]) -> float:
-    index = np.concatenate([np.arange(s.start, s.stop) for s in parts])
-    return _gain(a[np.ix_(index, index)], b[index], null[index])[0]
+def _taken_up(board: Scores, families: list[Family], certain: set[str]) -> list[Family]:
+    """Families of a channel by evidence, each beside those before it; first those with change points."""
+    taken = [f for f in families if f.name in certain]
+    best = _evidence(board, taken)
+    while True:
+        tried = {f: _evidence(board, [*taken, f]) for f in families if f not in taken}
+        if not tried or tried[first := max(tried, key=lambda f: tried[f])] < best + max(BESIDE, LEAST * best):
+            return taken
+        taken, best = [*taken, first], tried[first]
+
+
+def _evidence(board: Scores, families: list[Family]) -> float:
+    if not families:
+        return 0.0
+    own = np.concatenate([f.own for f in families])
+    return float(log_bayes(board.a[np.ix_(own, own)], board.b[own, 0], (0,) * own.size))
 
 
 def _false_discovery(p: Array) -> Array:
@@ -127,24 +137,56 @@ def _false_discovery(p: Array) -> Array:
     return out
 
 
-def sentence(stack: Stack, model: Model, channel: str, covariate: str) -> str:
-    """Measured less predicted in words, at the low and the high end of the covariate."""
-    own = stack.of(channel)
-    residual = (stack.measured - model.fitted.predicted)[own]
-    unit = stack.rig.units[channel]
-    name = covariate.split("·")[0]
-    size = f"{float(np.sqrt(np.mean(residual**2))):.3g} {unit} r.m.s."
-    if name == "constant":
-        return f"{channel}: measured less predicted is {residual.mean():+.3g} {unit} on average"
-    if name == "run":
-        means = {stack.rig.runs[r].name: residual[stack.run[own] == r].mean() for r in np.unique(stack.run[own])}
-        return (
-            f"{channel}: differs from run to run: " + ", ".join(f"{n} {m:+.2g}" for n, m in means.items()) + f" {unit}"
-        )
-    if name in ("wheel_angle", "direction") or "·" in covariate:
-        return f"{channel}: varies with {covariate.replace('·', ' and ')}, {size}"
-    x = stack.covariate(name)[own]
-    low, high = np.quantile(x, (0.15, 0.85))
-    first, last = residual[x <= low].mean(), residual[x >= high].mean()
-    ends = f"{first:+.3g} {unit} at {low:.3g} to {last:+.3g} {unit} at {high:.3g}"
-    return f"{channel}: measured less predicted goes from {ends} of {WORDS.get(name, name)}"
+# ---- ripples and strains -------------------------------------------------------------------------------------------
+
+
+def ripples(search: Search, beside: Beside, board: Scores, families: list[Family]) -> list[Found]:
+    """The strongest order of the wheel angle in each channel beside all smooth functions, against every surrogate's."""
+    stack = search.problem.stack
+    orders = np.arange(3.0, highest_order(stack))
+    found: list[Found] = []
+    for channel in stack.rig.channels if orders.size else ():
+        own = stack.of(channel)
+        moving = stack.covariate("speed")[own] > 0.0
+        waves = np.exp(1j * np.outer(stack.covariate("wheel_angle")[own], orders)) * moving[:, None]
+        smooth = np.column_stack([s.columns[own] for s in search.generics if s.name.startswith(f"{channel}~")])
+        size = float(np.sqrt(np.mean(smooth**2))) if own.any() else 0.0
+        if size <= 0.0:
+            continue
+        columns = np.column_stack((size * waves.real, size * waves.imag, smooth))
+        left = beside.scores(columns, own).without_columns(slice(2 * orders.size, columns.shape[1]))
+        nats = np.stack([_pair(left, k, k + orders.size) for k in range(orders.size)])
+        best = int(np.argmax(nats[:, 0]))
+        p = float((1 + np.sum(nats[:, 1:].max(axis=0) >= nats[best, 0])) / nats.shape[1])
+        whole = _gain(board, np.concatenate([f.own for f in families if f.channel == channel]))[0]
+        share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
+        if p <= RIPPLE and share >= LEAST:
+            amplitude = size * _amplitude(left, best, best + orders.size)
+            said = where.ripple(stack, channel, float(orders[best]), amplitude, share)
+            found.append((float(nats[best, 0]), Location(channel, "wheel_angle", share, p, p, said)))
+    return found
+
+
+def _pair(left: Scores, one: int, two: int) -> Array:
+    """Nats (1 + draws,) that cosine and sine of an order gain."""
+    own = [one, two]
+    gained = np.linalg.solve(left.a[np.ix_(own, own)] + 1e-9 * np.eye(2), left.b[own])
+    return np.asarray(0.5 * np.sum(left.b[own] * gained, axis=0))
+
+
+def _amplitude(left: Scores, one: int, two: int) -> float:
+    own = [one, two]
+    return float(np.linalg.norm(np.linalg.solve(left.a[np.ix_(own, own)] + 1e-9 * np.eye(2), left.b[own, 0])))
+
+
+def _strains(stack: Stack, model: Model) -> list[Found]:
+    """Calibration constants pulled far off what is known: a misfit that hides there leaves no residual."""
+    nats = 0.5 * model.fitted.u**2
+    found: list[Found] = []
+    for known, u, value in zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True):
+        channel, _, what = known.name.rpartition("_")
+        if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
+            said = where.strain(channel, what, known.of(u), known.unit, u)
+            p = float(2.0 * norm.sf(abs(u)))
+            found.append((value, Location(channel, STRAINED[what], value / float(nats.sum()), p, p, said)))
+    return found

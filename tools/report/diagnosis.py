@@ -208,15 +208,18 @@ def _misfit(found: Diagnosis) -> Markup | None:
 
 def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
     here = (scatter.channel, scatter.covariate)
-    words = [place.where for place in found.location if (place.channel, place.covariate) == here]
+    places = [place for place in found.location if (place.channel, place.covariate) == here]
     against = figures.drawn_against(scatter)
     about = f"Residual of {name_of(scatter.channel)} against {name_of(against)}"
     if against == "run":
         about = f"Residual of {name_of(scatter.channel)} in each run, in order of time"
-    key = figures.legend({"mean": "mean", "band": "± 2σ of the noise"})
-    caption = f"{about}. {sentence(tables.named(found, words[0]))}" if words else f"{about}."
+    changes = places[0].changes if places else ()
+    marks = {"change": "starts or stops"} if changes else {}
+    key = figures.legend({"mean": "mean", "band": "± 2σ of the noise", **marks})
+    caption = f"{about}. {sentence(tables.named(found, places[0].where))}" if places else f"{about}."
     runs = list(dict.fromkeys(trace.run for trace in found.traces))
-    return figures.figure(caption, figures.scatter(scatter, explanation(found), runs), legend=key, small=True)
+    drawn = figures.scatter(scatter, explanation(found), runs, changes)
+    return figures.figure(caption, drawn, legend=key, small=True)
 
 
 def _hypotheses(found: Diagnosis) -> Markup | None:

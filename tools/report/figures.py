@@ -135,8 +135,11 @@ def drawn_against(of: Scatter) -> str:
     return "run" if first == "constant" else first
 
 
-def scatter(of: Scatter, explanation: str, runs: Sequence[str]) -> Markup:
-    """Residuals without and with the explanation, on one scale; their mean through them."""
+def scatter(of: Scatter, explanation: str, runs: Sequence[str], changes: Sequence[float] = ()) -> Markup:
+    """Residuals without and with the explanation, on one scale; their mean through them.
+
+    changes: values of the covariate at which the misfit starts or stops; of runs, the number of the first run beyond.
+    """
     unit, factor = shown(of.unit)
     sides = [(f"without {explanation}", "before")] + ([(f"with {explanation}", "after")] if differs(of) else [])
     values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
@@ -151,10 +154,18 @@ def scatter(of: Scatter, explanation: str, runs: Sequence[str]) -> Markup:
             plot.band(at, -2 * sigma, 2 * sigma),
             plot.frame(at, f"residual [{unit or '–'}]", below=name, names=names),
             plot.dots(at, *_some(x, values[kind]), f"dots {kind}"),
+            plot.uprights(at, _marked(of, changes), "change") if changes else None,
             _levels(at, of, values[kind]) if names else plot.line(at, *running_mean(x, values[kind]), "line mean"),
         )
         drawn.append(panel(title if len(sides) > 1 else "", plot.picture(224.0, label, *marks)))
     return panels(drawn)
+
+
+def _marked(of: Scatter, changes: Sequence[float]) -> list[float]:
+    """Change points on the horizontal axis: between two runs, or in the unit shown."""
+    if drawn_against(of) == "run":
+        return [change - 1.5 for change in changes]
+    return [change * covariate_shown(of.covariate, of.covariate_unit)[1] for change in changes]
 
 
 Along = tuple[Array, str, tuple[float, float], list[str] | None]  # values, label, limits, names of 0, 1, 2 …

@@ -125,6 +125,16 @@ def line(at: Axes, x: Array | Sequence[float], y: Array | Sequence[float], class
     return at.clipped(tag("path", class_=class_, d="".join(pieces)))
 
 
+def uprights(at: Axes, places: Sequence[float], class_: str) -> Markup:
+    """A line over the whole height at each place along the horizontal axis."""
+    marks = [
+        tag("line", class_=class_, x1=x, x2=x, y1=at.y.start, y2=at.y.end)
+        for x in at.x(np.asarray(places, dtype=float)).tolist()
+        if np.isfinite(x)
+    ]
+    return at.clipped(*marks)
+
+
 def thinned(x: Array, y: Array, most: int = MOST) -> tuple[Array, Array]:
     """Of each stretch its least and greatest value, in order; all of it where there are few points."""
     if len(x) <= most:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from tools.diagnose.result import Diagnosis, Location, Quantity
@@ -26,6 +27,7 @@ UNSEEN = (
     "remaining uncertainty makes of a run that was not fitted."
 )
 STRAYED = 2.0  # [σ]
+DECADE = 10.0  # values from here on carry a third digit
 
 
 def parameters(found: Diagnosis) -> Markup | None:
@@ -46,22 +48,39 @@ def location(found: Diagnosis) -> Markup | None:
     if not found.location:
         return None
     rows = [
-        (name_of(p.channel), name_of(p.covariate), _words(found, p), percent(p.share), probability(p.q))
+        (
+            name_of(p.channel),
+            name_of(p.covariate),
+            sentence(named(found, p.where)),
+            _changes(found, p),
+            probability(p.q),
+        )
         for p in found.location
     ]
-    head = ("channel", "against", "in words", "share", "q")
-    note = "Share: the part of the channel's explainable misfit. q: false-discovery rate over all pairs tried."
-    return section("Where, in words", table(head, rows, numbers=3), tag("p", note, class_="note"))
+    head = ("channel", "against", "in words", "starts or stops at", "q")
+    note = (
+        "Recorded against predicted, the value's own run held out. A channel's misfit is what soil and calibration "
+        "cannot take; shares overlap where covariates vary together. q: false-discovery rate over all pairs tried."
+    )
+    return section("Where, in words", table(head, rows, numbers=4), tag("p", note, class_="note"))
 
 
-def _words(found: Diagnosis, place: Location) -> str:
-    """The sentence, and where the misfit starts or stops."""
-    where = sentence(named(found, place.where))
-    if not place.changes:
-        return where
+def _changes(found: Diagnosis, place: Location) -> str:
+    """Values of the covariate at which the misfit starts or stops."""
+    if place.covariate == "run":
+        return listed([run_name(found, change) for change in place.changes])
     unit, factor = covariate_shown(place.covariate, UNITS.get(place.covariate, ""))
-    changes = [spaced(change * factor, unit) for change in place.changes]
-    return f"{where} Changes at {listed(changes)}."
+    return listed(
+        [spaced(change * factor, unit, 2 if abs(change * factor) < DECADE else 3) for change in place.changes]
+    )
+
+
+def run_name(found: Diagnosis, number_of: float) -> str:
+    """The name of the n-th run in order of time, from 1."""
+    began = {trace.run: trace.time[0] for trace in found.traces}
+    names = sorted(began, key=lambda run: began[run])
+    at = int(number_of) - 1 if math.isfinite(number_of) else -1
+    return names[at] if 0 <= at < len(names) else f"run {number(number_of)}"
 
 
 def held_out(found: Diagnosis) -> Markup | None:

@@ -58,7 +58,8 @@ def shown(unit: str) -> tuple[str, float]:
 
 
 def covariate_shown(covariate: str, unit: str) -> tuple[str, float]:
-    return COVARIATES.get(covariate) or shown(unit)
+    """A drive's speed and position are angles, and are shown as such."""
+    return shown(unit) if unit.startswith("rad") else COVARIATES.get(covariate) or shown(unit)
 
 
 def number(value: float | None, digits: int = 3) -> str:

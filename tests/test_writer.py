@@ -306,7 +306,7 @@ while True:
         now = time.monotonic_ns()
         thread.put([Reading(now, "wheel_encoder", i, now)])
         i += 1
-    if i % 5 == 0:
+    if thread.status().written:
         print(i, flush=True)
     time.sleep(0.002)
 """

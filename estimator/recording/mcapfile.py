@@ -24,7 +24,6 @@ from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
     Chunk,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -36,6 +35,8 @@ from mcap.records import (
     SummaryOffset,
 )
 from numpy.typing import NDArray
+
+from estimator.recording.chunk_index import ChunkIndexes
 
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
@@ -116,7 +117,7 @@ class McapFile:
         self._definitions: dict[int, Definition] = {}
         self._preambles: dict[int, bytes] = {}
         self._metadata_index: list[MetadataIndex] = []
-        self._chunk_indexes = _Packed()
+        self._chunk_indexes = ChunkIndexes(self._compression)
         self._counts: Counter[int] = Counter()
         self._span: tuple[int, int] | None = None  # first and last log_time [ns]
         self._length = 0
@@ -171,9 +172,10 @@ class McapFile:
         span = int(heads["log_time"].min()), int(heads["log_time"].max())
         chunk = record_bytes(self._chunk(content, span))
         indexes = [_message_index(int(c), heads, offsets) for c in np.unique(heads["channel"])]
-        entry = self._chunk_index(chunk, indexes, len(content), span)
+        start = self._length
         self._append(chunk + b"".join(index for _, index in indexes))
-        self._chunk_indexes.add(entry)
+        lengths = [(channel, len(index)) for channel, index in indexes]
+        self._chunk_indexes.add(start, len(chunk), span, len(content), lengths)
         self._counts.update(heads["channel"].tolist())
         self._span = span if self._span is None else (min(self._span[0], span[0]), max(self._span[1], span[1]))
 
@@ -226,29 +228,6 @@ class McapFile:
             uncompressed_size=len(content),
         )
 
-    def _chunk_index(
-        self, chunk: bytes, indexes: Sequence[tuple[int, bytes]], size: int, span: tuple[int, int]
-    ) -> bytes:
-        """Serialised at once: closing the file then costs a join, however long the run was."""
-        position = self._length + len(chunk)
-        offsets: dict[int, int] = {}
-        for channel, index in indexes:
-            offsets[channel] = position
-            position += len(index)
-        return record_bytes(
-            ChunkIndex(
-                chunk_length=len(chunk),
-                chunk_start_offset=self._length,
-                compression=self._compression,
-                compressed_size=len(chunk) - RECORD_HEAD.size - 40 - len(self._compression),
-                message_end_time=span[1],
-                message_index_length=position - self._length - len(chunk),
-                message_index_offsets=offsets,
-                message_start_time=span[0],
-                uncompressed_size=size,
-            )
-        )
-
     def _ending(self) -> bytes:
         data_end = record_bytes(DataEnd(self._crc))
         start = self._length + len(data_end)
@@ -271,7 +250,7 @@ class McapFile:
             (Opcode.SCHEMA, record_bytes(*schemas.values())),
             (Opcode.CHANNEL, record_bytes(*(channel for _, channel in used))),
             (Opcode.STATISTICS, record_bytes(self._statistics(len(schemas)))),
-            (Opcode.CHUNK_INDEX, self._chunk_indexes.all()),
+            (Opcode.CHUNK_INDEX, self._chunk_indexes.records()),
             (Opcode.METADATA_INDEX, record_bytes(*self._metadata_index)),
         ]
 
@@ -288,22 +267,6 @@ class McapFile:
             metadata_count=len(self._metadata_index),
             schema_count=schemas,
         )
-
-
-class _Packed:
-    """Records that are added one by one and read once, compressed meanwhile: an index of many hours stays small."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._packer = zlib.compressobj(1)
-        self._packed = bytearray()
-
-    def add(self, record: bytes) -> None:
-        self._packed += self._packer.compress(record)
-        self.count += 1
-
-    def all(self) -> bytes:
-        return zlib.decompress(self._packed + self._packer.copy().flush())
 
 
 def _compress(kind: str, content: bytes) -> bytes:

@@ -6,6 +6,7 @@ import argparse
 import importlib
 import json
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Sequence
@@ -15,7 +16,8 @@ from estimator import config
 from estimator.recording import versions
 from estimator.recording.salvage import Recording
 from estimator.settings import Settings
-from tools.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
+from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
+from tools.diagnose import redo
 from tools.diagnose.apply import applied
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
@@ -31,32 +33,72 @@ FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole."""
+    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole.
+
+    With --redo, 1 if it comes out otherwise.
+    """
     arguments = _parser().parse_args(argv)
-    configuration = config.load(arguments.config)
     for path in (arguments.json, arguments.report, arguments.apply):
         if path is not None and not path.parent.is_dir():
             raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)
-    found, damage = of_files(arguments.files, configuration, arguments.seed, _said, arguments.jobs)
-    if arguments.json is not None:
-        arguments.json.write_text(json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
-    if arguments.report is not None:
-        importlib.import_module("tools.report.diagnosis").write(found, arguments.report)
-    if arguments.apply is not None:
-        arguments.apply.write_text(applied(configuration, found), encoding="utf-8")
+    if arguments.redo is not None:
+        return _again(arguments)
+    if not arguments.files or arguments.config is None:
+        raise CommandError("diagnose: expected recordings and --config F, or --redo FILE", USAGE)
+    configuration, seed = config.load(arguments.config), arguments.seed or 0
+    named = [*map(str, arguments.files), "--config", str(arguments.config), "--seed", str(seed)]
+    command = shlex.join(["gritd", "diagnose", *named])
+    found, damage = of_files(arguments.files, configuration, seed, _said, arguments.jobs, command)
+    _write(arguments, found, configuration)
     print(text(found))
     return DAMAGED if damage else DONE
 
 
+def _again(arguments: argparse.Namespace) -> int:
+    """The diagnosis of a JSON or a report once more, on the same files."""
+    if arguments.files or arguments.config is not None or arguments.seed is not None:
+        raise CommandError("diagnose --redo: expected no recordings, --config or --seed: they are in the file", USAGE)
+    then = redo.read(arguments.redo)
+    redo.check(then)
+    configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
+    found, _ = of_files(list(then.files), configuration, then.seed, _said, arguments.jobs, then.command)
+    _write(arguments, found, configuration)
+    differs = list(redo.differences(then, redo.Record.of(found)))
+    print(text(found))
+    for line in redo.changed_versions(then):
+        print(f"note: computed with {line}")
+    print(f"redone: {'; '.join(differs) or f'the same as in {arguments.redo}'}")
+    return FAILED if differs else DONE
+
+
+def _write(arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration) -> None:
+    try:
+        if arguments.json is not None:
+            written = json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n"
+            arguments.json.write_text(written, encoding="utf-8")
+        if arguments.report is not None:
+            importlib.import_module("tools.report.diagnosis").write(found, arguments.report)
+        if arguments.apply is not None:
+            arguments.apply.write_text(applied(configuration, found), encoding="utf-8")
+    except OSError as error:
+        raise CommandError(f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE) from None
+
+
 def of_files(
-    files: Sequence[Path], configuration: config.Configuration, seed: int, step: object = None, jobs: int = 1
+    files: Sequence[Path],
+    configuration: config.Configuration,
+    seed: int,
+    step: object = None,
+    jobs: int = 1,
+    command: str = "",
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
     recordings = read_all(files)
     rig, rate = _rig(recordings, configuration.settings)
     if not rig.channels:
         raise CommandError(f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED)
-    redo = {
+    needed = {
+        **({"command": command} if command else {}),
         "files": {str(path): sha256(path) for path in files},
         "configuration": configuration.text,
         "grid_hz": rate,
@@ -64,7 +106,7 @@ def of_files(
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = diagnose(rig, seed, redo, step if callable(step) else lambda _: None, jobs)
+        found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
         if isinstance(rig, WheelRig) and "torque" in rig.channels:
             found = with_innovations(found, configuration, recordings)
     return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
@@ -87,12 +129,13 @@ def _parser() -> argparse.ArgumentParser:
         prog="gritd diagnose",
         description="Find where model and recordings differ, name the physics left out, model it, show the fit.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings, one a run")
-    parser.add_argument("--config", required=True, help="the testbed and what is known of the soil")
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
+    parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
-    parser.add_argument("--seed", type=whole(0), default=0, help="of the surrogates; default 0")
+    parser.add_argument("--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report")
+    parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; default: one a core")
     return parser
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from tools.diagnose import redo as diagnosed
 from tools.diagnose.result import Diagnosis, Hypothesis, Scatter, SoilFit, Trace
 from tools.report import figures, hypotheses, redo, tables
 from tools.report.html import Child, Markup, page, section, table, tag
@@ -45,11 +47,11 @@ STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a 
 
 def write(found: Diagnosis, path: Path) -> None:
     """Raises OSError."""
-    path.write_text(render(found), encoding="utf-8")
+    path.write_text(render(found, path.name), encoding="utf-8")
 
 
-def render(found: Diagnosis) -> str:
-    """The whole document."""
+def render(found: Diagnosis, name: str = "report.html") -> str:
+    """The whole document; name: of the file it will be."""
     return page(
         f"gritd diagnosis: {VERDICTS[found.verdict][0].lower()}",
         _verdict(found),
@@ -63,7 +65,7 @@ def render(found: Diagnosis) -> str:
         tables.law(found),
         _caveats(found),
         _next(found),
-        _redo(found),
+        _redo(found, name),
     )
 
 
@@ -277,10 +279,22 @@ def _next(found: Diagnosis) -> Markup | None:
     )
 
 
-def _redo(found: Diagnosis) -> Markup:
+def _redo(found: Diagnosis, name: str) -> Markup:
     noise = [(name_of(channel), _noise(found, channel, values)) for channel, values in found.noise.items()]
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
-    return section("To redo it", redo.content(found.redo), noise_table)
+    return section("To redo it", _again(found, name), redo.content(found.redo), noise_table)
+
+
+def _again(found: Diagnosis, name: str) -> list[Markup] | None:
+    """The command that does it again from this page, and what the command reads from it."""
+    if not isinstance(found.redo.get("files"), Mapping):
+        return None
+    command = shlex.join(["gritd", "diagnose", "--redo", name])
+    said = (
+        "This page holds what it takes beside the recordings: they are checked by their hashes, and results compared."
+    )
+    embedded = tag("pre", diagnosed.as_json(found), id=diagnosed.EMBEDDED, hidden="hidden")
+    return [paragraph(said), tag("pre", command, class_="command"), embedded]
 
 
 def _noise(found: Diagnosis, channel: str, values: Mapping[str, float]) -> str:

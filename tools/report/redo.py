@@ -5,7 +5,6 @@ Keys are shown as they are found: a text of several lines is folded, a list of m
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,7 +15,7 @@ NAMES = {"sha256": "SHA-256"}
 
 def content(redo: Mapping[str, Any]) -> list[Markup]:
     """The command line first, long texts last."""
-    command = redo.get("command") or _diagnose(redo)
+    command = redo.get("command", "")
     others = {key: _records(key, value) for key, value in redo.items() if key != "command"}
     short = {key: value for key, value in others.items() if not _tabular(value) and not _long(value)}
     rows = [(_name(key), tag("span", _words(value), class_="code")) for key, value in short.items()]
@@ -24,14 +23,6 @@ def content(redo: Mapping[str, Any]) -> list[Markup]:
     parts += [_files(key, value) for key, value in others.items() if _tabular(value)]
     parts += [table(("what", "as used"), rows)] if rows else []
     return parts + [_folded(_name(key), value) for key, value in others.items() if _long(value)]
-
-
-def _diagnose(redo: Mapping[str, Any]) -> str:
-    """The command of a diagnosis, from its files; the configuration is on the page."""
-    files, seed = redo.get("files"), redo.get("seed", 0)
-    if not isinstance(files, Mapping):
-        return ""
-    return shlex.join(["gritd", "diagnose", *files, "--config", "configuration.yaml", "--seed", str(seed)])
 
 
 def _records(key: str, value: Any) -> Any:

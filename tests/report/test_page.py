@@ -126,7 +126,7 @@ def test_explained_says_everything_it_was_given() -> None:
     for text in (
         "loss 0.1310 ± 0.0060 N·m",  # parameter with unit
         "1710 ± 60 Pa",  # soil without
-        "2.3 σ away from what was known",  # strain
+        "cohesion c by +2.3 σ from what was known",  # strain
         "0.0630 mm",  # sinkage in millimetres
         "4.2 → 1.1",  # innovations
         "Torque rises late in the runs. 12.4 s",  # where it starts

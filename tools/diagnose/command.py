@@ -107,8 +107,7 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
-        if isinstance(rig, WheelRig) and "torque" in rig.channels:
-            found = with_innovations(found, configuration, recordings)
+        found = with_innovations(found, configuration, recordings, soil=isinstance(rig, WheelRig))
     return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
 
 
@@ -163,6 +162,8 @@ def text(found: Diagnosis) -> str:
                 f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
                 f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
             )
+        if strained := found.soil.strained():
+            lines.append(f"  {strained}")
     for channel, unit in found.fit.unit.items():
         lines.append(
             f"  held-out {channel}: {found.fit.before[channel]:.3g} before, {found.fit.after[channel]:.3g} after, "
@@ -172,6 +173,8 @@ def text(found: Diagnosis) -> str:
         pairs = found.fit.innovation_before.items()
         said = ", ".join(f"{n} {v:.2g} before, {found.fit.innovation_after.get(n, v):.2g} after" for n, v in pairs)
         lines.append(f"  on-line filter, innovation over its sigma: {said}")
+    elif found.fit.innovation_note:
+        lines.append(f"  on-line filter: {found.fit.innovation_note}")
     if found.next_experiment is not None:
         lines.append(f"  next: {found.next_experiment.action} ({found.next_experiment.expected_gain_nats:.0f} nats)")
     return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])

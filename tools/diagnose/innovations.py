@@ -9,22 +9,43 @@ import numpy as np
 
 from estimator import batch, config
 from estimator.filter.measurement import COMPONENTS
+from estimator.recording import RecordingError
 from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools.diagnose.apply import applied
 from tools.diagnose.result import Diagnosis
 
+NO_FILTER = "A drive without soil: no on-line filter runs over it."
+NO_UPDATE = "The on-line filter was offered no update: torque, load or motion are missing, or the wheel never settled."
+NOTHING_NEW = "Nothing was accepted, so the on-line filter stays as it is."
+
 
 def with_innovations(
-    found: Diagnosis, configuration: config.Configuration, recordings: Sequence[Recording]
+    found: Diagnosis, configuration: config.Configuration, recordings: Sequence[Recording], soil: bool = True
 ) -> Diagnosis:
-    """The result with the filter's normalised innovations, by the given configuration and by the improved one."""
-    before = innovations(configuration.settings, recordings)
-    after = before
-    if found.accepted or found.law is not None:
+    """The result with the filter's normalised innovations by the given configuration and by the improved one.
+
+    Where there are none, or no improved one, `innovation_note` says why.
+    """
+    if not soil:
+        return _noted(found, NO_FILTER)
+    try:
+        before = innovations(configuration.settings, recordings)
+        if not before:
+            return _noted(found, NO_UPDATE)
+        if not found.accepted and found.law is None:
+            return _noted(found, NOTHING_NEW, before, before)
         improved = config.loads(applied(configuration, found), "improved configuration")
-        after = innovations(improved.settings, recordings)
-    return replace(found, fit=replace(found.fit, innovation_before=before, innovation_after=after))
+        return _noted(found, "", before, innovations(improved.settings, recordings))
+    except (RecordingError, config.ConfigError) as error:
+        return _noted(found, f"The on-line filter could not run: {error}.")
+
+
+def _noted(
+    found: Diagnosis, note: str, before: dict[str, float] | None = None, after: dict[str, float] | None = None
+) -> Diagnosis:
+    fit = replace(found.fit, innovation_before=before, innovation_after=after, innovation_note=note)
+    return replace(found, fit=fit)
 
 
 def innovations(settings: Settings, recordings: Sequence[Recording]) -> dict[str, float]:

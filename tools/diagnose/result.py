@@ -45,7 +45,8 @@ class Location:
     """Where the misfit lives. `share` is the part of the channel's explainable misfit that the covariate takes.
 
     p is by surrogates, q after false-discovery control over all pairs that were tried.
-    changes: values of the covariate (time or position) at which the misfit starts or stops.
+    changes: values of the covariate at which the misfit starts or stops; of runs, the number (from 1) of the first
+    beyond.
     """
 
     channel: str
@@ -72,6 +73,16 @@ class Hypothesis:
     separated_by: Mapping[str, str] = field(default_factory=dict)  # rival -> what would tell them apart, in words
 
 
+SOIL = {  # in words
+    "c": "cohesion c",
+    "tan_phi": "tan φ",
+    "k": "shear modulus k",
+    "n": "sinkage exponent n",
+    "K": "sinkage modulus K",
+}
+STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
+
+
 @dataclass(frozen=True)
 class SoilFit:
     """c [Pa], tan_phi, k [m], n, K [Pa/mⁿ]: known before, fitted without and with the accepted effects.
@@ -84,12 +95,20 @@ class SoilFit:
     after: Mapping[str, Quantity]
     strain: Mapping[str, float]
 
+    def strained(self) -> str:
+        """In words, which parameters the fit without an effect moved far from what was known; empty if none."""
+        far = [(k, s) for k, s in self.strain.items() if math.isfinite(s) and abs(s) >= STRAINED]
+        moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
+        together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
+        return f"Without an effect the fit moves {together} from what was known." if moved else ""
+
 
 @dataclass(frozen=True)
 class Fit:
     """Root mean square errors in the channel's unit, on data held out: predicted by a fit to the other runs.
 
-    innovation: root mean square of the on-line filter's normalised innovations, None where they were not computed.
+    innovation: root mean square of the on-line filter's normalised innovations, None where there are none; the note
+    says why, or why after is as before.
     """
 
     unit: Mapping[str, str]
@@ -98,6 +117,7 @@ class Fit:
     noise_floor: Mapping[str, float]
     innovation_before: Mapping[str, float] | None = None
     innovation_after: Mapping[str, float] | None = None
+    innovation_note: str = ""
 
 
 @dataclass(frozen=True)
@@ -182,12 +202,12 @@ class Diagnosis:
         """The contract of docs/diagnosis.md; more keys than those promised may appear."""
         whole = asdict(self)
         soil, fit = whole.pop("soil"), whole.pop("fit")
-        whole["soil"] = soil
+        whole["soil"] = soil and {**soil, "strain_words": self.soil.strained() if self.soil else ""}
         whole["fit"] = {
             "heldout": {"before": fit["before"], "after": fit["after"]},
             "noise_floor": fit["noise_floor"],
             "unit": fit["unit"],
-            "innovation": {"before": fit["innovation_before"], "after": fit["innovation_after"]},
+            "innovation": {key: fit[f"innovation_{key}"] for key in ("before", "after", "note")},
         }
         return plain(whole)  # type: ignore[no-any-return]
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from tools.diagnose import redo as diagnosed
-from tools.diagnose.result import Diagnosis, Hypothesis, Scatter, SoilFit, Trace
+from tools.diagnose.result import STRAINED, Diagnosis, Hypothesis, Scatter, SoilFit, Trace
 from tools.report import figures, hypotheses, redo, tables
 from tools.report.html import Child, Markup, page, section, table, tag
 from tools.report.words import (
@@ -42,7 +41,6 @@ DRAWN = (
     "stretches were not compared: standstill, lifted, unsteady."
 )
 LOCATED_RUNS, OTHER_RUNS = 6, 3  # pictures in view of a channel where the misfit lives, and of another
-STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
 
 
 def write(found: Diagnosis, path: Path) -> None:
@@ -235,7 +233,8 @@ def _soil(found: Diagnosis) -> Markup | None:
     if found.soil is None:
         return None
     legend = {"prior": "known before", **_fitted(found)}
-    caption = f"Soil, ± 1σ thick and ± 2σ thin. {_strain(found.soil.strain)}"
+    strain = found.soil.strained() or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
+    caption = f"Soil, ± 1σ thick and ± 2σ thin. {strain}"
     drawn = figures.figure(caption, figures.soil(found.soil), legend=figures.legend(legend), small=True)
     return section("The soil", drawn)
 
@@ -244,14 +243,6 @@ def _fitted(found: Diagnosis) -> dict[str, str]:
     if found.soil is None or found.soil.before == found.soil.after:
         return {"after": "fitted"}
     return {"before": f"fitted without {explanation(found)}", "after": f"fitted with {explanation(found)}"}
-
-
-def _strain(strain: Mapping[str, float]) -> str:
-    """Which parameters had to leave what was known of them, where the effect is not modelled."""
-    far = [f"{name_of(k)} by {number(s, 2)} σ" for k, s in strain.items() if math.isfinite(s) and abs(s) >= STRAINED]
-    if not far:
-        return f"Without an effect no parameter is further than {STRAINED:g} σ from what was known before."
-    return f"Without an effect the fit moves {listed(far)} away from what was known before."
 
 
 # ---- the end -------------------------------------------------------------------------------------------------------

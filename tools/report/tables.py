@@ -101,6 +101,8 @@ def held_out(found: Diagnosis) -> Markup | None:
     notes = [tag("p", UNSEEN)]
     if innovations:
         notes.append(tag("p", "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
+    if fit.innovation_note:
+        notes.append(tag("p", fit.innovation_note))
     if found.remaining:
         notes.append(tag("p", sentence(named(found, found.remaining))))
     return section("Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note"))

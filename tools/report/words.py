@@ -5,17 +5,10 @@ from __future__ import annotations
 import math
 import re
 
-from tools.diagnose.result import Quantity
+from tools.diagnose.result import SOIL, Quantity
 
 NOTHING = "–"
 PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
-SOIL = {
-    "c": "cohesion c",
-    "tan_phi": "tan φ",
-    "k": "shear modulus k",
-    "n": "sinkage exponent n",
-    "K": "sinkage modulus K",
-}
 SHOWN = {  # unit inside -> unit shown, factor
     "m": ("mm", 1e3),
     "rad": ("°", math.degrees(1.0)),

@@ -9,11 +9,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.records import ChunkIndex
 
 from estimator.readings import CHANNELS, Reading
 from estimator.record import TICK_FIELDS
 from estimator.recording import LOG_TOPIC, RAW_TOPICS, RecordingError, RunInfo, RunWriter, part_path, parts
 from estimator.recording.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
+from estimator.recording.chunk_index import ChunkIndexes
+from estimator.recording.mcapfile import record_bytes
 from estimator.recording.salvage import read
 
 T0 = 1_700_000_000_123_456_789
@@ -295,3 +298,27 @@ def test_parts_are_found_in_order(tmp_path: Path) -> None:
     for part in (0, 1, 2, 4):
         part_path(first, part).touch()
     assert [p.name for p in parts(first)] == ["run.mcap", "run.1.mcap", "run.2.mcap"]
+
+
+UNSIGNED = st.integers(0, 2**64 - 1)
+LENGTHS = st.dictionaries(st.integers(0, 2**16 - 1), st.integers(15, 10**6), max_size=5)
+CHUNKS = st.lists(st.tuples(st.integers(0, 100), st.integers(60, 10**9), UNSIGNED, UNSIGNED, UNSIGNED, LENGTHS))
+
+
+@given(CHUNKS)
+def test_the_index_in_memory_gives_back_every_record(
+    chunks: list[tuple[int, int, int, int, int, dict[int, int]]],
+) -> None:
+    """Whatever the times are, and however often it is read."""
+    indexes, written, position = ChunkIndexes("zstd"), [], 0
+    for gap, length, first, last, size, lengths in chunks:
+        start = position + gap
+        offsets, position = {}, start + length
+        for channel, taken in lengths.items():
+            offsets[channel] = position
+            position += taken
+        indexes.add(start, length, (first, last), size, list(lengths.items()))
+        ended = position - start - length
+        written.append(ChunkIndex(length, start, "zstd", length - 53, last, ended, offsets, first, size))
+        assert indexes.records() == record_bytes(*written)
+    assert indexes.count == len(chunks)

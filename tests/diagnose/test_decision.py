@@ -64,10 +64,10 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
         share = np.exp((evidence - evidence.max()) / 3.0)
         truth = rng.choice(["a", "b", "c"], p=share / share.sum())
         weighed = [[[n], [e] * discrepancy.FORMS] for n, e in zip("abc", evidence.tolist(), strict=True)]
-        cases.append({"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": [-1e6, -1e6]})
+        cases.append({"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": -1e6})
     by, score = learn(cases)
     assert by.temperature == pytest.approx(3.0, rel=0.25)
-    overconfident = Calibration(0.5, by.forms, by.more, by.nameless, by.beside)
+    overconfident = Calibration(0.5, by.forms, by.more, by.nameless)
     assert score > log_truth(tabled(cases), overconfident).mean()
 
 
@@ -75,4 +75,4 @@ def test_the_learnt_table_is_sound() -> None:
     by = learnt()
     assert 0.5 < by.temperature < 50.0
     assert np.exp(by.forms).sum() == pytest.approx(1.0, abs=0.05)
-    assert max(by.more, by.nameless, by.beside) < 3.0
+    assert max(by.more, by.nameless) < 3.0

@@ -1,7 +1,7 @@
 """`python -m tools.diagnose.calibrate FILE… --out OUT`: learn how far evidence is to be trusted.
 
 Each FILE holds trials (`python -m tools.diagnose.trials --out FILE`). The temperature, the weights of how far forms may
-differ, and the two kinds of odds are those that give the truth of every case the largest probability, on average: the
+differ, and the odds are those that give the truth of every case the largest probability, on average: the
 logarithmic score, which only stated probabilities that are true maximise (Good 1952). A weak prior (PRIOR) keeps what
 the cases do not tell. The truth of a case is any set of effects that holds a true one, weighted by how many of its
 effects are true; of a stranger, functions without a name.
@@ -25,8 +25,8 @@ from estimator.terramechanics.soil import Array
 from tools.diagnose.calibration import Calibration
 from tools.diagnose.discrepancy import FORMS
 
-START = np.array([np.log(2.0), *([0.0] * (FORMS - 1)), -3.0, -3.0, -3.0])  # ln T, forms after the first, odds
-PRIOR = np.array([0.5, *([2.0] * (FORMS - 1)), 2.0, 3.0, 3.0])  # standard deviations about START
+START = np.array([np.log(2.0), *([0.0] * (FORMS - 1)), -3.0, -3.0])  # ln T, forms after the first, odds
+PRIOR = np.array([0.5, *([2.0] * (FORMS - 1)), 2.0, 3.0])  # standard deviations about START
 FLOOR = 1e-3  # probability no miss is charged below: one case must not decide
 NEVER = -1e9
 
@@ -38,7 +38,7 @@ class Table:
     evidence: Array  # (n, k, FORMS) [nats above the base model]; NEVER where there is none
     more: Array  # (n, k) effects beyond the first
     right: Array  # (n, k) how much of the explanation is true
-    nameless: Array  # (n, 2) alone, beside
+    nameless: Array  # (n,) evidence of functions without a name
     strange: Array  # (n,) 1 where functions without a name are the truth
 
 
@@ -51,7 +51,7 @@ def tabled(cases: Sequence[dict[str, Any]]) -> Table:
             evidence[i, j], more[i, j] = values, len(names) - 1
             right[i, j] = _true(names, case["truth"])
     strange = np.array([float(c["stratum"] == "unlisted") for c in cases])
-    return Table(evidence, more, right, np.maximum([c["nameless"] for c in cases], NEVER), strange)
+    return Table(evidence, more, right, np.array([c["nameless"] for c in cases]), strange)
 
 
 def _true(names: Sequence[str], truth: Sequence[str]) -> float:
@@ -62,7 +62,7 @@ def _true(names: Sequence[str], truth: Sequence[str]) -> float:
 def log_truth(table: Table, by: Calibration) -> Array:
     """Log probability of the truth of every case (n,)."""
     listed = logsumexp(table.evidence / by.temperature + np.array(by.forms), axis=2) + by.more * table.more
-    unnamed = logsumexp(table.nameless / by.temperature + np.array([by.nameless, by.beside]), axis=1)
+    unnamed = table.nameless / by.temperature + by.nameless
     total = np.logaddexp(logsumexp(listed, axis=1), unnamed)
     right = np.sum(np.exp(listed - total[:, None]) * table.right, axis=1)
     return np.asarray(np.log(FLOOR + np.where(table.strange > 0.0, np.exp(unnamed - total), right)))
@@ -71,8 +71,8 @@ def log_truth(table: Table, by: Calibration) -> Array:
 def calibration(x: Array) -> Calibration:
     forms = np.concatenate(([0.0], x[1:FORMS]))
     forms = forms - logsumexp(forms)
-    more, nameless, beside = x[FORMS:].tolist()
-    return Calibration(float(np.exp(x[0])), tuple(forms.tolist()), more, nameless, beside)
+    more, nameless = x[FORMS:].tolist()
+    return Calibration(float(np.exp(x[0])), tuple(forms.tolist()), more, nameless)
 
 
 def learn(cases: Sequence[dict[str, Any]]) -> tuple[Calibration, float]:

@@ -26,15 +26,14 @@ class Calibration:
     forms: tuple[float, ...]  # log weight of each degree of difference of discrepancy.py
     more: float  # log odds of one more effect
     nameless: float  # log odds of functions without a name in the place of an effect
-    beside: float  # of such functions beside listed effects
 
     def listed(self, evidence: Array, count: int) -> float:
         """Log weight of `count` effects, from their evidence (FORMS,), the base model's taken off."""
         return float(logsumexp(evidence / self.temperature + np.array(self.forms)) + self.more * max(count - 1, 0))
 
-    def unlisted(self, alone: float, beside: float) -> float:
-        """Log weight of functions without a name: alone, or beside the best effects [nats above the base model]."""
-        return float(np.logaddexp(alone / self.temperature + self.nameless, beside / self.temperature + self.beside))
+    def unlisted(self, evidence: float) -> float:
+        """Log weight of functions without a name, from their evidence above the base model's."""
+        return evidence / self.temperature + self.nameless
 
 
 @cache

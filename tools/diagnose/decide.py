@@ -1,9 +1,8 @@
 """From fitted models to a verdict, probabilities and groups.
 
 Every explanation has an evidence: listed effects, with a discrepancy for forms other than ours (discrepancy.py);
-smooth functions without a name instead of them; such functions beside the best of them. `calibration.py` makes
-probabilities of these. An effect has the weight of all models that hold it; both kinds of nameless functions together
-are `unlisted`.
+or smooth functions without a name instead of them: `unlisted`. `calibration.py` makes probabilities of these. An effect
+has the weight of all models that hold it.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ ALIKE = 2.0  # log odds: effects that are less apart cannot be told apart
 PAIR = 3.0  # [nats] a second function must gain
 FORM, FORM_MOST = 0.08, 25.0  # and this share of what the first gained, at most so many nats
 SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
-FAMILIES, LEFT = 2, 4  # functions without a name that may act together; that count what is left
+FAMILIES, FITTED = 4, 2  # functions without a name that may act together; that are fitted with the soil
 WEIGHED, NEAR, FAR = 10, 0.5, 60.0  # models weighed at most: within this share of the best gain, or so many nats of it
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
@@ -52,7 +51,7 @@ class Decision:
     unlisted: float
     groups: dict[str, tuple[str, ...]]
     weighed: tuple[Weighed, ...] = ()
-    nameless: tuple[float, float] = (-np.inf, -np.inf)  # evidence of functions without a name: alone, beside the best
+    nameless: float = -np.inf  # evidence of functions without a name [nats above the base model]
 
 
 def decide(search: Search) -> Decision:
@@ -60,17 +59,13 @@ def decide(search: Search) -> Decision:
     if not found.alarmed:
         verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
         return Decision(verdict, base, 1.0, 0.0, False, _quiet(found), 0.0, {})
-    weighed = weigh(search)
-    alone, beside = nameless_evidence(search, weighed)
-    return judged(search, weighed, alone, beside, learnt())
+    return judged(search, weigh(search), nameless_evidence(search, base), learnt())
 
 
-def judged(
-    search: Search, weighed: Sequence[Weighed], alone: float, beside: float, calibration: Calibration
-) -> Decision:
+def judged(search: Search, weighed: Sequence[Weighed], nameless: float, calibration: Calibration) -> Decision:
     """The decision from the evidence of all explanations [nats above the base model]."""
     weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
-    unnamed = calibration.unlisted(alone, beside)
+    unnamed = calibration.unlisted(nameless)
     total = float(np.logaddexp(logsumexp(weights), unnamed)) if weighed else unnamed
     unlisted = float(np.exp(unnamed - total))
     best = _best(weighed, weights) if weighed else search.models[0]
@@ -80,7 +75,7 @@ def judged(
         "explained" if weighed and unlisted < 0.5 else "unlisted",
         best, gained / max(gained + left, 1e-9), left, significant,
         _probabilities(weighed, weights - total), unlisted, _groups(weighed, weights, best),
-        tuple(weighed), (alone, beside),
+        tuple(weighed), nameless,
     )  # fmt: skip
 
 
@@ -104,37 +99,26 @@ def weigh(search: Search) -> list[Weighed]:
     return [Weighed(m, discrepancy.evidence(search.problem, m.fitted) - start) for m in near[:WEIGHED]]
 
 
-def nameless_evidence(search: Search, weighed: Sequence[Weighed]) -> tuple[float, float]:
-    """Evidence above the base model's [nats] of functions without a name: alone, and beside the best effects."""
-    base = search.models[0]
-    alone = refitted(search, base)
-    if not weighed:
-        return alone, -np.inf
-    best = max(weighed, key=lambda w: w.evidence[0])
-    more = nameless(search, best.model, LEFT)
-    return alone, float(best.evidence[0]) + more if more > 0.0 else -np.inf
-
-
 def remaining(search: Search, model: Model) -> tuple[float, bool]:
     """Nats that smooth functions of the covariates would still gain; whether any of them stands out of the noise."""
     found = search.screens.get(model.names) or rescreen(search, model)
     standing = [n for n in found.evidence if "~" in n and found.surprise(n) > found.threshold]
-    return (nameless(search, model, LEFT) if standing else 0.0), bool(standing)
+    return (_families(search, model, FAMILIES)[0] if standing else 0.0), bool(standing)
 
 
-def nameless(search: Search, model: Model, most: int) -> float:
-    """Evidence for the best few smooth functions of covariates on top of a model, taken up in turn [nats]."""
-    return _families(search, model, most)[0]
+def nameless_evidence(search: Search, model: Model) -> float:
+    """Evidence for functions without a name on top of a model [nats], as far as they may act together.
 
-
-def refitted(search: Search, model: Model) -> float:
-    """The same with soil and calibration fitted anew beside the best functions, as listed effects are fitted [nats]."""
+    Linear, and with soil and calibration fitted anew beside the first few, as they are for listed effects.
+    """
     linear, chosen = _families(search, model, FAMILIES)
-    if not chosen:
-        return linear
+    return max([linear, *(_refitted(search, model, chosen[: n + 1]) for n in range(min(len(chosen), FITTED)))])
+
+
+def _refitted(search: Search, model: Model, chosen: Sequence[int]) -> float:
     problem, found = search.problem, model.fitted
     columns = np.column_stack([search.generics[i].columns for i in chosen])
-    gains = [linear]
+    gains = []
     for scale in SIZES:
         fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
         gain = fitted.log_evidence - found.log_evidence

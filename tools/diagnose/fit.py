@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -69,7 +70,7 @@ class Fitted:
         gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
         return np.asarray(np.linalg.inv(gram))
 
-    @property
+    @cached_property
     def log_evidence(self) -> float:
         """Laplace's approximation (MacKay 2003, ch. 27), up to a constant that all models of one problem share."""
         gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)

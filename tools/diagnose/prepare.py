@@ -13,6 +13,7 @@ from tools.diagnose.fit import Fitted, Problem
 from tools.diagnose.rig import Rig, Stack
 from tools.diagnose.screen import noise_draws
 from tools.diagnose.signatures import raw_signatures, ripple_columns
+from tools.diagnose.wheel_rig import WheelRig
 
 TOLERANCE = 3e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
@@ -47,7 +48,8 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
 
 def _plates(stack: Stack, rough: Fitted) -> Array:
     """Errors of each run's own weights (N, m), where the rig has weights."""
-    names = [known.name for known in stack.rig.constants]
-    if "weights" not in names:
+    rig = stack.rig
+    if not isinstance(rig, WheelRig):
         return np.zeros((stack.size, 0))
-    return replicates.plate_columns(stack, rough.raw[:, names.index("weights")])
+    place = next(i for i, known in enumerate(rig.constants) if known.name == "weights")
+    return replicates.plate_columns(stack, rough.raw[:, place] / rig.constants[place].sigma, rig.own_weight)

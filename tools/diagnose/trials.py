@@ -119,7 +119,7 @@ def work(search: Search, decision: Decision) -> dict[str, Any]:
     return {
         "screen": dict(sorted(((n, round(e, 1)) for n, e in first.evidence.items()), key=lambda i: -i[1])[:8]),
         "weighed": [[list(w.model.names), [round(float(e), 2) for e in w.evidence]] for w in decision.weighed],
-        "nameless": [round(max(e, -1e6), 2) for e in decision.nameless],
+        "nameless": round(max(decision.nameless, -1e6), 2),
         "share": decision.share,
         "left": decision.left,
         "unlisted": decision.unlisted,

@@ -48,6 +48,7 @@ PHYSICS = (
     "weights",
     "carriage_scale",
 )  # what needs the forward model
+OWN = 0.7  # share of a common error of the weights that each set of them may have for itself
 KEPT = 4  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
 
@@ -126,6 +127,14 @@ class WheelRig:
 
     def stated(self, unit: str) -> float:
         return 1.0
+
+    def own_weight(self, load: float) -> float:
+        """Relative standard deviation of one set of weights for itself: a plate's, or the load cell's at that load."""
+        common = next(known.sigma for known in self.constants if known.name == "weights")
+        wrench = self.settings.wrench
+        if wrench is None or all(w.known for w in self._weights):
+            return OWN * common
+        return float(np.hypot(OWN * common, wrench.load.offset.sigma / load))
 
     def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
         """Channels under a proposed experiment (see proposals.py), for constants and effects as fitted."""

@@ -6,7 +6,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow lint format type docs scenarios fuzz soak install uninstall wheel clean
+.PHONY: help venv demo test slow lint format type docs proof scenarios fuzz soak install uninstall wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -43,6 +43,9 @@ type: $(READY) ## mypy --strict
 
 docs: $(READY) ## the generated parts of the documents
 	@$(BIN)/python -m tools.config_reference
+
+proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their part of docs/proof.md
+	@$(BIN)/python -m tools.proof.real
 
 scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
 	@$(BIN)/python -m tools.reliability

@@ -103,7 +103,9 @@ class DriveRig:
         """Factor from a parameter of the library to what it means for this drive."""
         if unit == "rad/s":
             return self.usual
-        return self.unit if unit in ("N·m", "A") else 1.0
+        if unit == "A":
+            return self.unit / self.settings.drive.torque_constant.value
+        return self.unit if unit == "N·m" else 1.0
 
     def _run(self, motion: Moving, name: str) -> Run:
         velocity, torque, angle = (motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle))

@@ -80,8 +80,11 @@ LAG = 0.015  # [s] by which an axle sinks later than in the balance: its damping
 
 def blur(stack: Stack, predicted: Array) -> Array:
     """Error (N,) where things change: averaging takes a share of the second difference, a value's or its neighbours';
-    and a lagging axle shifts all forces by the share by which the sinkage changes within the lag.
+    and a lagging axle shifts all forces by the share by which the sinkage changes within the lag. A rig that passes
+    prediction and measurement through the same filters says so by `blurs = False`.
     """
+    if not getattr(stack.rig, "blurs", True):
+        return np.zeros(stack.size)
     gaps = np.where(np.isfinite(stack.gaps), stack.gaps, np.inf)
     bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
     edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))

@@ -1,0 +1,84 @@
+"""`python -m tools.proof.real`: the five proofs on real recordings, and what docs/proof.md says of them."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from tools.cli import guarded
+from tools.command import DONE, USAGE, CommandError, Parser
+from tools.proof.real import cmu, ding, emps, figure, mgst
+from tools.proof.real.bench import ROOT, Bench
+from tools.proof.real.page import page, section
+from tools.proof.real.proof import Finding, Proof
+
+PROOFS: tuple[Proof, ...] = (mgst.DRIVETRAIN, mgst.SIDE_WALL, cmu.GROUSERS, emps.FRICTION, ding.STRENGTH)
+DATA = ROOT.parent / "shared" / "real"
+DOCS, PAGE = ROOT / "docs", "proof.md"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Redo the proofs and write their sections and figures. Exit 0.
+
+    A question that is missed is no failure of the command: it stands in the page.
+    """
+    arguments = _parser().parse_args(argv)
+    chosen = [p for p in PROOFS if not arguments.only or p.name in arguments.only]
+    for number, proof in enumerate(chosen, start=1):
+        if (arguments.data / proof.rig).is_dir():
+            _prove(proof, arguments.data, arguments.output, f"{number} of {len(chosen)}")
+        else:
+            missing = arguments.data / proof.rig
+            print(f"{proof.title}: skipped, found no {missing}; docs/importing.md says where the data are")
+    return DONE
+
+
+def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
+    """One proof; its section of the page and its figure are written."""
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="gritd-proof-") as work, warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        bench = Bench(data.resolve(), Path(work), lambda what: _step(f"{place}, {proof.name}: {what}", began))
+        finding = proof.run(bench)
+    seconds = time.monotonic() - began
+    _tell(proof, finding, seconds)
+    figure.draw(folder / f"proof-{proof.name}.png", finding.panels)
+    target = folder / PAGE
+    old = target.read_text(encoding="utf-8") if target.exists() else "# Proofs on real recordings\n"
+    target.write_text(page(old, proof.name, section(proof, finding, bench.commands, seconds)), encoding="utf-8")
+
+
+def _step(what: str, began: float) -> None:
+    print(f"[{time.monotonic() - began:4.0f} s] {what}", file=sys.stderr, flush=True)
+
+
+def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
+    print(f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, {seconds:.0f} s")
+    for asked in finding.asked:
+        print(f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; found {asked.found}")
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="python -m tools.proof.real", description="Proofs of diagnose on other laboratories' recordings."
+    )
+    parser.add_argument("--data", type=_folder, default=DATA, metavar="DIR", help="the public files, a folder a rig")
+    names = [p.name for p in PROOFS]
+    parser.add_argument("--only", action="append", choices=names, metavar="NAME", help=f"of {', '.join(names)}")
+    parser.add_argument("--output", type=_folder, default=DOCS, metavar="DIR", help="where proof.md and figures go")
+    return parser
+
+
+def _folder(text: str) -> Path:
+    path = Path(text)
+    if not path.is_dir():
+        raise CommandError(f"{path}: found no folder; expected one", USAGE)
+    return path
+
+
+if __name__ == "__main__":
+    sys.exit(guarded(main))

@@ -1,0 +1,91 @@
+"""Where a proof works: a folder of its own, the public data beside it, and the commands that a user would type."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tools.command import CommandError
+
+ROOT = Path(__file__).resolve().parents[3]
+TIMEOUT = 900.0  # [s] for one command
+
+
+@dataclass(frozen=True)
+class Said:
+    """What one diagnosis printed, and its JSON."""
+
+    command: str
+    text: str
+    found: dict[str, Any]
+    seconds: float
+
+    @property
+    def accepted(self) -> dict[str, dict[str, Any]]:
+        """Accepted effects by name, most probable first."""
+        return {h["effect"]: h for h in self.found["hypotheses"] if h["accepted"]}
+
+    def values(self, effect: str) -> dict[str, float]:
+        """Parameters of an accepted effect; empty if it was not accepted."""
+        found = self.accepted.get(effect)
+        return {name: q["value"] for name, q in found["parameters"].items()} if found else {}
+
+    @property
+    def group(self) -> set[str]:
+        """Accepted effects, and what the diagnosis says it cannot tell from them."""
+        return {n for name, h in self.accepted.items() for n in (name, *h["indistinguishable_from"])}
+
+
+@dataclass
+class Bench:
+    """Runs commands in `folder`; `data` holds the public files, a folder a rig."""
+
+    data: Path
+    folder: Path
+    step: Callable[[str], None] = lambda _: None
+    commands: list[str] = field(default_factory=list)
+
+    def imported(self, importer: str, name: str, *arguments: str, files: Sequence[str]) -> Path:
+        """Recordings and configuration in folder/name, from files and folders of the data."""
+        self.step(f"importing {name}")
+        paths = [str(self.data / file) for file in files]
+        self._gritd("import", importer, *paths, "-o", str(self.folder / name), *arguments)
+        return self.folder / name
+
+    def diagnosed(self, recordings: Sequence[Path], configuration: Path, name: str) -> Said:
+        """One diagnosis, in a process that is given nothing but these files. Raises CommandError."""
+        self.step(f"diagnosing {name}")
+        result = self.folder / f"{name}.json"
+        began = time.monotonic()
+        given = [str(p.relative_to(self.folder)) for p in sorted(recordings)]
+        said = self._gritd(
+            "diagnose", *given, "--config", str(configuration.relative_to(self.folder)), "--json", result.name,
+            "--apply", f"{name}.yaml", "--jobs", "1",
+        )  # fmt: skip
+        found = json.loads(result.read_text(encoding="utf-8"))
+        return Said(self.commands[-1], said.rstrip(), found, time.monotonic() - began)
+
+    def _gritd(self, *arguments: str) -> str:
+        """What the command printed. Raises CommandError with its one line."""
+        shown = (a.replace(f"{self.data}/", "").replace(f"{self.folder}/", "") for a in arguments)
+        self.commands.append("gritd " + " ".join(shown))
+        done = subprocess.run(
+            [sys.executable, "-m", "tools.cli", *arguments],
+            cwd=self.folder, env=_environment(), capture_output=True, text=True, timeout=TIMEOUT, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise CommandError(f"{self.commands[-1]}: exit {done.returncode}: {done.stderr.strip() or 'nothing said'}")
+        return done.stdout
+
+
+def _environment() -> dict[str, str]:
+    """Ours without what could tell, and one thread a process."""
+    kept = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "VIRTUAL_ENV")}
+    return kept | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUTF8": "1"}

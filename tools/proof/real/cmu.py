@@ -1,0 +1,169 @@
+"""CMU: a grousered wheel handed over as the smooth one on which the soil was learnt."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from estimator.terramechanics.soil import Array
+from tools.proof.real.bench import Bench, Said
+from tools.proof.real.judge import Judge, by_condition, rms
+from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+
+DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
+FIT, HELD = ("10", "20", "100"), ("12", "40")
+CHANNELS = {"drawbar_pull": ("drawbar pull [N]", 1.0), "sinkage": ("sinkage [mm]", 1e3)}
+TABLES = (
+    "cmu/smooth_all_trials_steady_state.csv",
+    "cmu/grouser_first_trial_steady_state.csv",
+    "cmu/penetration",
+)
+YIELDS = 0.0125e-3  # [m/N] of the frame, pressed on a rigid stop
+DEPTH, FACTOR = 0.02, 1.5  # [m] at which the learnt modulus is compared with the plates', and how near it must be
+PLATE, DEPTHS = 0.060, (4.0, 25.0)  # [m] plate nearest to the wheel's width; [mm] over which the moduli are fitted
+
+
+def _run(bench: Bench) -> Finding:
+    smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
+    first = bench.diagnosed(list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth")
+    learnt = bench.folder / "cmu-learnt.yaml"
+    learnt.write_text(
+        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.found), encoding="utf-8"
+    )
+    fit, held = (
+        bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES) / "grouser-table"
+        for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
+    )
+    second = bench.diagnosed(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
+    seen, unseen = (_conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.found) for f in (fit, held))
+    rows = [
+        (label, f"{speed} mm/s", *(f"{unseen[channel][i, k]:.2f}" for i in (1, 2, 3)))
+        for channel, (label, _) in CHANNELS.items() for k, speed in enumerate(HELD)
+    ]  # fmt: skip
+    heads = ("held-out state", "rim speed", "measured", "as if smooth", "with what was found")
+    labels = ("measured", "as if smooth", "with what was found; the states between were not seen")
+    panels = [
+        Panel(label, _sorted(np.hstack((seen[c], unseen[c]))), "slip [–]", label, labels, points=True)
+        for c, (label, _) in CHANNELS.items()
+    ]
+    return Finding(
+        [first, second], _asked(first, second, unseen, smooth / "penetration.csv"), Table(heads, rows), panels
+    )
+
+
+def _speeds(speeds: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(a for speed in speeds for a in ("--rim-speed", speed))
+
+
+def with_soil(text: str, found: dict[str, Any]) -> str:
+    """A configuration with the soil that a diagnosis fitted, values and sigmas."""
+    document = yaml.safe_load(text)
+    after = found["soil"]["after"]
+    units = {"cohesion": ("c", "Pa"), "tan_phi": ("tan_phi", ""), "shear_modulus": ("k", "m"), "exponent": ("n", "")}
+    for name, (symbol, unit) in units.items():
+        document["soil"][name] = {key: _written(after[symbol][key], unit) for key in ("value", "sigma")}
+    modulus = after["K"]
+    document["soil"]["k_c"] = "0 kN/m^(n+1)"
+    document["soil"]["k_phi"] = f"{modulus['value'] / 1e3:.6g} kN/m^(n+2)"
+    document["soil"]["modulus_sigma"] = f"{100.0 * modulus['sigma'] / modulus['value']:.4g} %"
+    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
+
+
+def _written(value: float, unit: str) -> Any:
+    return f"{value:.6g} {unit}" if unit else float(f"{value:.6g}")
+
+
+def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
+    """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of each channel."""
+    before, after = judge.predicted(None)[0], judge.predicted(found)[0]
+    run, out = judge.rig.runs[0], {}
+    for channel, (_, factor) in CHANNELS.items():
+        curves = (factor * v[channel] for v in (run.measured, before, after))
+        out[channel] = by_condition(judge, channel, run.covariates["slip"], *curves)
+    return out
+
+
+def _sorted(rows: Array) -> Array:
+    return np.asarray(rows[:, np.argsort(rows[0])])
+
+
+def moduli(path: Path) -> tuple[float, float]:
+    """Exponent n and modulus [Pa/mⁿ] by least squares on the logarithms, the frame's yielding taken off the depth."""
+    body = f"plate {PLATE * 1e3:.0f} mm"
+    with path.open(encoding="utf-8") as stream:
+        rows = [(float(r["depth_mm"]), float(r["force_N"])) for r in csv.DictReader(stream) if r["body"] == body]
+    depth, force = np.array(rows).T
+    depth = depth - 1e3 * YIELDS * force
+    inside = (depth > DEPTHS[0]) & (depth < DEPTHS[1])
+    n, log_k = np.polyfit(np.log(depth[inside] * 1e-3), np.log(force[inside] / (np.pi * (0.5 * PLATE) ** 2)), 1)
+    return float(n), float(np.exp(log_k))
+
+
+def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -> list[Asked]:
+    channels = dict.fromkeys(place["channel"] for place in second.found["location"])
+    group = listed(sorted(second.group)) or second.found["verdict"]
+    named = "Does it name grousers, or a group that holds them?"
+    asked = [
+        _of_modulus(first, pressed),
+        Asked("Do grip and sinking differ?", "drawbar_pull, sinkage", listed(channels), set(CHANNELS) <= set(channels)),
+        Asked(named, "grousers", group, "grousers" in second.group, REASON),
+        _of_frame(first, second),
+    ]
+    for channel, (label, _) in CHANNELS.items():
+        _, measured, before, after = unseen[channel]
+        worse, better = rms(before - measured), rms(after - measured)
+        question = f"Is the {label} of unseen states predicted better?"
+        asked.append(
+            Asked(question, "error halved", f"{worse:.2f} before, {better:.2f} after", better < 0.5 * worse, REASON)
+        )
+    return asked
+
+
+def _of_modulus(first: Said, pressed: Path) -> Asked:
+    after, (n, modulus) = first.found["soil"]["after"], moduli(pressed)
+    plate, wheel = modulus * DEPTH**n, after["K"]["value"] * DEPTH ** after["n"]["value"]
+    return Asked(
+        f"Is the pressure of the soil learnt, {DEPTH * 1e3:.0f} mm deep, that under the plates?",
+        f"{plate / 1e3:.0f} kPa (n {n:.2f}), within a factor of {FACTOR:g}",
+        f"{wheel / 1e3:.0f} kPa (n {after['n']['value']:.2f})",
+        1.0 / FACTOR < wheel / plate < FACTOR,
+    )
+
+
+def _of_frame(*said: Said) -> Asked:
+    values = [v["compliance"] for s in said if (v := s.values("frame_compliance"))]
+    found = f"{1e3 * max(values):.3f} mm/N" if values else "nothing said"
+    return Asked(
+        "Is nothing said of the frame's yielding that the rigid stop denies?",
+        f"at most {2e3 * YIELDS:.3f} mm/N, twice the stop's",
+        found,
+        max(values, default=0.0) <= 2.0 * YIELDS,
+    )
+
+
+REASON = """
+Steady means hold no ripple, the one thing that only grousers make; what is left is more grip and, at high slip, more
+sinkage, as the grousers dig. The library's grousers grip and enlarge the wheel, which makes it sink less, not more.
+"""
+
+GROUSERS = Proof(
+    name="cmu",
+    rig="cmu",
+    title="CMU, grousers concealed",
+    concealed=f"""
+        Two wheels in dry sand, one smooth, one with grousers of 5 mm (Pavlov and Johnson). That the second has grousers
+        is kept back. Of its steady states the diagnosis sees those at rim speeds of {listed(FIT)} mm/s (the carriage
+        has 10); those at {listed(HELD)} mm/s judge the prediction. Plates pressed into the sand judge the modulus, the
+        wheel pressed on a rigid stop judges what is said of the frame.
+    """,
+    saw="""
+        First the smooth wheel's steady states at 0 to 90 % slip, three repeats: motion, sinkage, load, drawbar pull, no
+        torque. What is found there, soil and effects, becomes the configuration (`--apply`, and the fitted soil with
+        its sigmas). Then the other wheel's states, as if they were of the same wheel.
+    """,
+    run=_run,
+)

@@ -1,0 +1,76 @@
+"""Ding et al. 2011: cohesion and friction angle from six points of a smooth wheel, against what was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tools.proof.real.bench import Bench, Said
+from tools.proof.real.judge import Judge, by_condition, rms
+from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+
+COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
+CHANNELS = {
+    "torque": ("torque [N·m]", 1.0),
+    "drawbar_pull": ("drawbar pull [N]", 1.0),
+    "sinkage": ("sinkage [mm]", 1e3),
+}
+SIGMAS = 2.0
+
+
+def _run(bench: Bench) -> Finding:
+    folder = bench.imported("table", "ding", files=["ding"])
+    recordings = sorted(folder.glob("*.mcap"))
+    configuration = folder / "ding2011_smooth.yaml"
+    said = bench.diagnosed(recordings, configuration, "ding-points")
+    judge = Judge(recordings, configuration)
+    before, after = (judge.predicted(said.found, when)[0] for when in ("before", "after"))
+    slip = judge.rig.runs[0].covariates["slip"]
+    panels, rows = [], []
+    for channel, (label, factor) in CHANNELS.items():
+        curves = (factor * v for v in (judge.measured(0, channel), before[channel], after[channel]))
+        means = by_condition(judge, channel, slip, *curves)
+        labels = ("measured", "soil alone", "with what was found")
+        panels.append(Panel(label, means, "slip [–]", label, labels, points=True))
+        rows.append((label, f"{rms(means[2] - means[1]):.2f}", f"{rms(means[3] - means[1]):.2f}"))
+    heads = ("six points, r.m.s. error", "soil alone", "with what was found")
+    return Finding([said], _asked(said), Table(heads, rows), panels)
+
+
+def _asked(said: Said) -> list[Asked]:
+    after = said.found["soil"]["after"]
+    c, tan_phi = (after[n] for n in ("c", "tan_phi"))
+    phi = np.degrees(np.arctan(tan_phi["value"]))
+    sigma = np.degrees(tan_phi["sigma"] / (1.0 + tan_phi["value"] ** 2))
+    cohesion, angle = f"{c['value']:.0f} ± {c['sigma']:.0f} Pa", f"{phi:.1f} ± {sigma:.1f}°"
+    near = abs(c["value"] - COHESION) <= SIGMAS * c["sigma"], abs(phi - FRICTION) <= SIGMAS * sigma
+    grows = "Does it find that sinkage grows with slip, as that paper does?"
+    found = listed(said.accepted) or said.found["verdict"]
+    return [
+        Asked("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
+        Asked("Is the measured friction angle within two sigma?", f"{FRICTION:g}°", angle, near[1], REASON),
+        Asked(grows, "slip_sinkage", found, "slip_sinkage" in said.group),
+    ]
+
+
+REASON = """
+At 60 % slip shear is fully mobilised with the published shear modulus, and Eqs. (8)-(10) with 31.9° then ask for a
+torque of about 7 N·m, where 5.3 N·m were measured. A smooth rim slides on the soil, at an angle of friction between
+metal and sand that is usually two thirds of the soil's own (21°); the wheel feels that one, and no effect of the
+library separates the two.
+"""
+
+STRENGTH = Proof(
+    name="ding",
+    rig="ding",
+    title="Ding 2011, strength of the soil concealed",
+    concealed="""
+        Drawbar pull, sinkage and torque of a smooth wheel at 80 N and six slips, read off published figures (Ding et
+        al. 2011, digitised by others). Cohesion and friction angle of the soil, measured by shear tests, are kept back
+        and judge.
+    """,
+    saw="""
+        The six points as segments, with the errors of reading a figure (0.5 N, 0.25 mm, 0.1 N·m); moduli, exponent and
+        shear modulus as published; cohesion 500 ± 500 Pa and tan φ 0.6 ± 0.15, dry sands in general.
+    """,
+    run=_run,
+)

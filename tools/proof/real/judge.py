@@ -1,0 +1,91 @@
+"""What a diagnosis found, put to use on recordings it has not seen: predictions, and measurements freed of the effects.
+
+The constants (soil, calibration) and accepted effects are read from the JSON alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimator import config
+from estimator.effects import make
+from estimator.effects.base import Effect
+from estimator.settings import Settings
+from estimator.terramechanics.soil import Array
+from tools.diagnose.load import read_all, signals
+from tools.diagnose.rig import Known
+from tools.diagnose.wheel_rig import WheelRig
+from tools.importers._segments import DURATION, PAUSE
+
+RATE = 10.0  # [Hz]
+RIG_STAGES = ("testbed", "drivetrain", "sensor")  # what stands between soil and reading
+
+
+class Judge:
+    """Recordings, and what a diagnosis said of others of the same rig."""
+
+    def __init__(self, recordings: Sequence[Path], configuration: Path) -> None:
+        self.settings: Settings = config.load(configuration).settings
+        self.rig = WheelRig([signals(r, self.settings, RATE) for r in read_all(sorted(recordings))], self.settings)
+
+    def time(self, run: int) -> Array:
+        return np.asarray(self.rig.runs[run].time - self.rig.runs[run].time[0])
+
+    def measured(self, run: int, channel: str) -> Array:
+        return np.asarray(self.rig.runs[run].measured[channel])
+
+    def predicted(self, found: dict[str, Any] | None, when: str = "after") -> list[dict[str, Array]]:
+        """Every channel of every run: by the configuration alone (None), 'before' with the soil fitted without effects,
+        'after' with both.
+        """
+        if found is None:
+            return self.rig.predict(np.zeros(len(self.rig.constants)), ())
+        return self.rig.predict(self._constants(found, when), effects(found) if when == "after" else ())
+
+    def freed(self, found: dict[str, Any], channel: str) -> list[Array]:
+        """A channel of every run less what the accepted effects of the rig, and its calibration, put on it."""
+        u = self._constants(found, "after")
+        acting = effects(found)
+        ideal = [e for e in acting if e.stage not in RIG_STAGES]
+        plain = np.array(
+            [0.0 if k.name.startswith(f"{channel}_") else x for k, x in zip(self.rig.constants, u, strict=True)]
+        )
+        added = zip(self.rig.predict(u, acting), self.rig.predict(plain, ideal), strict=True)
+        return [self.measured(n, channel) - (real[channel] - bare[channel]) for n, (real, bare) in enumerate(added)]
+
+    def _constants(self, found: dict[str, Any], when: str) -> Array:
+        """In prior σ; what the result does not state stays at its prior mean."""
+        soil = (found["soil"] or {}).get(when, {})
+        stated = {**(found["nuisance"] if when == "after" else {}), **soil}
+        return np.array([_strain(k, stated[k.name]["value"]) if k.name in stated else 0.0 for k in self.rig.constants])
+
+
+def by_condition(judge: Judge, channel: str, *series: Array) -> Array:
+    """Means (rows, conditions) of series (n,) over each steady state of the first run, where the channel counts."""
+    number = np.floor((judge.time(0) + 0.5 * PAUSE) / (DURATION + PAUSE))
+    inside = judge.rig.runs[0].used[channel]
+    return np.array([[np.nanmean(v[inside & (number == k)]) for k in np.unique(number[inside])] for v in series])
+
+
+def effects(found: dict[str, Any]) -> tuple[Effect, ...]:
+    """The accepted effects as they were fitted."""
+    return tuple(
+        make(h["effect"], {n: q["value"] for n, q in h["parameters"].items()})
+        for h in found["hypotheses"]
+        if h["accepted"]
+    )
+
+
+def _strain(known: Known, value: float) -> float:
+    if known.log:
+        return float(np.log(value / known.value) * known.value / known.sigma)
+    return (value - known.value) / known.sigma
+
+
+def rms(values: Array) -> float:
+    """Root mean square of what is finite."""
+    return float(np.sqrt(np.nanmean(np.asarray(values) ** 2)))

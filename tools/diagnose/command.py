@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import os
 import shlex
 import sys
@@ -24,7 +25,7 @@ from tools.diagnose.drive_rig import DriveRig
 from tools.diagnose.engine import diagnose
 from tools.diagnose.innovations import with_innovations
 from tools.diagnose.load import drive_series, is_drive, read_all, sha256, signals
-from tools.diagnose.result import Diagnosis
+from tools.diagnose.result import Diagnosis, NextExperiment
 from tools.diagnose.rig import Rig
 from tools.diagnose.wheel_rig import WheelRig
 
@@ -144,6 +145,11 @@ def _said(what: str) -> None:
         print(f"\r\033[K{what} …", end="", file=sys.stderr, flush=True)
 
 
+def _foreseen(following: NextExperiment) -> str:
+    gain = following.expected_gain_nats
+    return f" (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ""
+
+
 def text(found: Diagnosis) -> str:
     """The verdict for a person."""
     lines = [f"verdict: {found.verdict}", found.summary]
@@ -176,5 +182,5 @@ def text(found: Diagnosis) -> str:
     elif found.fit.innovation_note:
         lines.append(f"  on-line filter: {found.fit.innovation_note}")
     if found.next_experiment is not None:
-        lines.append(f"  next: {found.next_experiment.action} ({found.next_experiment.expected_gain_nats:.0f} nats)")
+        lines.append(f"  next: {found.next_experiment.action}{_foreseen(found.next_experiment)}")
     return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])

@@ -133,10 +133,13 @@ class Law:
 
 @dataclass(frozen=True)
 class NextExperiment:
+    """expected_probability: that of what is true, of two as likely now, after the expected gain. NaN: not foreseen."""
+
     key: str  # of estimator.effects.base.EXPERIMENTS
     action: str
     separates: tuple[str, ...]
     expected_gain_nats: float
+    expected_probability: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -259,13 +260,16 @@ def _next(found: Diagnosis) -> Markup | None:
     following = found.next_experiment
     if following is None:
         return None
-    told = f"It would tell {listed([name_of(n) for n in following.separates])} apart" if following.separates else "It"
-    gain = f"{told}; expected gain {nats(following.expected_gain_nats)}."
+    gain = f"expected gain {nats(following.expected_gain_nats)}"
+    if math.isfinite(following.expected_probability):
+        gain += f", which takes what is true from 50 % to {percent(following.expected_probability)} against a rival"
+    if following.separates:
+        gain = f"it would tell {listed([name_of(n) for n in following.separates])} apart; {gain}"
     return tag(
         "section",
         tag("h2", "Next experiment"),
         tag("p", sentence(following.action), class_="summary"),
-        paragraph(gain if following.separates else f"Expected gain {nats(following.expected_gain_nats)}."),
+        paragraph(sentence(gain)) if math.isfinite(following.expected_gain_nats) or following.separates else None,
         class_="next",
     )
 

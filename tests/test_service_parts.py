@@ -280,7 +280,9 @@ def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publishe
     master, slave = pty.openpty()
     termios.tcsetwinsize(slave, (10, 40))
     command = [sys.executable, "-m", "tools.cli", "monitor", "--socket", str(publisher.path)]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # if we ignore it, so does a child
     child = subprocess.Popen(command, stdout=slave, cwd=ROOT, env={**os.environ, "TERM": "xterm"})
+    signal.signal(signal.SIGINT, before)
     os.close(slave)
     seen = ""
     while seen.count(monitor.HOME) < 3:

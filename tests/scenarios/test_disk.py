@@ -188,6 +188,7 @@ def test_killed_while_logging(tmp_path, seed, figure):
 
 WRITER = """
 import mmap, os, struct, sys, time
+from estimator.daemon import real_time
 from estimator.recording import RunInfo
 from estimator.recording.writer import WriterThread
 from estimator.readings import Reading
@@ -199,6 +200,7 @@ for name in range(number):
     shared.truncate(16)
     child = os.fork()
     if not child:
+        real_time()
         put = mmap.mmap(shared.fileno(), 16)  # what the loop has handed over, as the kernel remembers it
         writer = WriterThread(f"{folder}/{name}.mcap", [PART], "a: 1", RunInfo())
         writer.start()

@@ -18,6 +18,7 @@ from estimator.effects import EFFECTS
 from estimator.effects.base import EXPERIMENTS, Effect
 from estimator.terramechanics.soil import Array
 from tools.diagnose.decide import Decision
+from tools.diagnose.proposals import driving
 from tools.diagnose.result import NextExperiment
 from tools.diagnose.select import Model, Search
 from tools.diagnose.wheel_rig import WheelRig
@@ -41,38 +42,42 @@ INSTRUMENT = 0.2  # of an expected size: what tape, level or clamp meter can tel
 MODELLED = 0.02  # of a channel's size: no rival predicts an experiment better than this
 EVERY = 10  # foreseen values that count as one: neighbours share their noise
 ENOUGH, MOST = 10.0, 50.0  # [nats] that decide; more than MOST are said as MOST
-RIVALS = 3
+RIVALS = 4
+WORTH = 1.0  # [nats] from which on two are said to be told apart
 STEP = 0.1  # [σ] of a constant, for differences
 
 
 def next_experiment(search: Search, decision: Decision) -> NextExperiment | None:
     """None where model and recordings agree, or one explanation stands alone."""
     if decision.verdict == "insufficient":
-        return _first_of(_unseen_shown(search), ())
+        return _most_shown(_unseen_shown(search))
     if decision.verdict == "unlisted":
         return _shape_of_misfit(search)
     rivals = _rivals(search, decision)
-    if len(rivals) < 2:
-        return None
-    names = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in _common(rivals)))
-    gains = {key: _told_apart(search, rivals, key) for key in DRIVEN}
-    for key, gain in _measured(rivals).items():
-        gains[key] = max(gains.get(key, 0.0), gain)
-    return _first_of(gains, names) or _by_hand(names)
+    return _between(search, rivals) if len(rivals) > 1 else None
 
 
-def _first_of(gains: Mapping[str, float], separates: tuple[str, ...]) -> NextExperiment | None:
-    """The least effort that decides, else the largest gain."""
-    if not gains or max(gains.values()) <= 0.0:
-        return None
-    deciding = [key for key, gain in gains.items() if gain >= ENOUGH]
-    key = deciding[0] if deciding else max(gains, key=lambda k: gains[k])
-    gain = min(gains[key], MOST)
+def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
+    """What tells most rivals from the first; of equals the least effort."""
+    gains = {key: _told_apart(search, rivals, key) for key in DRIVEN} | _measured(rivals)
+    settled = {key: sum(gain >= ENOUGH for gain in each) for key, each in gains.items()}
+    key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
+    told = [m for m, gain in zip(rivals[1:], gains[key], strict=True) if gain >= WORTH]
+    names = tuple(dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals)))
+    return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(names)
+
+
+def _most_shown(gains: Mapping[str, float]) -> NextExperiment | None:
+    key = max(gains, key=lambda k: gains[k], default="")
+    return _foretold(key, gains[key]) if key and gains[key] > 0.0 else None
+
+
+def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
     return NextExperiment(key, EXPERIMENTS[key], separates, gain, float(1.0 / (1.0 + np.exp(-gain))))
 
 
 def _by_hand(names: Sequence[str]) -> NextExperiment | None:
-    """What the rivals' own files name, where nothing can be foreseen."""
+    """What the rivals' own files name, where nothing is foreseen to tell."""
     for name in names:
         for other, key in EFFECTS[name].confusable_with.items():
             if other in names:
@@ -94,28 +99,33 @@ def _common(rivals: list[Model]) -> set[str]:
     return set.intersection(*(set(m.names) for m in rivals))
 
 
-def _told_apart(search: Search, rivals: list[Model], key: str) -> float:
-    """Smallest expected gain between the first and another rival [nats]."""
+def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
+    """Expected gain between the first and every other rival [nats]."""
     rig = search.problem.stack.rig
-    if not isinstance(rig, WheelRig):
-        return 0.0
     first, *others = rivals
+    if not isinstance(rig, WheelRig):
+        return [0.0] * len(others)
     here, slopes = _foreseen(search, key, first.fitted.u, first.fitted.acting)
-    return min(
-        _gain(search, here, _values(rig.foresee(key, m.fitted.u, m.fitted.acting)) - _values(here), slopes)
-        for m in others
-    )
+    seen = [_values(rig.foresee(key, m.fitted.u, m.fitted.acting)) for m in others]
+    return [_gain(search, key, here, values - _values(here), slopes) for values in seen]
 
 
-def _measured(rivals: list[Model]) -> dict[str, float]:
-    """Experiments the rivals' own files name, by what an instrument would tell."""
-    out: dict[str, float] = {}
-    for one in rivals:
-        for f, x in zip(one.fitted.free, one.fitted.x, strict=True):
-            for other, key in EFFECTS[f.name].confusable_with.items():
-                if key not in DRIVEN and any(other in m.names for m in rivals) and f.parameter.role == "strength":
-                    out[key] = max(out.get(key, 0.0), min(0.5 * float(x / INSTRUMENT) ** 2, MOST))
-    return out
+def _measured(rivals: list[Model]) -> dict[str, list[float]]:
+    """What instruments that the rivals' own files name would tell between the first and every other."""
+    first, *others = rivals
+    keys = {k for m in rivals for n in m.names for k in EFFECTS[n].confusable_with.values() if k not in DRIVEN}
+    return {key: [_read(first, other, key) for other in others] for key in sorted(keys)}
+
+
+def _read(one: Model, other: Model, key: str) -> float:
+    """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell these two."""
+    gain = 0.0
+    for model, rival in ((one, other), (other, one)):
+        for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
+            tells = any(EFFECTS[f.name].confusable_with.get(name) == key for name in rival.names)
+            if tells and f.parameter.role == "strength":
+                gain = max(gain, min(0.5 * float(x / INSTRUMENT) ** 2, MOST))
+    return gain
 
 
 # ---- insufficient, and not in the list -----------------------------------------------------------------------------
@@ -131,7 +141,7 @@ def _unseen_shown(search: Search) -> dict[str, float]:
     for key in DRIVEN if unseen else ():
         here, slopes = _foreseen(search, key, base.fitted.u, ())
         changes = [_values(rig.foresee(key, base.fitted.u, (effect,))) - _values(here) for effect in unseen]
-        out[key] = float(np.median([_gain(search, here, change, slopes) for change in changes]))
+        out[key] = float(np.median([_gain(search, key, here, change, slopes) for change in changes]))
     return out
 
 
@@ -158,7 +168,7 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     name = max(evidence, key=lambda n: evidence[n])
     key = ALONG.get(name.partition("~")[2].split("·")[0], "slip_step")
     gain = float(np.clip(evidence[name] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
-    return NextExperiment(key, EXPERIMENTS[key], (), gain, float(1.0 / (1.0 + np.exp(-gain))))
+    return _foretold(key, gain)
 
 
 # ---- what is foreseen ----------------------------------------------------------------------------------------------
@@ -185,14 +195,16 @@ def _values(foreseen: Foreseen) -> Array:
     return np.concatenate([np.asarray(values)[::EVERY] for values in foreseen.values()])
 
 
-def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float:
-    """Half the squared change in units of noise, the soil's uncertainty among it [nats]."""
+def _gain(search: Search, key: str, here: Foreseen, change: Array, slopes: Array) -> float:
+    """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST [nats]."""
     stack = search.problem.stack
     sigma = []
-    for (channel, values), colour in zip(here.items(), search.problem.noise.colours, strict=True):
+    for channel, colour in zip(here, search.problem.noise.colours, strict=True):
         usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
-        sigma.append(np.full(np.asarray(values)[::EVERY].size, np.hypot(colour.sigma, MODELLED * usual)))
+        counts = driving(key) | (channel == "torque")
+        sigma.append(np.where(counts, np.hypot(colour.sigma, MODELLED * usual), np.inf)[::EVERY])
     scale = np.concatenate(sigma)
     ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
     pulled = soil.T @ ready
-    return float(0.5 * (ready @ ready - pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)))
+    taken = pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)
+    return float(np.clip(0.5 * (ready @ ready - taken), 0.0, MOST))

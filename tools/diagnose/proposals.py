@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array
@@ -41,6 +42,14 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
         pass_number=last + 1.0 if key == "second_pass" else last,
         start_position=reached if key == "shifted_start" else 0.0,
     )
+
+
+def driving(key: str) -> NDArray[np.bool_]:
+    """Whether the wheel drives on the soil: at rest and lifted the motor current alone tells something."""
+    speeds, _, loads = LEVELS[key]
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)
+    return driving
 
 
 def _middle(values: Sequence[Array | float]) -> float:

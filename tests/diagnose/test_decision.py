@@ -44,7 +44,7 @@ def _evidence(acting: Sequence[Effect], name: str) -> Any:
     free = free_of((effect,))
     x = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
     fitted = prepared.problem.descend((effect,), free, prepared.base.u, x)
-    return discrepancy.evidence(prepared.problem, fitted) - prepared.base.log_evidence
+    return discrepancy.evidence(prepared.problem, fitted, prepared.base)
 
 
 def test_another_published_form_keeps_its_name() -> None:

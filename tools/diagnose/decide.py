@@ -27,7 +27,8 @@ PAIR = 3.0  # [nats] a second function must gain
 FORM, FORM_MOST = 0.08, 25.0  # and this share of what the first gained, at most so many nats
 SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, FITTED = 4, 2  # functions without a name that may act together; that are fitted with the soil
-WEIGHED, NEAR, FAR = 10, 0.5, 60.0  # models weighed at most: within this share of the best gain, or so many nats of it
+WEIGHED = 5  # models at most, of one effect and of more
+NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
@@ -95,8 +96,8 @@ def weigh(search: Search) -> list[Weighed]:
     top = max(gains.values())
     near = [m for m in search.models if m.names and gains[id(m)] > top - max(NEAR * top, FAR)]
     near.sort(key=lambda m: -gains[id(m)])
-    start = base.fitted.log_evidence
-    return [Weighed(m, discrepancy.evidence(search.problem, m.fitted) - start) for m in near[:WEIGHED]]
+    one, more = ([m for m in near if (len(m.names) == 1) == single][:WEIGHED] for single in (True, False))
+    return [Weighed(m, discrepancy.evidence(search.problem, m.fitted, base.fitted)) for m in (*one, *more)]
 
 
 def remaining(search: Search, model: Model) -> tuple[float, bool]:

@@ -9,8 +9,8 @@ with m smooth functions φ of unit size in each channel, of a ripple its harmoni
 O'Hagan 2001, J. R. Stat. Soc. B 63, 425-464, proportional to the effect). S′ is all of S, or what of S the soil and the
 calibration cannot absorb. ρ is how far forms differ: 0 says that ours is exact. Because the discrepancy grows with the
 effect, the evidence of rivals for a strong effect differs by how well their *shapes* agree with what was recorded, not
-by thousands of nats; and an effect that must be bent by more than ρ has little evidence left, which is how physics
-outside the library gives itself away.
+by thousands of nats. An effect that must be bent by more than ρ has little evidence left, and one that explains less
+than its own bending is not what was recorded: that is how physics outside the library gives itself away.
 """
 
 from __future__ import annotations
@@ -28,15 +28,17 @@ from tools.diagnose.ripples import order_of
 
 WHOLE = (0.05, 0.15, 0.4)  # how far another form may differ, as a share of what the effect does
 NET = (0.1, 0.3, 1.0)  # the same of what the base model cannot absorb of it
+BENDING, ALWAYS = 0.3, 2.0  # share of what an effect explains by itself that its bending may add, and these few nats
 FORMS = 1 + len(WHOLE) + len(NET)  # degrees of difference, none first
 
 
-def evidence(problem: Problem, fitted: Fitted) -> Array:
-    """Log evidence of fitted effects for each degree to which their forms may differ from ours (FORMS,)."""
+def evidence(problem: Problem, fitted: Fitted, base: Fitted) -> Array:
+    """Log evidence of fitted effects above the base model's, for each degree to which forms may differ (FORMS,)."""
     added = [_added(problem.stack, fitted, i) for i in range(len(fitted.effects))]
     net = [_net(problem, fitted, one) for one in added]
-    gains = (_gains(problem, fitted, parts, rho) for parts, rho in ((added, WHOLE), (net, NET)))
-    return fitted.log_evidence + np.concatenate((np.zeros(1), *gains))
+    bent = np.concatenate([_gains(problem, fitted, parts, rho) for parts, rho in ((added, WHOLE), (net, NET))])
+    own = fitted.log_evidence - base.log_evidence
+    return own + np.concatenate(([0.0], np.minimum(bent, BENDING * max(own, 0.0) + ALWAYS)))
 
 
 def _gains(problem: Problem, fitted: Fitted, added: list[Array], sizes: Sequence[float]) -> Array:

@@ -125,7 +125,9 @@ def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model
     made = each(search.jobs, lambda name: _fitted(search, model, effects[name], found.best[name]), names)
     if made:
         top = max(max(m.evidence for m in made), search.best().evidence)
-        close = [m for m in made if m.evidence > top - _hopeless(search, top)]
+        behind = _hopeless(search, top)
+        foreseen = max(found.evidence[m.names[-1]] for m in made) - behind
+        close = [m for m in made if m.evidence > top - behind or found.evidence[m.names[-1]] > foreseen]
         done = iter(each(search.jobs, lambda m: _finished(search.problem, m), close))
         made = [next(done) if m in close else m for m in made]
     search.models += made

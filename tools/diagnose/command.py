@@ -24,7 +24,7 @@ from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
 from tools.diagnose.engine import diagnose
 from tools.diagnose.innovations import with_innovations
-from tools.diagnose.load import drive_series, is_drive, read_all, sha256, signals
+from tools.diagnose.load import distinct, drive_series, is_drive, read_all, signals
 from tools.diagnose.result import Diagnosis, NextExperiment
 from tools.diagnose.rig import Rig
 from tools.diagnose.wheel_rig import WheelRig
@@ -40,8 +40,8 @@ def main(argv: Sequence[str]) -> int:
     """
     arguments = _parser().parse_args(argv)
     for path in (arguments.json, arguments.report, arguments.apply):
-        if path is not None and not path.parent.is_dir():
-            raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)
+        if path is not None:
+            _check_output(path, [*arguments.files, *([arguments.redo] if arguments.redo else [])])
     if arguments.redo is not None:
         return _again(arguments)
     if not arguments.files or arguments.config is None:
@@ -72,6 +72,16 @@ def _again(arguments: argparse.Namespace) -> int:
     return FAILED if differs else DONE
 
 
+def _check_output(path: Path, inputs: Sequence[Path]) -> None:
+    """Before the work is done. Raises CommandError."""
+    if not path.parent.is_dir():
+        raise CommandError(f"{path}: found no folder {path.parent}; expected one to write into", USAGE)
+    if path.is_dir():
+        raise CommandError(f"{path}: found a folder; expected the name of a file to write", USAGE)
+    if any(path.resolve() == given.resolve() for given in inputs):
+        raise CommandError(f"{path}: is read by this command; expected another name to write to", USAGE)
+
+
 def _write(arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration) -> None:
     try:
         if arguments.json is not None:
@@ -94,13 +104,13 @@ def of_files(
     command: str = "",
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
-    recordings = read_all(files)
+    recordings, hashes = read_all(files), distinct(files)
     rig, rate = _rig(recordings, configuration.settings)
     if not rig.channels:
         raise CommandError(f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED)
     needed = {
         **({"command": command} if command else {}),
-        "files": {str(path): sha256(path) for path in files},
+        "files": hashes,
         "configuration": configuration.text,
         "grid_hz": rate,
         "versions": versions(),
@@ -136,7 +146,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
     parser.add_argument("--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report")
     parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes; default: one a core")
+    parser.add_argument(
+        "--jobs", type=whole(1, 1024), default=os.cpu_count() or 1, help="processes; default: one a core"
+    )
     return parser
 
 

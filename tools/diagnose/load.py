@@ -63,12 +63,29 @@ def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
     found = {name: _series(recording, settings.channels[name]) for name in ("wheel_encoder", "motor_shunt")}
     for name, (time, _) in found.items():
         if time.size < 100:
-            raise CommandError(f"{recording.path}: found {time.size} readings of {name}; expected a drive's", DAMAGED)
+            raise _too_little(recording, f"{time.size or 'no'} readings of {name}", "some seconds of a run")
     return found
+
+
+def _too_little(recording: Recording, found: str, expected: str) -> CommandError:
+    damage = f" ({recording.damage[0]})" if recording.damage else ""
+    return CommandError(f"{recording.path}: found {found}; expected {expected}{damage}", DAMAGED)
 
 
 def sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def distinct(paths: Sequence[Path]) -> dict[str, str]:
+    """SHA-256 of every file. Raises CommandError where two are the same: a run counted twice would prove nothing."""
+    found: dict[str, str] = {}
+    for path in paths:
+        checksum = sha256(path)
+        if checksum in found.values():
+            first = next(name for name, value in found.items() if value == checksum)
+            raise CommandError(f"{path}: found the same recording as {first}; expected each run once", USAGE)
+        found[str(path)] = checksum
+    return found
 
 
 def _read(path: Path) -> Recording:
@@ -79,7 +96,7 @@ def _read(path: Path) -> Recording:
 
 
 def _code(path: Path) -> int:
-    return DAMAGED if path.exists() else USAGE
+    return DAMAGED if path.exists() and not path.is_dir() else USAGE
 
 
 def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
@@ -87,12 +104,12 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
     series = {name: _series(recording, channel) for name, channel in settings.channels.items()}
     missing = [name for name in ("wheel_encoder", "carriage_encoder") if series.get(name, _NONE)[0].size < 10]
     if missing:
-        raise CommandError(f"{recording.path}: found no readings of {missing[0]}; expected both encoders", DAMAGED)
+        raise _too_little(recording, f"no readings of {missing[0]}", "both encoders")
     encoders = [series["wheel_encoder"], series["carriage_encoder"]]
     start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
     count = int((end - start) * rate)
     if count < 5:
-        raise CommandError(f"{recording.path}: found {end - start:.2f} s of encoders; expected some seconds", DAMAGED)
+        raise _too_little(recording, f"{max(end - start, 0.0):.2f} s of both encoders together", "some seconds")
     edges = start + np.arange(count + 1) / rate
     wheel_angle, wheel_speed = slope(*encoders[0], edges)
     carriage_angle, carriage_rate = slope(*encoders[1], edges)

@@ -160,10 +160,10 @@ def test_a_table_drives_and_brakes(tmp_path: Path) -> None:
     scale = settings_.channels["wheel_encoder"].calibration.scale.value
     wheel = rows.arrays("/raw/wheel_encoder")["count"] * scale * settings_.wheel.radius
     carriage = rows.arrays("/raw/carriage_encoder")["count"] * 1e-6
-    assert len(wheel) == 1000
-    for segment, speeds in ((slice(0, 500), (0.02, 0.016)), (slice(500, 1000), (0.014, 0.02))):
+    assert len(wheel) == 1200
+    for segment, speeds in ((slice(0, 600), (0.02, 0.016)), (slice(600, 1200), (0.014, 0.02))):
         travelled = (np.ptp(wheel[segment]), np.ptp(carriage[segment]))
-        assert travelled == pytest.approx(tuple(speed * 4.99 for speed in speeds), abs=3e-6)
+        assert travelled == pytest.approx(tuple(speed * 5.99 for speed in speeds), abs=3e-6)
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from tests.real.data import REAL, Physical, needs
+from tools.command import CommandError
 from tools.import_rig import main
 
 pytestmark = needs("cmu")
-
-SPACING = 6.0  # [s] from one steady state to the next
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +27,9 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return output
 
 
-def steady(trial: Physical, number: int) -> dict[str, float]:
-    """Means of one steady state, SI."""
-    begin, end = number * SPACING, number * SPACING + 5.0
+def steady(trial: Physical) -> dict[str, float]:
+    """Means of a steady state, SI."""
+    begin, end = 0.0, 6.0
     forces = (trial.time("wrench") >= begin) & (trial.time("wrench") < end)
     inside = (trial.time("sinkage_pot") >= begin) & (trial.time("sinkage_pot") < end)
     return {
@@ -55,23 +54,40 @@ def test_every_straight_row_of_the_tables_is_one_steady_state(imported: Path) ->
         given = sorted((r["avg_Vry"], -r["avg_Fy"], r["std_Fy"], -r["avg_Fz"], -r["avg_Z"]) for r in rows(name))
         found = []
         for path in sorted((imported / f"{wheel}-table").glob("*.mcap")):
-            states = [steady(Physical(path), number) for number in range(9)]
-            found += [(s["rim"] * 1e3, s["pull"], s["pull_scatter"], s["load"], s["sinkage"] * 1e3) for s in states]
+            s = steady(Physical(path))
+            found.append((s["rim"] * 1e3, s["pull"], s["pull_scatter"], s["load"], s["sinkage"] * 1e3))
         np.testing.assert_allclose(sorted(found), given, rtol=1e-6, atol=2e-4)
 
 
-def test_repeats_are_runs_of_their_own(imported: Path) -> None:
-    names = [path.name for path in sorted((imported / "smooth-table").glob("*.mcap"))]
-    assert names == [f"smooth-table-{number}.mcap" for number in (1, 2, 3)]
-    assert len(list((imported / "grouser-table").glob("*.mcap"))) == 1
+def test_every_trial_is_a_run_that_states_its_own_load(imported: Path) -> None:
+    names = [path.stem for path in sorted((imported / "smooth-table").glob("smooth-0[02]0-*"))]
+    assert names == [f"smooth-{speed}-{repeat}" for speed in ("000", "020") for repeat in (1, 2, 3)]
+    trial = Physical(imported / "smooth-table" / "smooth-040-2.mcap")
+    assert trial.recording.run.nominal_load == 21.59
+    assert steady(trial)["load"] == pytest.approx(21.59, abs=0.01)
+
+
+def test_a_mean_is_as_uncertain_as_repeats_differ(imported: Path) -> None:
+    trial = Physical(imported / "smooth-table" / "smooth-020-1.mcap")
+    tenths = trial.value("sinkage_pot").reshape(60, 10)
+    assert np.ptp(tenths, axis=1).max() < 1e-9
+    assert tenths[:, 0].std() / np.sqrt(60) == pytest.approx(0.7e-3)
 
 
 def test_the_grousered_wheel_pulls_more_and_sinks_deeper_at_high_slip(imported: Path) -> None:
-    smooth = steady(Physical(imported / "smooth-table" / "smooth-table-1.mcap"), 8)
-    grouser = steady(Physical(imported / "grouser-table" / "grouser-table-1.mcap"), 8)
+    smooth = steady(Physical(imported / "smooth-table" / "smooth-100-1.mcap"))
+    grouser = steady(Physical(imported / "grouser-table" / "grouser-100-1.mcap"))
     assert smooth["speed"] / smooth["rim"] == pytest.approx(0.1, abs=0.01)
     assert grouser["pull"] > smooth["pull"] + 2.0
     assert grouser["sinkage"] > smooth["sinkage"] + 10e-3
+
+
+def test_one_rim_speed_alone(tmp_path: Path) -> None:
+    table = str(REAL / "cmu" / "grouser_first_trial_steady_state.csv")
+    assert main(["cmu", table, "-o", str(tmp_path), "--rim-speed", "20", "--rim-speed", "100"]) == 0
+    assert sorted(p.stem for p in tmp_path.rglob("*.mcap")) == ["grouser-020-1", "grouser-100-1"]
+    with pytest.raises(CommandError, match="found no row of rim speed 7 mm/s"):
+        main(["cmu", table, "-o", str(tmp_path), "--rim-speed", "7"])
 
 
 def test_a_log_ends_where_its_table_row_says(imported: Path) -> None:

@@ -21,9 +21,9 @@ from tools.importers._recording import NS, Stream, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]
-DURATION = 5.0  # [s] of a segment
+DURATION = 6.0  # [s] of a segment
 PAUSE = 1.0  # [s] between segments
-INDEPENDENT = 50  # tenths of a second in a segment
+INDEPENDENT = 60  # tenths of a second in a segment
 
 
 @dataclass(frozen=True)
@@ -54,23 +54,23 @@ def scatter_of_mean(value: float, sigma: float) -> Uncertain:
     return Uncertain(value, sigma * INDEPENDENT**0.5)
 
 
-def streams(conditions: Sequence[Condition], counting: Counting, run: int = 1) -> list[Stream]:
+def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> list[Stream]:
     """The segments one after the other, as the channels of a recording. Scatter has another order in every run."""
     seconds = np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
     times = np.concatenate([stamps(START, seconds + spacing * number) for number in range(len(conditions))])
-    sinkage = _all([c.sinkage for c in conditions], run, 3)
+    sinkage = _all([c.sinkage for c in conditions], *run, 3)
     found = [
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
         Stream("carriage_encoder", times, _travel([c.carriage_speed for c in conditions], counting.carriage)),
         Stream("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
     if any(c.current is not None for c in conditions):
-        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], run, 4)))
+        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], *run, 4)))
     axes = np.zeros((len(times), 6))
-    axes[:, 0] = _all([c.drawbar_pull for c in conditions], run, 0)
-    axes[:, 1] = _all([c.lateral_force for c in conditions], run, 1)
-    axes[:, 2] = _all([c.load for c in conditions], run, 2)
+    axes[:, 0] = _all([c.drawbar_pull for c in conditions], *run, 0)
+    axes[:, 1] = _all([c.lateral_force for c in conditions], *run, 1)
+    axes[:, 2] = _all([c.load for c in conditions], *run, 2)
     return [*found, Stream("wrench", times, axes)]
 
 

@@ -88,20 +88,18 @@ def _import_table(
     configured: config.Configuration,
     progress: Progress,
 ) -> list[Path]:
-    """The k-th repeat of every commanded speed is recording k."""
-    repeats = _repeats([row for row in _straight(path) if not speeds or row[0] in speeds])
-    if not repeats:
+    """A recording of each row: it was a trial of its own, with a load of its own."""
+    trials = _numbered([row for row in _straight(path) if not speeds or row[0] in speeds])
+    if not trials:
         raise RigFileError(f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0")
     written = []
     progress("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
-    for number_, conditions in enumerate(repeats, start=1):
-        name = f"{wheel}-table-{number_}"
-        for condition in conditions:
-            progress(_row(name, condition))
-        load = float(np.mean([condition.load.value for condition in conditions]))
-        info = RunInfo(name=name, nominal_load=round(load, 2), notes=f"{wheel} wheel; {len(conditions)} steady states")
-        folder = output / f"{wheel}-table"
-        written.append(write(folder / f"{name}.mcap", streams(conditions, COUNTING, number_), configured, info))
+    for speed, repeat, condition in trials:
+        name = f"{wheel}-{speed:03.0f}-{repeat}"
+        progress(_row(name, condition))
+        info = RunInfo(name=name, nominal_load=round(condition.load.value, 2), notes=f"{wheel} wheel; a steady state")
+        made = streams([condition], COUNTING, round(speed), repeat)
+        written.append(write(output / f"{wheel}-table" / f"{name}.mcap", made, configured, info))
     return written
 
 
@@ -129,15 +127,11 @@ def _condition(row: dict[str, float]) -> Condition:
     )
 
 
-def _repeats(rows: list[tuple[float, Condition]]) -> list[list[Condition]]:
-    """The first of each commanded speed, the second, and so on; each by rising speed."""
-    repeats: list[dict[float, Condition]] = []
-    for speed, condition in rows:
-        free = next((repeat for repeat in repeats if speed not in repeat), None)
-        if free is None:
-            repeats.append(free := {})
-        free[speed] = condition
-    return [[repeat[speed] for speed in sorted(repeat)] for repeat in repeats]
+def _numbered(rows: list[tuple[float, Condition]]) -> list[tuple[float, int, Condition]]:
+    """Commanded speed, number of the repeat from 1, and condition; by rising speed."""
+    ordered = sorted(rows, key=lambda row: row[0])
+    speeds = [speed for speed, _ in ordered]
+    return [(speed, number_ - speeds.index(speed) + 1, c) for number_, (speed, c) in enumerate(ordered)]
 
 
 def _row(name: str, condition: Condition) -> str:

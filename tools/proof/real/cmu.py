@@ -11,7 +11,7 @@ import yaml
 
 from estimator.terramechanics.soil import Array
 from tools.proof.real.bench import Bench, Said
-from tools.proof.real.judge import Judge, by_condition, rms
+from tools.proof.real.judge import Judge, rms
 from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
 DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
@@ -79,11 +79,11 @@ def _written(value: float, unit: str) -> Any:
 
 def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
     """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of each channel."""
-    before, after = judge.predicted(None)[0], judge.predicted(found)[0]
-    run, out = judge.rig.runs[0], {}
+    models = ([run.measured for run in judge.rig.runs], judge.predicted(None), judge.predicted(found))
+    out = {}
     for channel, (_, factor) in CHANNELS.items():
-        curves = (factor * v[channel] for v in (run.measured, before, after))
-        out[channel] = by_condition(judge, channel, run.covariates["slip"], *curves)
+        out[channel] = judge.means(channel, judge.covariate("slip"), *([run[channel] for run in m] for m in models))
+        out[channel][1:] *= factor
     return out
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tools.proof.real.bench import Bench, Said
-from tools.proof.real.judge import Judge, by_condition, rms
+from tools.proof.real.judge import Judge, rms
 from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
 COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
@@ -23,12 +23,12 @@ def _run(bench: Bench) -> Finding:
     configuration = folder / "ding2011_smooth.yaml"
     said = bench.diagnosed(recordings, configuration, "ding-points")
     judge = Judge(recordings, configuration)
-    before, after = (judge.predicted(said.found, when)[0] for when in ("before", "after"))
-    slip = judge.rig.runs[0].covariates["slip"]
+    before, after = (judge.predicted(said.found, when) for when in ("before", "after"))
     panels, rows = [], []
     for channel, (label, factor) in CHANNELS.items():
-        curves = (factor * v for v in (judge.measured(0, channel), before[channel], after[channel]))
-        means = by_condition(judge, channel, slip, *curves)
+        curves = ([run[channel] for run in model] for model in ([r.measured for r in judge.rig.runs], before, after))
+        means = judge.means(channel, judge.covariate("slip"), *curves)
+        means[1:] *= factor
         labels = ("measured", "soil alone", "with what was found")
         panels.append(Panel(label, means, "slip [–]", label, labels, points=True))
         rows.append((label, f"{rms(means[2] - means[1]):.2f}", f"{rms(means[3] - means[1]):.2f}"))

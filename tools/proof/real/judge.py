@@ -57,18 +57,23 @@ class Judge:
         added = zip(self.rig.predict(u, acting), self.rig.predict(plain, ideal), strict=True)
         return [self.measured(n, channel) - (real[channel] - bare[channel]) for n, (real, bare) in enumerate(added)]
 
+    def means(self, channel: str, *series: Sequence[Array]) -> Array:
+        """Means (rows, conditions) of series of every run over each steady state, where the channel counts."""
+        parts = []
+        for n, run in enumerate(self.rig.runs):
+            number = np.floor((self.time(n) + 0.5 * PAUSE) / (DURATION + PAUSE))
+            inside = run.used[channel]
+            parts += [[np.nanmean(s[n][inside & (number == k)]) for s in series] for k in np.unique(number[inside])]
+        return np.array(parts).T
+
+    def covariate(self, name: str) -> list[Array]:
+        return [np.asarray(run.covariates[name]) for run in self.rig.runs]
+
     def _constants(self, found: dict[str, Any], when: str) -> Array:
         """In prior σ; what the result does not state stays at its prior mean."""
         soil = (found["soil"] or {}).get(when, {})
         stated = {**(found["nuisance"] if when == "after" else {}), **soil}
         return np.array([_strain(k, stated[k.name]["value"]) if k.name in stated else 0.0 for k in self.rig.constants])
-
-
-def by_condition(judge: Judge, channel: str, *series: Array) -> Array:
-    """Means (rows, conditions) of series (n,) over each steady state of the first run, where the channel counts."""
-    number = np.floor((judge.time(0) + 0.5 * PAUSE) / (DURATION + PAUSE))
-    inside = judge.rig.runs[0].used[channel]
-    return np.array([[np.nanmean(v[inside & (number == k)]) for k in np.unique(number[inside])] for v in series])
 
 
 def effects(found: dict[str, Any]) -> tuple[Effect, ...]:

@@ -11,6 +11,7 @@ import shlex
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from estimator import config
@@ -119,7 +120,8 @@ def of_files(
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
         found = with_innovations(found, configuration, recordings, soil=isinstance(rig, WheelRig))
-    return found, [f"{r.path}: {line}" for r in recordings for line in r.damage]
+    damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
+    return replace(found, caveats=(*found.caveats, *(f"Damaged: {line}" for line in damage))), damage
 
 
 def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:

@@ -47,19 +47,24 @@ def sentence(stack: Stack, residual: Array, channel: str, family: str, places: S
         said = _corner(stack, residual, own, family.split("·"), say)
     else:
         said = _along(stack, residual, own, covariate, say)
-    return f"{name_of(channel)}, {said}; {percent(share)} of its misfit"
+    return _started(f"{name_of(channel)}, {said}; {percent(share)} of its misfit")
 
 
 def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: float) -> str:
     """A ripple of so many times a turn and its amplitude in the channel's unit."""
     size = _amplitude(stack, channel, amplitude)
-    return f"{name_of(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit"
+    return _started(f"{name_of(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit")
 
 
 def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:
     """A calibration constant that the fit pulls off what is known of it."""
     size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else _signed(value, unit)
-    return f"{name_of(channel)}, the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
+    moved = f"the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
+    return _started(f"{name_of(channel)}, {moved}")
+
+
+def _started(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 # ---- pieces --------------------------------------------------------------------------------------------------------

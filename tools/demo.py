@@ -143,7 +143,8 @@ class Child:
             start_new_session=True,  # Ctrl-C reaches us alone: we stop them in order
         )
         assert self._process.stdout is not None
-        Thread(target=self._listen, args=(self._process.stdout,), daemon=True).start()
+        self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)
+        self._listener.start()
         self._said: list[str] = []
 
     def _listen(self, stream: IO[str]) -> None:
@@ -202,7 +203,7 @@ class Child:
             self._process.kill()
             self._process.wait()
             raise CommandError(f"the {self._name} did not end within {STOP:g} s of SIGTERM") from None
-        time.sleep(0.05)
+        self._listener.join(STOP)  # to the end of what it said
         while not self._lines.empty():
             self._said.append(self._lines.get())
         return self._said[before:]

@@ -22,6 +22,7 @@ from typing import Any
 from estimator.patience import waited
 
 INTERVAL = 0.1  # [s] between lines
+BREATH = 0.01  # [s] between attempts to take somebody in who cannot be, for want of descriptors
 MAX_CLIENTS = 16
 STOP = 0.5  # [s] the longest a stop waits
 MODE = 0o660
@@ -64,7 +65,7 @@ class Publisher:
     def _run(self) -> None:
         with selectors.DefaultSelector() as waiting:
             waiting.register(self._listener, selectors.EVENT_READ)
-            while not self._stop.wait(INTERVAL if self._clients else 0.0):
+            while not self._stop.wait(INTERVAL if self._clients else BREATH):
                 if waiting.select(0.0 if self._clients else INTERVAL):
                     self._accept()
                 if self._clients:

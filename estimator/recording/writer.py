@@ -352,7 +352,8 @@ class _Syncer:
 
     def raise_error(self, path: Path) -> None:
         """Raises RecordingError if a sync failed since the last call: the medium may lack what it was given."""
-        error, self._error = self._error, None
+        with self._lock:
+            error, self._error = self._error, None
         if error:
             raise RecordingError(f"{path}: cannot sync: {error.strerror}", error.errno) from error
 
@@ -369,6 +370,7 @@ class _Syncer:
             try:
                 sync(file)
             except OSError as error:
-                self._error = error
+                with self._lock:
+                    self._error = error
             finally:
                 os.close(file)

@@ -131,6 +131,7 @@ def _of_modulus(first: Said, pressed: Path) -> Asked:
         f"{plate / 1e3:.0f} kPa (n {n:.2f}), within a factor of {FACTOR:g}",
         f"{wheel / 1e3:.0f} kPa (n {after['n']['value']:.2f})",
         1.0 / FACTOR < wheel / plate < FACTOR,
+        REASON_MODULUS,
     )
 
 
@@ -145,9 +146,16 @@ def _of_frame(*said: Said) -> Asked:
     )
 
 
+REASON_MODULUS = """
+Steady states at one load tell one pressure, not a modulus: with slip-sinkage, exponent, datum and modulus trade against
+each other within what is known of them (modulus ± 50 %, exponent ± 0.2), and without torque the shear is not known
+either.
+"""
+
 REASON = """
-Steady means hold no ripple, the one thing that only grousers make; what is left is more grip and, at high slip, more
-sinkage, as the grousers dig. The library's grousers grip and enlarge the wheel, which makes it sink less, not more.
+Steady means hold no ripple, the one thing that only grousers make. What is left is more grip and, at high slip, more
+sinkage, as the grousers dig soil out. The library's grousers grip and enlarge the wheel, which makes it sink less, not
+more, so other effects that pull more and sink deeper with slip stand in their place.
 """
 
 GROUSERS = Proof(

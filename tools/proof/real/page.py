@@ -38,10 +38,7 @@ def _lines(proof: Proof, finding: Finding, commands: Sequence[str], seconds: flo
     yield ""
     yield f"![{proof.title}](proof-{proof.name}.png)"
     yield ""
-    missed = [a for a in finding.asked if not a.met]
-    if missed:
-        yield "**Missed.** " + " ".join(f"*{a.question}* {flowing(a.reason) or 'Reason not found.'}" for a in missed)
-        yield ""
+    yield from _missed([a for a in finding.asked if not a.met])
     yield f"**Said**, unedited, in {seconds:.0f} s for all commands of this proof:"
     yield ""
     for said in finding.said:
@@ -51,8 +48,20 @@ def _lines(proof: Proof, finding: Finding, commands: Sequence[str], seconds: flo
         yield "```"
         yield ""
     others = [c for c in commands if c not in {s.command for s in finding.said}]
-    yield "The other commands: " + "; ".join(f"`{c}`" for c in others) + "."
+    yield "The other commands:"
     yield ""
+    yield from ("```sh", *others, "```")
+    yield ""
+
+
+def _missed(asked: Sequence[Asked]) -> Iterator[str]:
+    """Each reason once, after the questions it stands for."""
+    reasons: dict[str, list[str]] = {}
+    for a in asked:
+        reasons.setdefault(flowing(a.reason) or "The reason was not found.", []).append(f"*{a.question}*")
+    if reasons:
+        yield "**Missed.** " + " ".join(f"{' '.join(questions)} {why}" for why, questions in reasons.items())
+        yield ""
 
 
 def flowing(prose: str) -> str:

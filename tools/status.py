@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import socket
+import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,12 @@ METRICS = {
     "gritd_tan_phi": ("gauge", "tangent of the internal friction angle", "tick.tan_phi"),
     "gritd_tan_phi_sigma": ("gauge", "its standard deviation", "tick.tan_phi_sigma"),
     "gritd_filter_updates_total": ("counter", "filter updates applied", "tick.updates"),
+    "gritd_filter_consistency": ("gauge", "mean normalised innovation squared, 1 when honest", "tick.consistency"),
+    "gritd_model_disagrees_sigmas": (
+        "gauge",
+        "size of the innovations while model and measurement disagree",
+        "disagreement.sigmas",
+    ),
     "gritd_filter_resets_total": ("counter", "covariance resets", "tick.resets"),
     "gritd_late_total": ("counter", "readings older than the horizon", "tick.late"),
     "gritd_duplicates_total": ("counter", "readings that came twice", "tick.duplicates"),
@@ -155,6 +162,12 @@ def _label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
+def _disagreement(found: Mapping[str, Any]) -> str:
+    """Channel, time and size of a disagreement between model and measurement."""
+    since = time.strftime("%H:%M:%S", time.gmtime(found["since"]))
+    return f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, {found['sigmas']:.1f} σ off"
+
+
 def summary(report: Report) -> Iterator[str]:
     """A few lines for people."""
     tick, loop, log = report["tick"], report["loop"], report["log"]
@@ -162,6 +175,8 @@ def summary(report: Report) -> Iterator[str]:
     if tick:
         yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
+    if disagreement := report.get("disagreement"):
+        yield f"  model    {_disagreement(disagreement)}"
     yield f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: {report['real_time']}"
     for name, stats in report["devices"].items():
         yield f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, {stats['lost']} lost"

@@ -35,6 +35,7 @@ class Reporter:
             "real_time": self._notice or "yes",
             "configuration": daemon.configuration.source,
             **_tick(daemon),
+            "disagreement": daemon.model.present and daemon.model.present._asdict(),
             "queue": self._queue.counts()._asdict(),
             "devices": {reader.device: self._device(reader) for reader in self._readers},
             "log": {**writer, "files": len(writer["files"]), "file": str(writer["files"][-1])},

@@ -20,6 +20,7 @@ from typing import Protocol
 
 from estimator.config import Configuration
 from estimator.daemon.clock import Clock
+from estimator.daemon.disagreement import Watch
 from estimator.daemon.ending import Ending
 from estimator.daemon.health import Pulse, silent
 from estimator.daemon.loop import Change, Loop, LoopRecord, Source
@@ -127,6 +128,7 @@ class Daemon:
             Pulse("writer", lambda: self.writer.beats, WRITER_PATIENCE),
             *(Pulse(f"reader {reader.device}", partial(_beats, reader), READER_PATIENCE) for reader in readers),
         ]
+        self.model = Watch()  # whether model and measurement agree
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
         self._part_began = time.monotonic()
         self._ending, self._loop_stop = Ending(), Event()
@@ -183,6 +185,7 @@ class Daemon:
     def _look(self, loop: Thread, watch: Callable[[Daemon], None]) -> None:
         try:
             self._check(loop)
+            self._compare()
             self._rotate()
             watch(self)
         except Exception as error:  # a fault of ours: named, and the log is closed all the same
@@ -206,6 +209,11 @@ class Daemon:
         if abs(offset - self._wall_offset) > WALL_STEP:
             self.say(WARNING, f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the old one")
             self._wall_offset = offset
+
+    def _compare(self) -> None:
+        """Say where model and measurement begin or cease to disagree."""
+        if self.loop.latest is not None and (said := self.model.look(self.loop.latest[0])):
+            self.say(WARNING if self.model.present else INFO, said)
 
     def _rotate(self) -> None:
         """Ask for a new part when the present one is large or old."""

@@ -22,8 +22,8 @@ COLUMN, ROW = 4.8, 2.6  # [in] of one run, of one channel
 def draw(path: Path, found: Comparison) -> None:
     """Raises OSError."""
     runs, channels = found.runs, found.channels
-    across = min(len(runs), ACROSS)
-    down = -(-len(runs) // across)
+    down = -(-len(runs) // ACROSS)
+    across = -(-len(runs) // down)
     figure = Figure(figsize=(COLUMN * max(across, 2), ROW * len(channels) * down + 0.8), dpi=DPI, layout="constrained")
     blocks = figure.subfigures(down, across, squeeze=False).flat
     for number_of, (block, run) in enumerate(zip(blocks, runs, strict=False)):

@@ -186,12 +186,21 @@ def test_a_log_without_numbers_is_refused(tmp_path: Path) -> None:
         ("1,2,3,4,5,6\n", "row 1: found 6 fields; expected 7"),
         ("1,2,3,4,5,6,7\n1,2,x,4,5,7,8\n", "row 2: found 'x'; expected a finite number"),
         ("1,2,3,4,5,6,7\n1,2,inf,4,5,7,8\n", "row 2: found a number that is not finite"),
+        ("1,2,3,4,5,6,7\n1,2,1e300,4,5,7,8\n", "row 2: found a number that is not finite"),
+        ("", "found no rows; expected 7 numbers"),
         ("1,2,3,4,5,6,7\n", "found 1 rows; expected a log of two or more"),
         ("1,2,3,4,5,6,7\n1,2,3,4,5,6,8\n", "row 2: the clock does not rise"),
     ):
         log.write_text(text)
         said = complaint("cmu", log, "-o", tmp_path / "out")
         assert said.startswith(str(log)) and expected in said
+
+
+def test_a_penetration_test_without_rows_is_refused(tmp_path: Path) -> None:
+    log = tmp_path / "f-d-large-box__force-displacement_1.ft.csv"
+    log.write_text("# zero offsets: 0.1,0.2,0.3,0.4,0.5,0.6\n# time,Fx,Fy,Fz,Tx,Ty,Tz\n")
+    log.with_name("f-d-large-box__force-displacement_1.rig.txt").write_text("1,2,3,4,5,6,7\n1,2,3,4,5,6,8\n")
+    assert f"{log}: found no rows" in complaint("cmu", tmp_path, "-o", tmp_path / "out")
 
 
 def test_a_matlab_file_that_is_none_is_refused(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tools.command import DAMAGED, USAGE, CommandError
 
 Array = NDArray[np.float64]
+LARGEST = 1e15  # no number of a rig's log is beyond: counts of it must fit into 64 bits
 Table = dict[str, list[str]]
 
 
@@ -75,12 +76,12 @@ def numbers(path: Path, table: Table, name: str) -> Array:
 
 
 def number(path: Path, where: str, text: str) -> float:
-    """A finite number. Raises RigFileError."""
+    """A finite number, not beyond LARGEST. Raises RigFileError."""
     try:
         value = float(text)
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value):
+    if not abs(value) <= LARGEST:
         raise RigFileError(f"{path}: {where}: found {text[:40]!r}; expected a finite number")
     return value
 
@@ -92,6 +93,8 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
     """
     lines = [line for line in read_text(path).splitlines() if line.strip()][skip:]
     rows = [line.split(",")[:columns] for line in lines]
+    if not rows:
+        raise RigFileError(f"{path}: found no rows; expected {columns} numbers in each")
     for place, row in enumerate(rows, start=skip + 1):
         if len(row) < columns:
             raise RigFileError(f"{path}: row {place}: found {len(row)} fields; expected {columns}")
@@ -99,8 +102,9 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
         values = np.array(rows, dtype=float).reshape(len(rows), columns)
     except ValueError:
         values = np.array([[number(path, f"row {i}", text) for text in row] for i, row in enumerate(rows, skip + 1)])
-    if not np.all(np.isfinite(values)):
-        bad = int(np.argmin(np.all(np.isfinite(values), axis=1))) + skip + 1
+    good = np.all(np.abs(values) <= LARGEST, axis=1)
+    if not np.all(good):
+        bad = int(np.argmin(good)) + skip + 1
         raise RigFileError(f"{path}: row {bad}: found a number that is not finite; expected {columns} finite numbers")
     return values
 

@@ -16,7 +16,7 @@ from scipy.io import loadmat
 
 from estimator.recording import RunInfo
 from tools.importers import Progress
-from tools.importers._files import Array, RigFileError, find, increasing
+from tools.importers._files import LARGEST, Array, RigFileError, find, increasing
 from tools.importers._recording import Stream, configuration, stamps, write
 from tools.importers._segments import START
 
@@ -63,7 +63,7 @@ def read_log(path: Path) -> dict[str, Array]:
         log[name] = np.ravel(np.asarray(content[name], dtype=np.float64))
     for name, values in log.items():
         expected = 1 if name == "gtau" else len(log["t"])
-        if len(values) != expected or not np.all(np.isfinite(values)):
+        if len(values) != expected or not np.all(np.abs(values) <= LARGEST):
             raise RigFileError(f"{path}: {name}: found {len(values)} values; expected {expected}, all finite")
     increasing(path, "t", log["t"], first=1)
     return log

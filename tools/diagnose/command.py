@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import io
 import json
 import math
 import os
@@ -15,11 +17,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from estimator import config
-from estimator.recording import versions
+from estimator.config import ConfigError
+from estimator.recording import RecordingError, versions
 from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
-from tools.diagnose import redo
+from tools.diagnose import campaigns, redo
 from tools.diagnose.apply import applied
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
@@ -45,8 +48,10 @@ def main(argv: Sequence[str]) -> int:
             _check_output(path, [*arguments.files, *([arguments.redo] if arguments.redo else [])])
     if arguments.redo is not None:
         return _again(arguments)
+    if arguments.campaigns is not None:
+        return _many(arguments)
     if not arguments.files or arguments.config is None:
-        raise CommandError("diagnose: expected recordings and --config F, or --redo FILE", USAGE)
+        raise CommandError("diagnose: expected recordings and --config F, or --redo FILE, or --campaigns DIR", USAGE)
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     named = [*map(str, arguments.files), "--config", str(arguments.config), "--seed", str(seed)]
     command = shlex.join(["gritd", "diagnose", *named])
@@ -71,6 +76,30 @@ def _again(arguments: argparse.Namespace) -> int:
         print(f"note: computed with {line}")
     print(f"redone: {'; '.join(differs) or f'the same as in {arguments.redo}'}")
     return FAILED if differs else DONE
+
+
+def _many(arguments: argparse.Namespace) -> int:
+    """Every campaign of a folder; 1 if one of them could not be diagnosed."""
+    if arguments.files or arguments.config is not None:
+        raise CommandError("diagnose --campaigns: expected no recordings or --config: they are in its folders", USAGE)
+    every = campaigns.found(arguments.campaigns)
+    failed = False
+    for campaign, said in campaigns.diagnosed(every, _one, arguments.jobs, arguments.scheduler):
+        print(f"{campaign.folder.name}: {said}", flush=True)
+        failed |= not campaign.done
+    print(f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: {campaigns.RESULT} in each")
+    return FAILED if failed else DONE
+
+
+def _one(campaign: campaigns.Campaign) -> str:
+    """Verdict and summary of one campaign, or the one line of what was wrong with it."""
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            main(campaign.arguments())
+    except (CommandError, ConfigError, RecordingError) as error:
+        return f"not diagnosed: {error}"
+    found = json.loads(campaign.result.read_text(encoding="utf-8"))
+    return f"{found['verdict']}. {found['summary']}"
 
 
 def _check_output(path: Path, inputs: Sequence[Path]) -> None:
@@ -147,9 +176,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument("--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found")
     parser.add_argument("--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report")
+    parser.add_argument("--campaigns", type=Path, metavar="DIR", help="each folder in DIR: its *.mcap and its *.yaml")
+    parser.add_argument(
+        "--scheduler", metavar="tcp://…", help="with --campaigns: a dask scheduler whose workers see DIR"
+    )
     parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
     parser.add_argument(
-        "--jobs", type=whole(1, 1024), default=os.cpu_count() or 1, help="processes; default: one a core"
+        "--jobs",
+        type=whole(1, 1024),
+        default=os.cpu_count() or 1,
+        help="processes, or campaigns at once; default: one a core",
     )
     return parser
 

@@ -1,24 +1,19 @@
-"""Many trials: on local processes or on a dask cluster, resumable, with progress."""
+"""Many trials, resumable, with progress."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import secrets
-import signal
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
-from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tools.command import FAILED, USAGE, CommandError
+from tools.command import USAGE, CommandError
 from tools.proof import seal, strata, trial
 from tools.proof.trial import Spec
 
@@ -70,52 +65,6 @@ def resumed(output: Path) -> Batch:
         raise CommandError(f"{output}: found no batch; expected one that was begun without --resume", USAGE) from None
     answers = seal.opened(output / SECRET, public["seal"])
     return Batch(output, answers["cases"], tuple(answers["strata"]), answers["secret"], public["seal"])
-
-
-@contextmanager
-def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
-    """Where trials run, and how many at a time. Raises CommandError where the cluster cannot be had."""
-    if scheduler is None:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers: cases run side by side
-        with _processes(jobs) as pool:
-            yield pool, jobs
-        return
-    with _cluster(scheduler) as client:
-        yield client.get_executor(pure=False), max(len(client.nthreads()), 1)
-
-
-@contextmanager
-def _processes(jobs: int) -> Iterator[Executor]:
-    """Workers in process groups of their own: when the batch is stopped, their diagnoses stop with them."""
-    ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    try:
-        with ProcessPoolExecutor(jobs, get_context("spawn"), initializer=os.setpgid, initargs=(0, 0)) as pool:
-            try:
-                yield pool
-            except BaseException:
-                for pid in (worker.pid for worker in active_children() if worker.pid):
-                    with suppress(ProcessLookupError):
-                        os.killpg(pid, signal.SIGTERM)
-                raise
-    finally:
-        signal.signal(signal.SIGTERM, ended)
-
-
-@contextmanager
-def _cluster(address: str) -> Iterator[Any]:
-    try:
-        from distributed import Client
-    except ImportError:
-        message = "--scheduler needs dask.distributed; expected it installed: pip install 'gritd[cluster]'"
-        raise CommandError(message, USAGE) from None
-    try:
-        client: Any = Client(address, timeout="5s")
-    except (OSError, ValueError, TimeoutError):
-        raise CommandError(f"--scheduler {address}: found no scheduler; expected one that answers", FAILED) from None
-    try:
-        yield client
-    finally:
-        client.close()
 
 
 def run(

@@ -13,6 +13,7 @@ from tools.progress import Progress
 from tools.proof import batch, page, score, tables, trial
 from tools.proof.strata import STRATA
 from tools.proof.verdicts import Row, row
+from tools.workers import workers
 
 SCORE, PAGE, SEALS = "score.json", "score.html", "seals.txt"
 OUTPUT = Path("proof")
@@ -52,7 +53,7 @@ def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path
     told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
     with (
         seals.open("a", encoding="utf-8") as published,
-        batch.workers(arguments.jobs, arguments.scheduler) as (executor, width),
+        workers(arguments.jobs, arguments.scheduler) as (executor, width),
         Progress("cases", left) as progress,
     ):
 

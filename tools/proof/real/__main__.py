@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tools.cli import guarded
-from tools.command import DONE, USAGE, CommandError, Parser
+from tools.command import DONE, FAILED, USAGE, CommandError, Parser
 from tools.proof.real import cmu, ding, emps, figure, mgst
 from tools.proof.real.bench import ROOT, Bench
 from tools.proof.real.page import page, section
@@ -22,19 +22,24 @@ DOCS, PAGE = ROOT / "docs", "proof.md"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Redo the proofs and write their sections and figures. Exit 0.
+    """Redo the proofs and write their sections and figures. Exit 0; 1 if a command failed, the others are made.
 
     A question that is missed is no failure of the command: it stands in the page.
     """
     arguments = _parser().parse_args(argv)
     chosen = [p for p in PROOFS if not arguments.only or p.name in arguments.only]
+    failed = False
     for number, proof in enumerate(chosen, start=1):
-        if (arguments.data / proof.rig).is_dir():
-            _prove(proof, arguments.data, arguments.output, f"{number} of {len(chosen)}")
-        else:
-            missing = arguments.data / proof.rig
+        missing = arguments.data / proof.rig
+        if not missing.is_dir():
             print(f"{proof.title}: skipped, found no {missing}; docs/importing.md says where the data are")
-    return DONE
+            continue
+        try:
+            _prove(proof, arguments.data, arguments.output, f"{number} of {len(chosen)}")
+        except CommandError as error:
+            print(f"gritd: {proof.name}: {error}", file=sys.stderr)
+            failed = True
+    return FAILED if failed else DONE
 
 
 def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:

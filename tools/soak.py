@@ -141,6 +141,7 @@ def growth(memory: Sequence[tuple[float, float]]) -> float:
 def on_wires(arguments: Namespace) -> list[str]:
     """Testbed and daemon as processes, and busy ones beside them; what was not right."""
     seconds = arguments.minutes * 60.0
+    os.environ.update(unit_environment())
     with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
         told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
         with Child(Ending(), "testbed", "tools.testbed", *told) as testbed:
@@ -154,6 +155,13 @@ def on_wires(arguments: Namespace) -> list[str]:
                 looks = list(watched(Path(name) / "gritd.sock", seconds))
                 words = daemon.stop()
     return judged(looks, words, arguments)
+
+
+def unit_environment() -> dict[str, str]:
+    """What the service's unit sets."""
+    text = Path(packaged("gritd.service")).read_text(encoding="utf-8")
+    lines = [line.removeprefix("Environment=") for line in text.splitlines() if line.startswith("Environment=")]
+    return dict(setting.split("=", 1) for line in lines for setting in line.split())
 
 
 @contextmanager

@@ -43,7 +43,7 @@ def delays(ticks, moments, condition):
 
 def cycled(tmp_path, seed, cycles):
     rng = np.random.default_rng(seed)
-    with service(tmp_path, driven(60.0, seed, skip=2.0)) as (wires, daemon):
+    with service(tmp_path, driven(60.0 + 4.0 * cycles, seed, skip=2.0)) as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         before = daemon.descriptors()
         pulled, back = unplug_and_back(wires, daemon, rng, cycles)

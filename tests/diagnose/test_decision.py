@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from estimator.effects import EFFECTS, make
 from estimator.effects.base import Effect
@@ -16,7 +17,8 @@ from tools.diagnose.calibrate import learn, log_truth, tabled
 from tools.diagnose.calibration import Calibration, learnt
 from tools.diagnose.cases import record
 from tools.diagnose.cousins import LorentzStribeck
-from tools.diagnose.fit import free_of
+from tools.diagnose.evidence import SCALES
+from tools.diagnose.fit import WIDE, Fitted, free_of
 from tools.diagnose.prepare import prepare
 from tools.diagnose.screen import Screen
 from tools.diagnose.wheel_rig import WheelRig
@@ -76,3 +78,24 @@ def test_the_learnt_table_is_sound() -> None:
     assert 0.5 < by.temperature < 50.0
     assert np.exp(by.forms).sum() == pytest.approx(1.0, abs=0.05)
     assert max(by.more, by.nameless) < 3.0
+
+
+def test_the_evidence_of_a_fit_is_the_integral() -> None:
+    """A linear problem with one constant and one bounded strength: against quadrature over both."""
+    rng = np.random.default_rng(5)
+    jacobian = rng.standard_normal((30, 2))
+    values = jacobian @ np.array([0.7, 1.1]) + rng.standard_normal(30)
+    effect = EFFECTS["viscous_friction"]
+    free, at, penalty = free_of((effect,)), np.array([0.4, 0.8]), np.array([1.0, 1.0 / WIDE])
+    residual = values - jacobian @ at
+    objective = float(residual @ residual + np.sum((penalty * at) ** 2))
+    fitted = Fitted(
+        (effect,), free, at[:1], at[1:], jacobian @ at, residual, jacobian, jacobian, penalty, np.zeros(0), objective
+    )
+
+    constant, strength = np.linspace(-4.0, 5.0, 300), np.linspace(0.0, 8.0, 400)
+    off = values[:, None, None] - jacobian[:, 0, None, None] * constant[:, None] - jacobian[:, 1, None, None] * strength
+    likelihood = np.exp(-0.5 * (np.sum(off**2, axis=0) - residual @ residual)) * norm.pdf(constant)[:, None]
+    priors = np.mean([2.0 * norm.pdf(strength, 0.0, s) for s in SCALES], axis=0)
+    true = np.trapezoid(np.trapezoid(likelihood * priors, strength, axis=1), constant)
+    assert fitted.log_evidence == pytest.approx(np.log(true) - 0.5 * residual @ residual, abs=0.02)

@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
-from scipy.special import log_ndtr
+from scipy.special import logsumexp
 
 from estimator.effects.base import Effect, Parameter
 from estimator.terramechanics.soil import Array
-from tools.diagnose.evidence import Base
+from tools.diagnose.evidence import Base, log_bayes
 from tools.diagnose.noise import Noise, whiten
 from tools.diagnose.rig import Stack
 
@@ -72,29 +73,48 @@ class Fitted:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Laplace's approximation (MacKay 2003, ch. 27), up to a constant that all models of one problem share."""
-        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
-        spread = np.linalg.slogdet(gram)[1] - 2.0 * np.log(self.penalty).sum()
-        return float(-0.5 * (self.objective + spread) + self._one_sided(gram))
+        """Log evidence, up to a constant that all models of one problem share.
 
-    def _one_sided(self, gram: Array) -> float:
-        """ln of twice the posterior share on the allowed side, for each strength that is bounded at its off value."""
-        bounded = [
-            i for i, f in enumerate(self.free) if f.parameter.role == "strength" and f.parameter.low >= f.parameter.off
-        ]
-        if not bounded:
-            return 0.0
+        Laplace's approximation (MacKay 2003, ch. 27) for all unknowns but the strengths; these have the screen's prior:
+        several sizes, and of each effect all strengths or one alone.
+        """
+        strong = np.zeros(self.penalty.size, bool)
+        strong[len(self.u) : len(self.u) + len(self.free)] = [f.parameter.role == "strength" for f in self.free]
         centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
-        inverse = np.linalg.inv(gram)
-        best = centre + inverse @ (self.jacobian.T @ self.residual - self.penalty**2 * centre)
-        at = np.array(bounded) + len(self.u)
-        return float(np.sum(log_ndtr(best[at] / np.sqrt(np.diag(inverse)[at])) + np.log(2.0)))
+        prior = np.where(strong, 0.0, self.penalty**2)
+        pull = self.jacobian.T @ self.residual - prior * centre
+        gram = self.jacobian.T @ self.jacobian + np.diag(prior)
+        root = np.linalg.cholesky(gram[np.ix_(~strong, ~strong)])
+        inside = np.linalg.solve(root, np.column_stack((gram[np.ix_(~strong, strong)], pull[~strong])))
+        spread = 2.0 * np.log(np.diag(root)).sum() - 2.0 * np.log(self.penalty[~strong]).sum()
+        misfit = self.residual @ self.residual + np.sum(prior * centre**2) - inside[:, -1] @ inside[:, -1]
+        a = gram[np.ix_(strong, strong)] - inside[:, :-1].T @ inside[:, :-1]
+        b = pull[strong] - inside[:, :-1].T @ inside[:, -1]
+        return float(-0.5 * (misfit + spread) + self._strengths(a, b, centre[strong]))
+
+    def _strengths(self, a: Array, b: Array, at: Array) -> float:
+        """What the strengths add to the log evidence, from curvature (p, p) and slope (p,) of the likelihood there."""
+        if not at.size:
+            return 0.0
+        free = [f for f in self.free if f.parameter.role == "strength"]
+        sign = [int(f.parameter.low >= f.parameter.off) for f in free]
+        names = [f.name for f in free]
+        groups = [[i for i, n in enumerate(names) if n == name] for name in dict.fromkeys(names)]
+        chosen = [sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))]
+        pull = b + a @ at  # seen from strengths of nought
+        found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
+        return float(logsumexp(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
 
     def base(self) -> Base:
         """The neighbourhood of this fit, for signatures of further effects."""
         scaled = self.jacobian / self.penalty
         pulled = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
         return Base(scaled, self.residual, pulled * self.penalty)
+
+
+def _choices(strengths: list[int]) -> list[list[int]]:
+    """All strengths of an effect together, and each alone."""
+    return [strengths] if len(strengths) == 1 else [strengths, *([i] for i in strengths)]
 
 
 def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from estimator.terramechanics.soil import Array
 from tools.proof.real.bench import Bench, Said
 from tools.proof.real.judge import Judge, rms
 from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
@@ -31,15 +32,26 @@ def _run(bench: Bench) -> Finding:
         judge.predicted(said.found, "before"),
         judge.predicted(said.found),
     )
-    panels, rows = [], []
+    panels, columns = [], []
     for channel, (label, factor) in CHANNELS.items():
         curves = ([run[channel] for run in model] for model in models)
         means = judge.means(channel, judge.covariate("slip"), *curves)
         means[1:] *= factor
         panels.append(Panel(label, means[[0, 1, 3, 4]], "slip [–]", label, LABELS, points=True))
-        rows.append((label, *(f"{rms(model - means[1]):.2f}" for model in means[2:])))
-    heads = ("six points, r.m.s. error", "soil as published", "soil as fitted, no effect", "with what was found")
-    return Finding([said], _asked(said), Table(heads, rows), panels)
+        columns.append(means)
+    return Finding([said], _asked(said), _table(columns), panels)
+
+
+def _table(columns: list[Array]) -> Table:
+    """Every point as measured, by the published soil, by the fitted one, and with effects; then the errors."""
+    rows = [[f"{slip:.0%}", *(_four(c[1:, k]) for c in columns)] for k, slip in enumerate(columns[0][0])]
+    rows.append(["r.m.s. error", *(_four(np.array([0.0, *(rms(m - c[1]) for m in c[2:])])) for c in columns)])
+    four = "measured / soil as published / as fitted, no effect / with what was found"
+    return Table((f"slip; {four}", *(label for label, _ in CHANNELS.values())), rows)
+
+
+def _four(values: Array) -> str:
+    return " / ".join(f"{v:.1f}" for v in values)
 
 
 def _asked(said: Said) -> list[Asked]:

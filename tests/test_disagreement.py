@@ -30,7 +30,9 @@ def watched(loss: float) -> tuple[Watch, list[tuple[int, str]], list[int]]:
 
 
 def _more(reading: Reading, volts: float) -> Reading:
-    return reading._replace(value=reading.value + volts) if reading.channel == "motor_shunt" else reading
+    if reading.channel != "motor_shunt" or isinstance(reading.value, tuple):
+        return reading
+    return reading._replace(value=reading.value + volts)
 
 
 def test_a_motor_that_suddenly_drags_is_said_with_channel_and_time() -> None:

@@ -29,6 +29,7 @@ def proposed(found: Diagnosis) -> str:
     return following.key
 
 
+@pytest.mark.slow
 def test_rivals_are_told_apart_by_what_they_do_differently() -> None:
     """Without reversal a constant loss and one that differs by direction are the same; driving back tells."""
     found = diagnosed(plan(), (make("coulomb_friction", {"loss": 0.25}),))

@@ -17,6 +17,8 @@ NYQUIST = 0.35  # of the grid's rate: faster ripples are damped too much by the 
 TURNS = 1.5  # ripples a run must hold to be told from a trend
 STRONGEST = 3  # orders of a channel that do not count as its noise
 ORDERS = 120  # at most
+STEPS = (1.0, 0.1, 0.01)  # of an expected size, for a derivative
+LARGEST = 10.0  # times the largest value measured: what changes by more runs away
 RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
 
 
@@ -43,14 +45,34 @@ def signature(
     shape: Mapping[str, float],
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
-    """None where the effect changes nothing that is measured."""
-    columns = np.column_stack(
-        [stack.predict(u, (*others, effect(**{**shape, p.name: p.off + p.sigma}))) - base for p in strengths(effect)]
-    )
+    """None where the effect changes nothing that is measured, or runs away however weak it is."""
+    found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
+    columns = np.column_stack(found)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
     return Signature(effect.name, columns, sign, dict(shape))
+
+
+def _derivative(
+    stack: Stack,
+    u: Array,
+    base: Array,
+    effect: type[Effect],
+    shape: Mapping[str, float],
+    strength: Parameter,
+    others: tuple[Effect, ...],
+) -> Array:
+    """Change of all values (N,) per expected size; by a smaller step where the full one runs away, as a motor may that
+    heats the more the more current it draws; NaN where every step does."""
+    largest = LARGEST * np.abs(stack.measured).max(initial=0.0)
+    for step in STEPS:
+        acting = effect(**{**shape, strength.name: strength.off + step * strength.sigma})
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            change = stack.predict(u, (*others, acting)) - base
+        if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:
+            return np.asarray(change / step)
+    return np.full(stack.size, np.nan)
 
 
 def shape_grid(rig: Rig, effect: type[Effect]) -> Iterator[dict[str, float]]:

@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.settings import Settings
+from estimator.settings import Calibration, Settings, Uncertain
 from estimator.terramechanics.soil import Array
 from tools.diagnose.load import Signals
 
 CLOSE = 0.15  # relative distance of the measured load from the stated one at which both mean the same
 RAISED = 0.2  # share of the stated load below which the wheel is lifted
 PASSING = 0.1  # share of a run that may pass between lifted and loaded
+DOUBT = 4.0  # [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
 LEVEL = 0.03  # relative change of the measured load that is a change of weights
 HOLD = 1.0  # [s] weights stay for at least this long
 
@@ -23,22 +24,33 @@ class Weights(NamedTuple):
 
 
 def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weights:
-    """Stated weights where the measured load does not contradict them, else the levels of the measured load."""
-    stated = signals.info.nominal_load if signals.info.nominal_load is not None else settings.load.nominal.value
+    """Stated weights where the measured load does not contradict them, else the levels of the measured load.
+
+    A run that states nothing has the configuration's weights, if the measured load is theirs within the uncertainties.
+    """
+    said = signals.info.nominal_load
+    stated = settings.load.nominal.value if said is None else said
     constant = np.full(signals.time.size, float(stated))
     measured = signals.analogue.get("load")
     if measured is None or settings.wrench is None or settings.wrench.load.offset.sigma > 1e5:
         return Weights(constant, True)
     load = _bridged(measured)
     near, lifted = np.abs(load - stated) <= CLOSE * stated + 1.0, load <= RAISED * stated
-    if np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
+    held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
+    known = said is not None or abs(held - stated) <= DOUBT * _sigma(settings.load.nominal, settings.wrench.load)
+    if known and np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
         return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
-    note = (
-        "Weights change within a run, so they are taken from the measured load: friction of the load axis cannot show."
-    )
+    note = "Weights are taken from the measured load in runs that do not state theirs or that change them: "
+    note += "friction of the load axis cannot show there."
     if note not in caveats:
         caveats.append(note)
     return Weights(levels(signals.time, load), False)
+
+
+def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
+    """Of the configured weights beside the sensor that measures them [N]."""
+    gain = sensor.scale.sigma / sensor.scale.value * nominal.value
+    return float(np.sqrt(nominal.sigma**2 + gain**2 + sensor.offset.sigma**2))
 
 
 def levels(time: Array, load: Array) -> Array:

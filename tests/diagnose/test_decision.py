@@ -69,7 +69,7 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
         cases.append({"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": -1e6})
     by, score = learn(cases)
     assert by.temperature == pytest.approx(3.0, rel=0.25)
-    overconfident = Calibration(0.5, by.forms, by.more, by.nameless)
+    overconfident = Calibration(0.5, by.forms, by.more, by.nameless, by.lapse)
     assert score > log_truth(tabled(cases), overconfident).mean()
 
 
@@ -78,6 +78,7 @@ def test_the_learnt_table_is_sound() -> None:
     assert 0.5 < by.temperature < 50.0
     assert np.exp(by.forms).sum() == pytest.approx(1.0, abs=0.05)
     assert max(by.more, by.nameless) < 3.0
+    assert 0.0 < by.lapse < 0.2
 
 
 def test_the_evidence_of_a_fit_is_the_integral() -> None:

@@ -2,8 +2,8 @@
 
 Each FILE holds trials (`python -m tools.diagnose.trials --out FILE`). The temperature, the weights of how far forms may
 differ, and the odds are those that give the truth of every case the largest probability, on average: the
-logarithmic score, which only stated probabilities that are true maximise (Good 1952). A weak prior (PRIOR) keeps what
-the cases do not tell. The truth of a case is any set of effects that holds a true one, weighted by how many of its
+logarithmic score, which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps what
+few cases do not tell. The truth of a case is any set of effects that holds a true one, weighted by how many of its
 effects are true; of a stranger, functions without a name.
 """
 
@@ -19,15 +19,15 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose.calibration import Calibration
 from tools.diagnose.discrepancy import FORMS
 
-START = np.array([np.log(2.0), *([0.0] * (FORMS - 1)), -3.0, -3.0])  # ln T, forms after the first, odds
-PRIOR = np.array([0.5, *([2.0] * (FORMS - 1)), 2.0, 3.0])  # standard deviations about START
-FLOOR = 1e-3  # probability no miss is charged below: one case must not decide
+START = np.array([np.log(2.0), *([0.0] * (FORMS - 1)), -2.5, -3.5, -3.0])  # ln T, forms after the first, odds, lapse
+PRIOR = np.array([0.2, *([1.0] * (FORMS - 1)), 1.0, 1.0, 1.0])  # standard deviations about START
+OTHERS = 30  # names among which a lapse spreads
 NEVER = -1e9
 
 
@@ -65,14 +65,15 @@ def log_truth(table: Table, by: Calibration) -> Array:
     unnamed = table.nameless / by.temperature + by.nameless
     total = np.logaddexp(logsumexp(listed, axis=1), unnamed)
     right = np.sum(np.exp(listed - total[:, None]) * table.right, axis=1)
-    return np.asarray(np.log(FLOOR + np.where(table.strange > 0.0, np.exp(unnamed - total), right)))
+    found = np.where(table.strange > 0.0, np.exp(unnamed - total), right)
+    return np.asarray(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * found))
 
 
 def calibration(x: Array) -> Calibration:
     forms = np.concatenate(([0.0], x[1:FORMS]))
     forms = forms - logsumexp(forms)
-    more, nameless = x[FORMS:].tolist()
-    return Calibration(float(np.exp(x[0])), tuple(forms.tolist()), more, nameless)
+    more, nameless, lapse = x[FORMS:].tolist()
+    return Calibration(float(np.exp(x[0])), tuple(forms.tolist()), more, nameless, float(expit(lapse)))
 
 
 def learn(cases: Sequence[dict[str, Any]]) -> tuple[Calibration, float]:

@@ -1,7 +1,8 @@
 """How far evidence is to be trusted: what `python -m tools.diagnose.calibrate` learnt from simulated cases.
 
 The evidence of every explanation [nats] becomes a probability by one temperature, one weight for each degree to which a
-published form may differ from ours, and the odds of one more effect and of physics that is in no list.
+published form may differ from ours, the odds of one more effect and of physics that is in no list, and the share of
+cases in which all evidence misleads.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ class Calibration:
     forms: tuple[float, ...]  # log weight of each degree of difference of discrepancy.py
     more: float  # log odds of one more effect
     nameless: float  # log odds of functions without a name in the place of an effect
+    lapse: float  # share of cases in which the evidence misleads: no probability exceeds 1 less this
 
     def listed(self, evidence: Array, count: int) -> float:
         """Log weight of `count` effects, from their evidence (FORMS,), the base model's taken off."""

@@ -68,15 +68,15 @@ def judged(search: Search, weighed: Sequence[Weighed], nameless: float, calibrat
     weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
     unnamed = calibration.unlisted(nameless)
     total = float(np.logaddexp(logsumexp(weights), unnamed)) if weighed else unnamed
-    unlisted = float(np.exp(unnamed - total))
+    unlisted = float(np.exp(unnamed - total)) * (1.0 - calibration.lapse)
     best = _best(weighed, weights) if weighed else search.models[0]
     left, significant = remaining(search, best)
     gained = 0.5 * (search.models[0].fitted.objective - best.fitted.objective)
     return Decision(
-        "explained" if weighed and unlisted < 0.5 else "unlisted",
+        "explained" if weighed and unlisted < 0.5 * (1.0 - calibration.lapse) else "unlisted",
         best, gained / max(gained + left, 1e-9), left, significant,
-        _probabilities(weighed, weights - total), unlisted, _groups(weighed, weights, best),
-        tuple(weighed), nameless,
+        _probabilities(weighed, weights - total + np.log1p(-calibration.lapse)), unlisted,
+        _groups(weighed, weights, best), tuple(weighed), nameless,
     )  # fmt: skip
 
 

@@ -46,7 +46,9 @@ class Screen:
 
     @property
     def threshold(self) -> float:
-        return max(float(tail_quantile(self.nulls, LEVEL)), LEAST)
+        """At the tail of the nulls, fitted and counted: whichever is farther, since a fitted tail may be too light."""
+        counted = np.sort(self.nulls)[-max(int(LEVEL * (1 + len(self.nulls))), 1)]
+        return max(float(tail_quantile(self.nulls, LEVEL)), float(counted), LEAST)
 
     def surprise(self, name: str, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows under this name."""

@@ -32,7 +32,7 @@ from tests.scenarios.rig import (
     service,
     verified,
 )
-from tests.scenarios.test_loop import as_root, folder_of_nobody, hand_over
+from tests.scenarios.test_users import as_root, folder_of_nobody, hand_over
 
 __all__ = ["folder_of_nobody"]
 

@@ -1,19 +1,13 @@
-"""The process under pressure: clock steps, stalls, starvation, dead threads, a second instance, another user."""
+"""The process under pressure: clock steps, stalls, starvation, dead threads."""
 
 from __future__ import annotations
 
-import os
-import pwd
 import random
-import resource
 import signal
-import stat
 import subprocess
 import sys
-import tempfile
 import time
 from contextlib import suppress
-from pathlib import Path
 from threading import Event, Thread
 
 import numpy as np
@@ -27,12 +21,8 @@ from estimator.daemon.loop import Loop
 from estimator.pipeline import Pipeline
 from estimator.recording.salvage import read
 from tests.scenarios.rig import (
-    LIMIT,
-    ROOT,
     TESTBED,
     WIRES,
-    DaemonProcess,
-    Wires,
     driven,
     log_lines,
     rows,
@@ -372,94 +362,3 @@ def test_garbage_collector_pause(tmp_path, seed, figure):
     figure("garbage-collector pause", level, "samples the queue dropped", report["queue"]["dropped"], "", 0)
     figure("garbage-collector pause", level, "largest lateness", late * 1e3, "ms")
     assert unreported(daemon.path()) == 0 and verified(daemon.path())
-
-
-# --- who runs it -----------------------------------------------------------------------------------------------------
-
-
-def test_second_instance(tmp_path, seed, figure):
-    with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
-        began, spent = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
-        second = subprocess.run(
-            [sys.executable, "-m", "tools.cli", "run", "--config", str(wires.config)],
-            cwd=ROOT, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        took, after = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
-        assert second.returncode == 1 and second.stdout == ""
-        assert second.stderr == f"gritd: {tmp_path}: another gritd is logging here\n"
-        time.sleep(0.3)
-        daemon.stop()
-    assert len(list(tmp_path.glob("*.mcap"))) == 1 and verified(daemon.path())
-    own = after.ru_utime + after.ru_stime - spent.ru_utime - spent.ru_stime
-    row, level = "second instance", "two daemon processes"
-    figure(row, level, "refused, from the start of its process", took, "s", 0.5, real=True)
-    figure(row, level, "processor time until then", own, "s", 0.5, real=True)
-
-
-def test_nobody_listens_any_more(tmp_path, figure):
-    """What it says goes into a pipe whose other end is closed: it runs on, and closes its log when it is told to."""
-    command = [sys.executable, "-m", "tools.cli", "run", "--status", "0.1", "--config"]
-    with Wires(tmp_path) as wires:
-        daemon = subprocess.Popen(
-            [*command, str(wires.config)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
-        daemon.stdout.close()
-        wires.play(driven(40.0, 1, skip=1.0))
-        time.sleep(2.0)
-        daemon.send_signal(signal.SIGTERM)
-        assert daemon.wait(LIMIT) == 0
-    recording = read(path)
-    assert recording.complete and recording.counts["/tick"] > 100
-    figure("nobody listens", WIRES, "exit code after SIGTERM", 0, "", 0)
-
-
-as_root = pytest.mark.skipif(
-    os.geteuid() != 0, reason="only root can become nobody; these tests run unprivileged already"
-)
-
-
-@as_root
-def test_unprivileged_user(folder_of_nobody, seed, figure):
-    nobody = pwd.getpwnam("nobody").pw_uid
-    with Wires(folder_of_nobody) as wires:
-        hand_over(folder_of_nobody, wires, nobody)
-        with DaemonProcess(wires.config, user=nobody) as daemon:
-            daemon.ready()
-            wires.play(driven(40.0, seed, skip=1.0))
-            daemon.wait_status(lambda report: report["status"] == "TRACKING")
-            assert stat.S_IMODE(os.stat(daemon.socket).st_mode) == 0o660
-            daemon.stop()
-    assert verified(daemon.path())
-    figure("unprivileged user", f"{WIRES}, as nobody", "exit code after SIGTERM", 0, "", 0)
-
-
-@as_root
-def test_a_device_it_may_not_open_is_a_clear_error(folder_of_nobody, figure):
-    nobody = pwd.getpwnam("nobody").pw_uid
-    with Wires(folder_of_nobody) as wires:
-        hand_over(folder_of_nobody, wires, nobody)
-        port = os.path.realpath(wires.encoders.plug.path)
-        os.chown(port, 0, 0)
-        os.chmod(port, 0o600)
-        with DaemonProcess(wires.config, user=nobody) as daemon:
-            daemon.heard("device encoders WAITING")
-            assert "Permission denied (is the user in the port's group, often dialout?)" in daemon.text
-            os.chmod(port, 0o666)
-            daemon.heard("device encoders OPEN")
-            daemon.stop()
-    figure("unprivileged user", f"{WIRES}, as nobody", "lines that say why a port cannot be opened", 1, "")
-
-
-@pytest.fixture
-def folder_of_nobody():
-    """Below /tmp: pytest's own folders are closed to others."""
-    with tempfile.TemporaryDirectory() as name:
-        os.chmod(name, 0o755)
-        yield Path(name)
-
-
-def hand_over(folder, wires, uid):
-    """Folder, files and the terminal's slave to another user."""
-    for path in (folder, *folder.iterdir()):
-        os.chown(path, uid, uid)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.stats import norm
 from estimator.effects import EFFECTS, make
 from estimator.effects.base import Effect
 from tests.diagnose.campaigns import plan, settings
-from tools.diagnose import discrepancy
+from tools.diagnose import decide, discrepancy
 from tools.diagnose.calibrate import learn, log_truth, tabled
 from tools.diagnose.calibration import Calibration, learnt
 from tools.diagnose.cases import record
@@ -71,6 +72,21 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
     assert by.temperature == pytest.approx(3.0, rel=0.25)
     overconfident = Calibration(0.5, by.forms, by.more, by.nameless, by.lapse)
     assert score > log_truth(tabled(cases), overconfident).mean()
+
+
+@pytest.mark.parametrize("left, verdict", [(0.0, "explained"), (20.0, "explained"), (100.0, "unlisted")])
+def test_an_explanation_that_leaves_much_is_none(left: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five hundred nats gained, by far more than functions without a name alone; what stands out beside it decides."""
+    monkeypatch.setattr(decide, "remaining", lambda *_: (left, left > 0.0))
+    base, best = (
+        SimpleNamespace(names=n, fitted=SimpleNamespace(objective=o)) for n, o in (((), 1000.0), (("a",), 0.0))
+    )
+    search: Any = SimpleNamespace(models=[base, best])
+    weighed: Any = [decide.Weighed(best, np.full(discrepancy.FORMS, 480.0))]
+    found = decide.judged(search, weighed, 200.0, learnt())
+    assert found.verdict == verdict
+    assert found.probability["a"] + found.unlisted == pytest.approx(1.0 - learnt().lapse)
+    assert (found.probability["a"] > 0.5) == (verdict == "explained")
 
 
 def test_the_learnt_table_is_sound() -> None:

@@ -29,6 +29,10 @@ SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, FITTED = 4, 2  # functions without a name that may act together; that are fitted with the soil
 WEIGHED = 5  # models at most, of one effect and of more
 NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
+WHOLE = 0.9  # share of the misfit that an explanation takes, if what it leaves stands out of the noise
+PART = (
+    0.1  # belief in one that takes less: of eleven such in simulated cases none was right, of eight that took more all
+)
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
@@ -68,14 +72,15 @@ def judged(search: Search, weighed: Sequence[Weighed], nameless: float, calibrat
     weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
     unnamed = calibration.unlisted(nameless)
     total = float(np.logaddexp(logsumexp(weights), unnamed)) if weighed else unnamed
-    unlisted = float(np.exp(unnamed - total)) * (1.0 - calibration.lapse)
     best = _best(weighed, weights) if weighed else search.models[0]
     left, significant = remaining(search, best)
     gained = 0.5 * (search.models[0].fitted.objective - best.fitted.objective)
+    share = gained / max(gained + left, 1e-9)
+    believed = (PART if significant and share < WHOLE else 1.0) * (1.0 - calibration.lapse)
+    unlisted = 1.0 - calibration.lapse - believed * -float(np.expm1(unnamed - total))
     return Decision(
         "explained" if weighed and unlisted < 0.5 * (1.0 - calibration.lapse) else "unlisted",
-        best, gained / max(gained + left, 1e-9), left, significant,
-        _probabilities(weighed, weights - total + np.log1p(-calibration.lapse)), unlisted,
+        best, share, left, significant, _probabilities(weighed, weights - total + np.log(believed)), unlisted,
         _groups(weighed, weights, best), tuple(weighed), nameless,
     )  # fmt: skip
 

@@ -74,7 +74,7 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
     assert score > log_truth(tabled(cases), overconfident).mean()
 
 
-@pytest.mark.parametrize("left, verdict", [(0.0, "explained"), (20.0, "explained"), (100.0, "unlisted")])
+@pytest.mark.parametrize("left, verdict", [(0.0, "explained"), (40.0, "explained"), (100.0, "unlisted")])
 def test_an_explanation_that_leaves_much_is_none(left: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Five hundred nats gained, by far more than functions without a name alone; what stands out beside it decides."""
     monkeypatch.setattr(decide, "remaining", lambda *_: (left, left > 0.0))

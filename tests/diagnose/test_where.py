@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,3 +84,15 @@ def test_noise_alone_has_no_change_points() -> None:
         drawn = draw(settings, np.random.default_rng(seed))
         alarms += bool(changes.find(*searched(WheelRig(record(drawn, ()), drawn.settings))))
     assert alarms <= 2
+
+
+def test_a_covariate_with_no_place_for_a_step_is_left_out() -> None:
+    """All but a few values at the start of the bed: whatever the place, too few lie beyond it."""
+    position = np.concatenate([np.linspace(0.0, 1e-3, 400), np.linspace(0.01, 1.0, 6)])
+    run = SimpleNamespace(time=np.arange(position.size), covariates={"position": position})
+    stack: Any = SimpleNamespace(
+        rig=SimpleNamespace(runs=[run]), run=np.zeros(position.size, dtype=int), time=run.time,
+        covariate=lambda name: run.covariates[name],
+    )  # fmt: skip
+    everything = np.ones(position.size, dtype=bool)
+    assert all(places.size for _, places, _ in changes._steps(stack, everything, everything))

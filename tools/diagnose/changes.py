@@ -166,7 +166,9 @@ def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array
             if name == "time":
                 inside = [(r.time[0] < places) & (places < r.time[-1]) for r in stack.rig.runs]
                 places = places[np.any(inside, axis=0)]
-            yield from ((name, places, _rise(along, places, width * float(np.ptp(along[moving])))) for width in WIDTHS)
+            if places.size:
+                span = float(np.ptp(along[moving]))
+                yield from ((name, places, _rise(along, places, width * span)) for width in WIDTHS)
 
 
 def _swept(along: Array) -> bool:

@@ -29,7 +29,7 @@ SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
 FAMILIES, FITTED = 4, 2  # functions without a name that may act together; that are fitted with the soil
 WEIGHED = 5  # models at most, of one effect and of more
 NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
-WHOLE = 0.9  # share of the misfit that an explanation takes, if what it leaves stands out of the noise
+WHOLE, MUCH = 0.9, 20.0  # share of the misfit that an explanation takes, if it leaves so many nats
 PART = (
     0.1  # belief in one that takes less: of eleven such in simulated cases none was right, of eight that took more all
 )
@@ -76,7 +76,7 @@ def judged(search: Search, weighed: Sequence[Weighed], nameless: float, calibrat
     left, significant = remaining(search, best)
     gained = 0.5 * (search.models[0].fitted.objective - best.fitted.objective)
     share = gained / max(gained + left, 1e-9)
-    believed = (PART if significant and share < WHOLE else 1.0) * (1.0 - calibration.lapse)
+    believed = (PART if significant and left > MUCH and share < WHOLE else 1.0) * (1.0 - calibration.lapse)
     unlisted = 1.0 - calibration.lapse - believed * -float(np.expm1(unnamed - total))
     return Decision(
         "explained" if weighed and unlisted < 0.5 * (1.0 - calibration.lapse) else "unlisted",

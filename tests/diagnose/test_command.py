@@ -53,7 +53,7 @@ def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
 
 def test_what_cannot_be_read_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("none")
-    for name, code in (("nowhere.mcap", USAGE), (".", USAGE), ("text.mcap", DAMAGED)):
+    for name, code in (("nowhere.mcap", USAGE), (".", DAMAGED), ("text.mcap", DAMAGED)):
         path = tmp_path / name
         line, found = said(path, "--config", packaged())
         assert str(path) in line and found == code

@@ -60,7 +60,7 @@ def test_a_patch_is_given_from_where_to_where() -> None:
     [
         ("motor_heating", {"fall": 0.4, "duration": 20.0}),
         ("slip_sinkage", {"growth": 0.15}),
-        ("viscous_friction", {"damping": 0.8}),
+        ("viscous_friction", {"damping": 0.3}),
     ],
 )
 def test_what_drifts_or_curves_has_no_change_points(name: str, parameters: dict[str, float]) -> None:

@@ -96,7 +96,7 @@ def _read(path: Path) -> Recording:
 
 
 def _code(path: Path) -> int:
-    return DAMAGED if path.exists() and not path.is_dir() else USAGE
+    return DAMAGED if path.exists() else USAGE
 
 
 def signals(recording: Recording, settings: Settings, rate: float) -> Signals:

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from tools.figure import plain
 from tools.proof.real.proof import Panel
 
-WIDE, HIGH, DPI = 4.2, 2.9, 80  # [in] of a panel; [1/in]
+WIDE, LEAST, HIGH, DPI = 4.2, 8.4, 2.9, 80  # [in] of a panel, of a drawing at least; [1/in]
 COLOURS = ("#111111", "#c1121f", "#00798c")
 MARKS = ("o", "x", "+")
 
 
 def draw(path: Path, panels: Sequence[Panel]) -> None:
     """Write the panels side by side as PNG."""
-    figure = Figure(figsize=(WIDE * len(panels), HIGH), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(max(WIDE * len(panels), LEAST), HIGH), dpi=DPI, layout="constrained")
     for ax, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         _drawn(ax, panel)
     handles, labels = figure.axes[0].get_legend_handles_labels()

@@ -126,9 +126,10 @@ def test_mistakes_are_one_line(finished: Path, tmp_path: Path) -> None:
     with pytest.raises(CommandError, match="found a batch; expected a new folder, or --resume"):
         command.main([*SMALL, "--output", str(finished)], STUB)
     with pytest.raises(CommandError, match="found no batch"):
-        command.main(["--resume", "--output", str(tmp_path)], STUB)
+        command.main(["--resume", "--output", str(tmp_path / "new")], STUB)
     with pytest.raises(CommandError, match="found 'nnoe'; expected some of none,"):
-        command.main(["--strata", "nnoe", "--output", str(tmp_path)], STUB)
+        command.main(["--strata", "nnoe", "--output", str(tmp_path / "new")], STUB)
+    assert not (tmp_path / "new").exists()
 
 
 def test_secrets_differ_unless_seeded(tmp_path: Path) -> None:

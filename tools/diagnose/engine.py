@@ -192,4 +192,5 @@ def _summary(decision: Decision, hypotheses: tuple[Hypothesis, ...], location: A
     names = " and ".join(decision.best.names)
     alike = {r for n in decision.best.names for r in decision.groups.get(n, ())}
     doubt = f" It cannot be told apart from {', '.join(sorted(alike))} with these recordings." if alike else ""
-    return f"Model and recordings differ (p = {p:.2g}); {names} explains {decision.share:.0%} of it.{doubt}{where}"
+    verb = "explains" if len(decision.best.names) == 1 else "explain"
+    return f"Model and recordings differ (p = {p:.2g}); {names} {verb} {decision.share:.0%} of it.{doubt}{where}"

@@ -23,7 +23,6 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     """Run the trials, open the answers, print the score; 1 where a diagnosis failed. Raises CommandError."""
     arguments = _parser().parse_args(argv)
     output: Path = arguments.output
-    output.mkdir(parents=True, exist_ok=True)
     begun = batch.resumed(output) if arguments.resume else _started(arguments)
     print(f"{begun.cases} cases in {output}; sealed before any diagnosis, SHA-256 {begun.sealed}", flush=True)
     specs = begun.specs(arguments.keep, diagnose)
@@ -37,7 +36,9 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
 
 
 def _started(arguments: argparse.Namespace) -> batch.Batch:
-    return batch.started(arguments.output, arguments.cases, _strata(arguments.strata), arguments.seed)
+    chosen = _strata(arguments.strata)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    return batch.started(arguments.output, arguments.cases, chosen, arguments.seed)
 
 
 def _strata(text: str) -> tuple[str, ...]:

@@ -165,13 +165,14 @@ GROUSERS = Proof(
     concealed=f"""
         Two wheels in dry sand, one smooth, one with grousers of 5 mm (Pavlov and Johnson). That the second has grousers
         is kept back. Of its steady states the diagnosis sees those at rim speeds of {listed(FIT)} mm/s (the carriage
-        has 10); those at {listed(HELD)} mm/s judge the prediction. Plates pressed into the sand judge the modulus, the
-        wheel pressed on a rigid stop judges what is said of the frame.
+        has 10); those at {listed(HELD)} mm/s judge the prediction. The wheel pressed on a rigid stop judges what is
+        said of the frame, the plates whether the soil that is learnt is still theirs.
     """,
     saw="""
         First the smooth wheel's steady states at 0 to 90 % slip, three repeats: motion, sinkage, load, drawbar pull, no
-        torque. What is found there, soil and effects, becomes the configuration (`--apply`, and the fitted soil with
-        its sigmas). Then the other wheel's states, as if they were of the same wheel.
+        torque. The configuration has the moduli of the plates pressed into the sand, as uncertain as plates of three
+        sizes disagree. What is found there, soil and effects, becomes the configuration (`--apply`, and the fitted soil
+        with its sigmas). Then the other wheel's states, as if they were of the same wheel.
     """,
     run=_run,
 )

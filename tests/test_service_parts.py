@@ -275,6 +275,13 @@ def test_the_monitor_fits_a_terminal_of_80_by_24_and_tells_of_trouble_first():
     ]
 
 
+def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
+    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
+    picture = list(monitor.lines({**HEALTHY, "disagreement": found}))
+    assert picture[1] == "! model disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off"
+    assert len(picture) <= 24 and list(monitor.lines({**HEALTHY, "disagreement": None})) == list(monitor.lines(HEALTHY))
+
+
 def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
     """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never wrapped."""
     master, slave = pty.openpty()

@@ -11,7 +11,7 @@ from math import degrees
 from typing import Any
 
 from tools.command import DONE, Parser
-from tools.status import Report, add_socket, connected, reports
+from tools.status import Report, add_socket, connected, disagreement, reports
 
 EVERY = 0.2  # [s] between pictures
 OPEN, CLOSE = "\033[?1049h\033[?25l", "\033[?25h\033[?1049l"  # a screen of its own without a cursor, and back
@@ -112,6 +112,8 @@ def _trouble(report: Report) -> Iterator[str]:
             yield f"{TROUBLE} {name} {stats['state']} {stats['last_error']}".rstrip()
     if report["log"]["state"] != "writing":
         yield f"{TROUBLE} log {report['log']['state']} {report['log']['error']}".rstrip()
+    if found := report.get("disagreement"):
+        yield f"{TROUBLE} model {disagreement(found)}"
 
 
 def _quantity(tick: Report, label: str, name: str, sigma: str, factor: float, unit: str, decimals: int) -> str:

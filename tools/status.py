@@ -162,8 +162,8 @@ def _label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _disagreement(found: Mapping[str, Any]) -> str:
-    """Channel, time and size of a disagreement between model and measurement."""
+def disagreement(found: Mapping[str, Any]) -> str:
+    """Channel, time and size of a disagreement between model and measurement, in words."""
     since = time.strftime("%H:%M:%S", time.gmtime(found["since"]))
     return f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, {found['sigmas']:.1f} σ off"
 
@@ -175,8 +175,8 @@ def summary(report: Report) -> Iterator[str]:
     if tick:
         yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
-    if disagreement := report.get("disagreement"):
-        yield f"  model    {_disagreement(disagreement)}"
+    if found := report.get("disagreement"):
+        yield f"  model    {disagreement(found)}"
     yield f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: {report['real_time']}"
     for name, stats in report["devices"].items():
         yield f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, {stats['lost']} lost"

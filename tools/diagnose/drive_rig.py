@@ -27,7 +27,7 @@ from estimator.situation import Sensed, Situation
 from estimator.terramechanics.soil import Array
 from tools.command import DAMAGED, CommandError
 from tools.diagnose.load import Series
-from tools.diagnose.rig import Known, Run
+from tools.diagnose.rig import Bools, Known, Run
 
 RATE = 10.0  # [Hz] of the comparison, as for a wheel
 FINE = 250.0  # [Hz] at most, on which position and current are averaged first and the model is evaluated
@@ -55,6 +55,7 @@ class DriveRig:
     units: Mapping[str, str] = UNITS
     smooth = (("speed",), ("velocity",), ("acceleration",), ("wheel_angle",), ("velocity", "acceleration"))
     baseline: tuple[Effect, ...] = ()
+    partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
     blurs = False  # prediction and measurement go through the same filters
 
     def __init__(self, series: Sequence[Mapping[str, Series]], names: Sequence[str], settings: Settings) -> None:

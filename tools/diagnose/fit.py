@@ -204,8 +204,12 @@ class Problem:
     ) -> Fitted:
         predicted, residual = at
         slack, objective = self._slack(residual, centre, penalty)
-        columns = [self._difference(effects, free, centre, q, i, predicted) for i in range(len(centre))]
-        raw = np.column_stack(columns)
+        raw = np.empty((self.stack.size, len(centre)))
+        partial = self.stack.partial
+        for i in (i for i in range(len(centre)) if i not in partial):
+            raw[:, i] = self._difference(effects, free, centre, q, i, predicted)
+        for i, (whole, share) in partial.items():
+            raw[:, i] = share * raw[:, whole]
         jacobian = whiten(self.noise, raw)
         return Fitted(
             tuple(effects), tuple(free), centre[:q], centre[q:], predicted, residual,

@@ -30,11 +30,11 @@ class Campaign:
         self._joined = _joined(self._motions)
         self._start: Array | None = None  # θ₁ of the last call: the next balance starts there
 
-    def readings(self, soil: Soil, weights: float, travelled: float, effects: Sequence[Effect]) -> Array:
-        """True readings (channels, N); weights and travel are factors on what the motions say."""
+    def readings(self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]) -> Array:
+        """True readings (channels, N); weights (N,) and travel are factors on what the motions say."""
         if all(_at_once(e) for e in effects):
             return self._simulated(soil, _scaled(self._joined, weights, travelled), effects, slice(None))
-        runs = [_scaled(motion, weights, travelled) for motion in self._motions]
+        runs = [_scaled(m, weights[part], travelled) for m, part in zip(self._motions, self.parts, strict=True)]
         return np.hstack(
             [self._simulated(soil, run, effects, part) for run, part in zip(runs, self.parts, strict=True)]
         )
@@ -82,7 +82,7 @@ def _joined(motions: Sequence[Motion]) -> Motion:
     return Motion(**{name: np.concatenate([getattr(m, name) for m in motions]) for name in names})
 
 
-def _scaled(motion: Motion, weights: float, travelled: float) -> Motion:
+def _scaled(motion: Motion, weights: Array, travelled: float) -> Motion:
     return replace(
         motion,
         load=motion.load * weights,

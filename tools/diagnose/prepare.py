@@ -13,7 +13,6 @@ from tools.diagnose.fit import Fitted, Problem
 from tools.diagnose.rig import Rig, Stack
 from tools.diagnose.screen import noise_draws
 from tools.diagnose.signatures import raw_signatures, ripple_columns
-from tools.diagnose.wheel_rig import WheelRig
 
 TOLERANCE = 3e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
@@ -40,16 +39,6 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     saturated = np.column_stack([*explained, rough.raw]), ripple_columns(stack, stack.measured - rough.predicted)
     found = noise.fit(stack, rough.predicted, saturated, replicates.cells(stack), first, rng)
     spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
-    loose = (tolerance, replicates.run_columns(stack, spread), _plates(stack, rough))
-    problem = Problem(stack, found, np.column_stack(loose))
+    problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))
     base = problem.descend((), (), rough.u, np.zeros(0))
     return Prepared(problem, base, generics, noise_draws(found, base.jacobian.shape[1], rng))
-
-
-def _plates(stack: Stack, rough: Fitted) -> Array:
-    """Errors of each run's own weights (N, m), where the rig has weights."""
-    rig = stack.rig
-    if not isinstance(rig, WheelRig):
-        return np.zeros((stack.size, 0))
-    place = next(i for i, known in enumerate(rig.constants) if known.name == "weights")
-    return replicates.plate_columns(stack, rough.raw[:, place] / rig.constants[place].sigma, rig.own_weight)

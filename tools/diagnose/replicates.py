@@ -7,7 +7,6 @@ are replicates: what their means differ by, beyond the noise inside a run, is pu
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +18,6 @@ from tools.diagnose.rig import Index, Stack
 WIDTHS = {"slip": 0.04, "speed": 0.08, "load": 0.05}  # of a cell; of speed and load relative to their largest
 FEW, MANY = 10, 60  # values a cell must hold; cells a channel may have
 EQUAL = 1e-3  # difference of pass or start at which two runs are no replicates
-SAME = 0.02  # relative distance at which weights are others
 PAIRS = 2  # comparisons of replicates at least
 
 
@@ -70,20 +68,6 @@ def between_runs(stack: Stack, residual: Array, colours: tuple[Colour, ...]) -> 
         if len(squares) >= PAIRS:
             out[number] = np.sqrt(max(float(np.mean(squares)), 0.0))
     return out
-
-
-def plate_columns(stack: Stack, change: Array, own: Callable[[float], float]) -> Array:
-    """What each set of weights may be off by, for itself (N, m), each one standard deviation.
-
-    change: (N,) derivative of the prediction by a common relative error of all weights.
-    own:    relative standard deviation of weights [N], for themselves.
-    """
-    load = stack.covariate("load")
-    level = np.rint(np.log(np.maximum(load, 1e-9)) / SAME).astype(int)
-    masks = [level == one for one in np.unique(level[load > 0.0])]
-    if not 1 < len(masks) <= MANY:
-        return np.zeros((stack.size, 0))
-    return np.column_stack([np.where(mask, own(float(load[mask].mean())) * change, 0.0) for mask in masks])
 
 
 def _terms(stack: Stack) -> Array:

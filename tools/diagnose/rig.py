@@ -77,6 +77,10 @@ class Rig(Protocol):
     def constants(self) -> tuple[Known, ...]: ...
 
     @property
+    def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
+        """Constants that do to some values, marked per run, what another constant does to all: a cheap derivative."""
+
+    @property
     def effects(self) -> Mapping[str, type[Effect]]:
         """The candidates."""
 
@@ -133,6 +137,19 @@ class Stack:
 
     def predict(self, u: Array, effects: Sequence[Effect] = ()) -> Array:
         return self.joined(self.rig.predict(u, effects))
+
+    @cached_property
+    def partial(self) -> dict[int, tuple[int, Array]]:
+        """Of each constant of `rig.partial`: the constant that it is a part of, and its derivative's share of that
+        one's (N,)."""
+        place = {known.name: i for i, known in enumerate(self.rig.constants)}
+        sigma = [known.sigma for known in self.rig.constants]
+        out = {}
+        for name, (whole, masks) in self.rig.partial.items():
+            share = sigma[place[name]] / sigma[place[whole]]
+            marked = self.joined([dict.fromkeys(self.rig.channels, np.where(mask, share, 0.0)) for mask in masks])
+            out[place[name]] = place[whole], marked
+        return out
 
     def of(self, channel: str) -> Bools:
         mask: Bools = self.channel == self.rig.channels.index(channel)

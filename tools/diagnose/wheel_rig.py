@@ -16,8 +16,9 @@ from estimator.situation import Motion, situation_of
 from estimator.terramechanics.soil import Array, Soil
 from tools.diagnose.load import Signals
 from tools.diagnose.physics import ORDER, Campaign, sensed_as
+from tools.diagnose.plates import plates_of
 from tools.diagnose.proposals import proposed
-from tools.diagnose.rig import Known, Run
+from tools.diagnose.rig import Bools, Known, Run
 from tools.diagnose.states import at_rest, states
 from tools.diagnose.weights import weights_of
 
@@ -34,6 +35,7 @@ FLOORS = {
     "K": 0.02,
 }  # least relative sigma
 SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
+LEAST_WEIGHTS = 2e-3  # nor any weights
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-",
     "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s",
@@ -71,6 +73,8 @@ class WheelRig:
         self._motions = [
             _motion(s, w.values, settings, s.start - began) for s, w in zip(signals, self._weights, strict=True)
         ]
+        self._plates = plates_of([np.asarray(m.load) for m in self._motions])
+        self._plate = np.concatenate(self._plates.label)  # (N,)
         self.baseline = configured(settings.effects)
         self.constants = (*_soil(settings, self.caveats), *self._calibrations(), *_configured(settings))
         out = {*LEFT_OUT, *(b.name for b in self.baseline)}
@@ -95,14 +99,14 @@ class WheelRig:
 
     def _true(self, value: Mapping[str, float], effects: tuple[Effect, ...]) -> Array:
         """True readings (channels, N) before scale, offset and delay; the last few are kept."""
-        physics = (*(value[name] for name in PHYSICS), *effects)
+        own = (*(value[name] for name in self._plates.names), 0.0)  # the last for values without plates of their own
+        physics = (*(value[name] for name in PHYSICS), *own, *effects)
         if physics not in self._kept:
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
-            self._kept[physics] = self._campaign.readings(
-                soil, 1.0 + value["weights"], 1.0 + value["carriage_scale"], effects
-            )
+            weights = 1.0 + value["weights"] + np.array(own)[self._plate]
+            self._kept[physics] = self._campaign.readings(soil, weights, 1.0 + value["carriage_scale"], effects)
         return self._kept[physics]
 
     def _read(self, true: Array, value: Mapping[str, float]) -> Array:
@@ -128,9 +132,16 @@ class WheelRig:
     def stated(self, unit: str) -> float:
         return 1.0
 
-    def own_weight(self, load: float) -> float:
+    @property
+    def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
+        """What one set of weights is off by for itself does to its own values what a common error does to all."""
+        return {
+            name: ("weights", [label == number for label in self._plates.label])
+            for number, name in enumerate(self._plates.names)
+        }
+
+    def _own_weight(self, load: float, common: float) -> float:
         """Relative standard deviation of one set of weights for itself: a plate's, or the load cell's at that load."""
-        common = next(known.sigma for known in self.constants if known.name == "weights")
         wrench = self.settings.wrench
         if wrench is None or all(w.known for w in self._weights):
             return OWN * common
@@ -161,7 +172,10 @@ class WheelRig:
                 Known(f"{channel}_blur", 0.0, BLUR),
             ]
         nominal = self.settings.load.nominal
-        known.append(Known("weights", 0.0, max(nominal.sigma / max(nominal.value, 1e-9), 2e-3)))
+        common = max(nominal.sigma / max(nominal.value, 1e-9), LEAST_WEIGHTS)
+        known.append(Known("weights", 0.0, common))
+        for name, load in zip(self._plates.names, self._plates.loads, strict=True):
+            known.append(Known(name, 0.0, self._own_weight(load, common)))
         carriage = self.settings.channels["carriage_encoder"].calibration.scale
         known.append(Known("carriage_scale", 0.0, max(carriage.sigma / abs(carriage.value), SCALE_FLOOR)))
         return known

@@ -46,6 +46,11 @@ def test_help_and_version() -> None:
     assert all(name in gritd("--help").stdout for name in cli.COMMANDS)
 
 
+def test_who_is_refused_by_the_lock_does_not_wait_for_numpy() -> None:
+    code = "import sys, tools.cli, tools.run; print(sorted({'numpy', 'can', 'mcap'} & sys.modules.keys()))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
 def test_packaged_configuration_is_valid_and_summarised() -> None:
     run = gritd("check-config")
     assert (run.returncode, run.stderr) == (0, "")

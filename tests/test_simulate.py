@@ -12,10 +12,10 @@ from mcap_ros2.decoder import DecoderFactory
 
 from config import packaged
 from estimator import config, effects
-from estimator.config.yamltree import ConfigError
 from estimator.readings import Reading
 from estimator.recording import RunInfo, RunWriter
 from estimator.recording.salvage import read
+from estimator.yamltree import ConfigError
 from tools import schedule as schedules
 from tools.command import CommandError
 from tools.schedule import Schedule, Segment, motion_of

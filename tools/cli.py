@@ -8,10 +8,9 @@ import io
 import os
 import sys
 from collections.abc import Callable, Sequence
-from importlib import metadata
 
 from drivers.errors import DeviceError, DeviceSettingsError
-from estimator.config.yamltree import ConfigError
+from estimator.yamltree import ConfigError
 from tools.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
 
 # command -> (module, what it does)
@@ -74,14 +73,24 @@ def _parser() -> argparse.ArgumentParser:
         epilog=f"commands:\n{listing}\n\n`gritd COMMAND --help` explains one.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"gritd {version()}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version")
     parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="one of the commands below")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
     return parser
 
 
+class _Version(argparse.Action):
+    """Say the version and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"gritd {version()}")
+        parser.exit()
+
+
 def version() -> str:
     """The installed version."""
+    from importlib import metadata  # only for whoever asks: every command would wait for it
+
     try:
         return metadata.version("gritd")
     except metadata.PackageNotFoundError:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from estimator.config import load
 from estimator.lock import LockError, locked
-from estimator.recording import RunInfo
+from estimator.yamltree import Mapping, Scalar, compose, read_text
 from tools.command import FAILED, CommandError, Parser, number, whole
+
+if TYPE_CHECKING:
+    from estimator.recording import RunInfo
 
 SOCKET = "gritd.sock"
 
@@ -18,16 +23,39 @@ SOCKET = "gritd.sock"
 def main(argv: Sequence[str]) -> int:
     """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the configuration."""
     arguments = _parser().parse_args(argv)
-    configuration = load(arguments.config)
-    run = _run_info(configuration.run, arguments)
-    folder = Path(arguments.directory or configuration.settings.logging.directory)
     try:
-        with locked(folder):
-            from tools.serve import serve  # takes a second: whoever is refused need not wait for it
-
-            return serve(configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status)
+        with ExitStack() as held:
+            return _run(arguments, held)
     except LockError as error:
         raise CommandError(error, FAILED) from None
+
+
+def _run(arguments: Namespace, held: ExitStack) -> int:
+    """Lock the log folder and serve. A folder that is there is locked before the rest of the program is loaded, which
+    takes half a second: whoever is refused need not wait for it."""
+    named = _folder_named(arguments)
+    early = named if named and named.is_dir() else None
+    if early:
+        held.enter_context(locked(early))
+    from estimator.config import load
+    from tools.serve import serve
+
+    configuration = load(arguments.config)
+    folder = Path(arguments.directory or configuration.settings.logging.directory)
+    if folder != early:
+        held.enter_context(locked(folder))
+    run = _run_info(configuration.run, arguments)
+    return serve(configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status)
+
+
+def _folder_named(arguments: Namespace) -> Path | None:
+    """Where logs go by the command line, or by the configuration as it is written; None where neither says so."""
+    if arguments.directory:
+        return Path(arguments.directory)
+    tree = compose(read_text(Path(arguments.config)), arguments.config)
+    logging = tree.items.get("logging") if isinstance(tree, Mapping) else None
+    directory = logging.items.get("directory") if isinstance(logging, Mapping) else None
+    return Path(directory.text) if isinstance(directory, Scalar) and directory.text else None
 
 
 def _socket_path(folder: Path, given: str | None) -> Path:

@@ -10,9 +10,9 @@ import numpy as np
 
 from estimator.config import read_text
 from estimator.config.schema import Key, Kind, Quantity, Section
-from estimator.config.yamltree import Node, Sequence, compose, describe
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array
+from estimator.yamltree import Node, Sequence, compose, describe
 
 LOCKED = -0.95  # [-] a wheel more locked than this is not driven by its motor any more
 

@@ -11,12 +11,12 @@ from typing import TextIO
 from drivers.queue import ReadingQueue
 from drivers.reader import Reader, ReaderStats
 from estimator.config import load
-from estimator.config.yamltree import ConfigError
 from estimator.daemon import INFO, WARNING, WATCH, Daemon, DaemonError, notify
 from estimator.daemon.notify import Notifier
 from estimator.daemon.publish import Publisher
 from estimator.record import TICK_NAMES, Flag, Status
 from estimator.recording.retention import trim
+from estimator.yamltree import ConfigError
 
 TIDY = 5.0  # [s] between looks at the disk
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from estimator import units
-from estimator.config.yamltree import Mapping, Node, Place, Scalar, Sequence, compose, describe, shown
 from estimator.settings import Uncertain
+from estimator.yamltree import Mapping, Node, Place, Scalar, Sequence, compose, describe, shown
 
 NEEDED = "\0needed"
 ABSENT = "\0absent"  # may be left out, and then there is none

@@ -31,8 +31,6 @@ from estimator.config.schema import (
     UncertainQuantity,
     entries,
 )
-from estimator.config.yamltree import Mapping as Tree
-from estimator.config.yamltree import Node, Scalar, describe
 from estimator.effects import EFFECTS
 from estimator.readings import CHANNELS, ENCODERS, REQUIRED
 from estimator.recording import RunInfo
@@ -51,6 +49,8 @@ from estimator.settings import (
     Wrench,
 )
 from estimator.terramechanics.soil import PressureSinkage, Wheel
+from estimator.yamltree import Mapping as Tree
+from estimator.yamltree import Node, Scalar, describe
 
 EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""

@@ -38,7 +38,8 @@ BECOMING = """
 import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast
 import tools.run, tools.serve
 from drivers.build import build_readers
-build_readers(tools.run.load({config!r}).settings, lambda: 0, None)
+from estimator.config import load
+build_readers(load({config!r}).settings, lambda: 0, None)
 os.setgroups([]); os.setgid({user}); os.setuid({user})
 """
 LIMIT = 120.0  # [s] ends a scenario that has failed

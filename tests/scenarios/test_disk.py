@@ -131,17 +131,23 @@ def copied(daemon, folder):
 
 @as_root
 def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
-    nobody = pwd.getpwnam("nobody").pw_uid
-    with Wires(folder_of_nobody, logging={"directory": str(folder_of_nobody / "logs")}) as wires:
-        (folder_of_nobody / "logs").mkdir(mode=0o555)
-        with DaemonProcess(wires.config, user=nobody) as daemon:
-            code = daemon.exit_code()
-            took = time.monotonic() - daemon.heard("loaded")
-            refusal = f"gritd: {folder_of_nobody}/logs: cannot keep logs here: Permission denied"
-            assert code == 1 and daemon.text == f"loaded\n{refusal}"
-    figure(
-        READ_ONLY, f"{WIRES}, as nobody", "at start: error and exit, once Python has loaded", took, "s", 1.0, real=True
-    )
+    """Refused before anything heavy is loaded, which nobody could not: the code may lie where only root can read."""
+    nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
+    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, tools.cli, tools.run"
+    becoming = f"os.setgroups([]); os.setgid({nobody}); os.setuid({nobody})"
+    code = f"{loaded}; {becoming}; sys.exit(tools.cli.main(sys.argv[1:]))"
+    with Wires(folder_of_nobody, logging={"directory": str(logs)}) as wires:
+        logs.mkdir(mode=0o555)
+        began = time.monotonic()
+        daemon = subprocess.run(
+            [sys.executable, "-c", code, "run", "--config", str(wires.config)],
+            cwd=ROOT, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        took = time.monotonic() - began
+    assert daemon.returncode == 1 and daemon.stdout == ""
+    assert daemon.stderr == f"gritd: {logs}: cannot keep logs here: Permission denied\n"
+    what = "at start: error and exit, from the start of its process"
+    figure(READ_ONLY, f"{WIRES}, as nobody", what, took, "s", 1.0, real=True)
 
 
 @as_root

@@ -2,13 +2,16 @@
 
 PyYAML's parser makes the events; the tree is built here because PyYAML overlooks duplicate keys, follows aliases
 (a few lines can unfold to gigabytes), builds objects from tags and forgets the lines. Scalars stay text: the schema
-decides what they are, and `tag` says what YAML would have made of them.
+decides what they are, and `tag` says what YAML would have made of them. Loads in a few milliseconds, unlike the schema.
 """
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -88,6 +91,30 @@ def _reading(node: Scalar) -> str:
         return "" if node.text == truth else f", which YAML reads as {truth}"
     kinds = {"null": "nothing", "timestamp": "a date"}
     return f", which YAML reads as {kinds[node.tag]}" if node.tag in kinds else ""
+
+
+def read_text(path: Path, expected: str = "a configuration file") -> str:
+    """Text of a regular file of bounded size; a pipe or a device is refused without waiting for it.
+
+    Raises ConfigError, which says what was expected.
+    """
+    try:
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise ConfigError(f"{path}: found something that is no regular file; expected {expected}")
+            data = stream.read(MAX_BYTES + 1)
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: found a directory; expected {expected}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ConfigError(f"{path}: found {str(reason).lower()}; expected {expected}") from None
+    if len(data) > MAX_BYTES:
+        raise ConfigError(f"{path}: found more than {MAX_BYTES // 1024} KiB; expected {expected}")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ConfigError(f"{path}:{line}: document: found a byte that is not UTF-8; expected UTF-8 text") from None
 
 
 def compose(text: str, file: str) -> Node:

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose import discrepancy
+from tools.diagnose import discrepancy, scans
 from tools.diagnose.calibration import Calibration, learnt
-from tools.diagnose.evidence import Base, log_bayes
+from tools.diagnose.evidence import Base, Signature, log_bayes
 from tools.diagnose.result import Verdict
 from tools.diagnose.rig import Index
 from tools.diagnose.screen import Screen, whitened
@@ -121,34 +121,39 @@ def nameless_evidence(search: Search, model: Model) -> float:
     return max([linear, *(_refitted(search, model, chosen[: n + 1]) for n in range(min(len(chosen), FITTED)))])
 
 
-def _refitted(search: Search, model: Model, chosen: Sequence[int]) -> float:
+def _refitted(search: Search, model: Model, chosen: Sequence[Signature]) -> float:
     problem, found = search.problem, model.fitted
-    columns = np.column_stack([search.generics[i].columns for i in chosen])
+    columns, prior = np.column_stack([s.columns for s in chosen]), sum(s.prior for s in chosen)
     gains = []
     for scale in SIZES:
         fitted = problem.beside(columns * scale).descend(found.effects, found.free, found.u, found.x)
-        gain = fitted.log_evidence - found.log_evidence
+        gain = fitted.log_evidence - found.log_evidence + prior
         gains.append(gain - (PAIR + _form(gain)) * (len(chosen) - 1))
     return max(gains)
 
 
-def _families(search: Search, model: Model, most: int) -> tuple[float, list[int]]:
-    """Evidence of the chosen functions together [nats], and their places among the generics."""
-    base = model.fitted.base()
-    ready = whitened(search.problem.noise, search.generics)
+def _families(search: Search, model: Model, most: int) -> tuple[float, list[Signature]]:
+    """Evidence of the chosen functions together [nats], and which they are."""
+    base = scans.without_harmonics(search.problem, model.fitted)
+    functions = [*search.generics, *scans.candidates(search.scans, search.problem, model.fitted)]
+    prior = np.array([s.prior for s in functions])
+    ready = whitened(search.problem.noise, functions)
     a, b = base.projected(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
     total = 0.0
     chosen: list[int] = []
     for _ in range(most):
-        tried = [_together(a, b, [parts[i] for i in (*chosen, k)]) for k in range(len(parts))]
+        tried = [
+            _together(a, b, [parts[i] for i in (*chosen, k)]) + float(prior[[*chosen, k]].sum())
+            for k in range(len(parts))
+        ]
         best = int(np.argmax(tried))
         price = PAIR + _form(total) if chosen else 0.0
         if best in chosen or tried[best] - price <= total:
             break
         total, chosen = tried[best] - price, [*chosen, best]
-    return total, chosen
+    return total, [functions[i] for i in chosen]
 
 
 def _together(a: Array, b: Array, parts: list[Index]) -> float:

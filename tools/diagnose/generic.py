@@ -27,12 +27,18 @@ def signatures(stack: Stack) -> list[Signature]:
     found = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
-        size = SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
+        size = size_of(stack, channel)
         for name, columns in _families(stack):
             kept = _scaled(np.where(own[:, None], columns, 0.0), own, size)
             if kept.shape[1]:
                 found.append(Signature(f"{channel}~{name}", kept, (0,) * kept.shape[1], {}))
     return found
+
+
+def size_of(stack: Stack, channel: str) -> float:
+    """The expected size of a misfit of a channel, in its unit."""
+    own = stack.of(channel)
+    return SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
 
 
 def tolerance(stack: Stack, share: float) -> Array:

@@ -201,11 +201,11 @@ def _saturated(columns: Array, sure: Array, cells: Index) -> Array:
     """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal."""
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
     held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
-    held = _basis(held, held.shape[1])
-    return np.column_stack((held, _basis(columns - held @ (held.T @ columns))))
+    held = basis(held, held.shape[1])
+    return np.column_stack((held, basis(columns - held @ (held.T @ columns))))
 
 
-def _basis(columns: Array, most: int = COLUMNS) -> Array:
+def basis(columns: Array, most: int = COLUMNS) -> Array:
     """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]

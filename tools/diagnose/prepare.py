@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose import generic, noise, replicates
+from tools.diagnose import generic, lines, noise, replicates
 from tools.diagnose.evidence import Signature
 from tools.diagnose.fit import Fitted, Problem
 from tools.diagnose.rig import Rig, Stack
@@ -36,8 +36,9 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     generics = generic.signatures(stack)
     smooth = [n for n, e in rig.effects.items() if not any(p.scan and not p.unit for p in e.parameters())]
     explained = [s.columns for s in (*raw_signatures(stack, rough.u, rough.predicted, smooth), *generics)]
-    saturated = np.column_stack([*explained, rough.raw]), ripple_columns(stack, stack.measured - rough.predicted)
-    found = noise.fit(stack, rough.predicted, saturated, replicates.cells(stack), first, rng)
+    left, likely = stack.measured - rough.predicted, np.column_stack([*explained, rough.raw])
+    sure = np.column_stack((ripple_columns(stack, left), lines.standing(stack, left, likely)))
+    found = noise.fit(stack, rough.predicted, (likely, sure), replicates.cells(stack), first, rng)
     spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
     problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))
     base = problem.descend((), (), rough.u, np.zeros(0))

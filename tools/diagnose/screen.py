@@ -10,8 +10,8 @@ Young 1993, Resampling-Based Multiple Testing).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import logsumexp
@@ -43,6 +43,7 @@ class Screen:
     best: dict[str, Whitened]
     shapes: dict[str, list[dict[str, float]]]  # of each name, the most likely first
     nulls: Array  # (draws,) the largest surprise of all names
+    chance: dict[str, float] = field(default_factory=dict)  # of as much evidence under a name by noise alone
 
     @property
     def threshold(self) -> float:
@@ -91,10 +92,15 @@ def noise_draws(noise: Noise, size: int, rng: np.random.Generator) -> tuple[Arra
     return whiten(noise, surrogates(noise, NULLS, rng)), rng.standard_normal((size, NULLS))
 
 
-def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array]) -> Screen:
-    """Evidence of each name (averaged over its shapes) and its largest in every null."""
+def screen(
+    base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array], searched: Mapping[str, Array] | None = None
+) -> Screen:
+    """Evidence of each name (averaged over its shapes) and its largest in every null.
+
+    searched: names whose shapes were tried elsewhere (scans.py), with the averages (1 + draws,).
+    """
     if not signatures:
-        return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2))
+        return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
     columns = np.column_stack([s.columns for s in signatures])
     a, b = base.projected(columns)
     null_b = base.scores(columns, *draws)
@@ -104,21 +110,22 @@ def screen(base: Base, signatures: Sequence[Whitened], draws: tuple[Array, Array
         own = slice(end - s.columns.shape[1], end)
         value = log_evidence(a[own, own], np.column_stack((b[own], null_b[own])), s.signature.sign)
         found.setdefault(s.signature.name, []).append((value, s))
-    return _ranked(found)
+    return _ranked(found, searched or {})
 
 
-def _ranked(found: dict[str, list[tuple[Array, Whitened]]]) -> Screen:
+def _ranked(found: dict[str, list[tuple[Array, Whitened]]], searched: Mapping[str, Array]) -> Screen:
     """From the log Bayes factors of every shape (1 + draws,), the recordings' first."""
-    evidence, usual, best, order, nulls = {}, {}, {}, {}, []
+    best, order, means = {}, {}, dict(searched)
     for name, shapes in found.items():
         shapes.sort(key=lambda item: -item[0][0])
         order[name] = [s.signature.shape for _, s in shapes]
         best[name] = shapes[0][1]
         prior = np.array([s.signature.prior for _, s in shapes])[:, None]
-        mean = logsumexp(np.stack([v for v, _ in shapes]) + prior, axis=0)
-        evidence[name], usual[name] = float(mean[0]), _usual(mean[1:])
-        nulls.append((mean[1:] - usual[name][0]) / usual[name][1])
-    return Screen(evidence, usual, best, order, np.max(nulls, axis=0))
+        means[name] = logsumexp(np.stack([v for v, _ in shapes]) + prior, axis=0)
+    usual = {name: _usual(mean[1:]) for name, mean in means.items()}
+    largest = np.max([(mean[1:] - usual[name][0]) / usual[name][1] for name, mean in means.items()], axis=0)
+    chance = {n: float((1 + np.sum(mean[1:] >= mean[0])) / mean.size) for n, mean in means.items()}
+    return Screen({n: float(mean[0]) for n, mean in means.items()}, usual, best, order, largest, chance)
 
 
 def _usual(nulls: Array) -> tuple[float, float]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from estimator.effects.base import Effect
 from estimator.terramechanics.soil import Array
+from tools.diagnose import scans
 from tools.diagnose.evidence import Base, Signature
 from tools.diagnose.fit import Fitted, Free, Maker, Problem, free_of
 from tools.diagnose.parallel import each
@@ -55,6 +57,11 @@ class Search:
     screens: dict[tuple[str, ...], Screen] = field(default_factory=dict)
     jobs: int = 1  # processes that fit
 
+    @cached_property
+    def scans(self) -> list[scans.Family]:
+        """Misfits without a name that must be searched for."""
+        return scans.families(self.problem.stack, self.problem.noise, self.draws[0])
+
     def best(self, size: int | None = None) -> Model:
         return max((m for m in self.models if size is None or len(m.names) == size), key=lambda m: m.evidence)
 
@@ -68,7 +75,10 @@ def rescreen(search: Search, model: Model) -> Screen:
     signatures = list(_beside(search, model))
     ready = whitened(search.problem.noise, [*signatures, *search.generics])
     noise, strain = search.draws
-    found = screen(base, ready, (noise, _resized(strain, base)))
+    beside = scans.without_harmonics(search.problem, model.fitted)
+    left = scans.Left(beside, noise, _resized(strain, beside))
+    searched = {family.name: family.average(left) for family in search.scans}
+    found = screen(base, ready, (noise, _resized(strain, base)), searched)
     search.screens[model.names] = found
     return found
 

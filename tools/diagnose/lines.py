@@ -1,0 +1,129 @@
+"""Waves in time and along the bed: where they are looked for, and those that stand out of the noise's spectrum.
+
+A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any length, and what shakes
+a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its period, not its phase. A wave of the bed or of
+the rails stays where it is: one phase for all runs, or, where the bed was made anew, one for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from estimator.terramechanics.soil import Array
+from tools.diagnose.noise import basis
+from tools.diagnose.rig import Index, Stack
+
+AXES = ("time", "position")
+STRETCH = 40.0  # [s] for which a wave keeps its phase at least
+CYCLES = 2.0  # in a stretch, to be told from a trend
+FINER = 2.0  # frequencies tried in each that the longest stretch resolves
+NYQUIST = 0.35  # of the grid's rate: faster waves are damped too much by the averaging
+MOST = 200  # frequencies of a scan
+FEW = 12  # values a stretch must hold
+CHANCE = 0.01  # of any line of a channel by noise of a smooth spectrum
+NEAR, FAR = 1.5, 7.0  # neighbours of a line, in resolved frequencies
+STRONGEST = 3  # lines of a channel along an axis that may stand out
+SHARE = 8  # of a channel's values, those that lines may take
+
+
+def stretches(stack: Stack, channel: str) -> list[Index]:
+    """Values of a channel in one run while the wheel moves, long runs cut into equal parts."""
+    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+    found: list[Index] = []
+    for number in range(len(stack.rig.runs)):
+        index = np.flatnonzero(own & (stack.run == number))
+        if index.size:
+            time = stack.time[index]
+            parts = int(np.ceil(max(float(np.ptp(time)), 1e-9) / STRETCH))
+            found += [index[part == k] for part in [_parts(time, parts)] for k in range(parts)]
+    return [index for index in found if index.size >= FEW]
+
+
+def _parts(time: Array, count: int) -> Index:
+    share = (time - time[0]) / max(float(np.ptp(time)), 1e-9)
+    return np.asarray(np.minimum((count * share).astype(int), count - 1), dtype=np.intp)
+
+
+def frequencies(stack: Stack, channel: str, axis: str) -> Array:
+    """Waves [1/s, 1/m] that the grid shows (f,): at least CYCLES in the longest stretch; empty where there is none."""
+    x, parts = stack.covariate(axis), stretches(stack, channel)
+    longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
+    if longest <= 1e-9:
+        return np.zeros(0)
+    along = np.concatenate(parts)
+    interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
+    span = longest if axis == "time" else float(np.ptp(x[along]))
+    low, high = CYCLES / longest, NYQUIST / max(interval, 1e-3 * longest)
+    tried = np.arange(low, high, 1.0 / (FINER * span))
+    return np.asarray(tried[:MOST])
+
+
+def waves(x: Array, frequency: Array) -> Array:
+    """Cosines and sines (n, f, 2)."""
+    phase = 2.0 * np.pi * np.multiply.outer(x, frequency)
+    return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
+
+
+def standing(stack: Stack, residual: Array, explained: Array) -> Array:
+    """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of the noise.
+
+    Noise has a smooth spectrum. A line of more power than that of its neighbours by a factor that chance gives one
+    channel in a hundred is none, and is not taken for it; of noise alone nothing is taken, so its size and colour stay
+    what they are. explained: (N, p) what else is no noise, left out first.
+    """
+    columns = []
+    for channel in stack.rig.channels:
+        own = np.flatnonzero(stack.of(channel))
+        taken = basis(explained[own])
+        left = np.zeros(stack.size)
+        left[own] = residual[own] - taken @ (taken.T @ residual[own])
+        room = own.size // SHARE
+        for axis in AXES:
+            for pairs in _lines(stack, channel, axis, left):
+                room -= pairs.shape[1]
+                if room >= 0:
+                    columns.append(pairs)
+    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def _lines(stack: Stack, channel: str, axis: str, left: Array) -> Iterator[Array]:
+    """Columns of one line after the other; `left` (N,) loses them."""
+    tried, parts = frequencies(stack, channel, axis), stretches(stack, channel)
+    if tried.size < 2 * FAR:
+        return
+    x = stack.covariate(axis)
+    resolved = 1.0 / (max(float(np.ptp(x[index])) for index in parts) * (tried[1] - tried[0]))  # in steps of the scan
+    shapes = [waves(x[index], tried) for index in parts]
+    for _ in range(STRONGEST):
+        power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
+        chance = _chance(np.asarray(power), len(parts), resolved)
+        best = int(np.argmin(chance))
+        if chance[best] * tried.size > CHANCE:
+            return
+        out = np.zeros((stack.size, 2 * len(parts)))
+        for number, (shape, index) in enumerate(zip(shapes, parts, strict=True)):
+            pair = shape[:, best]
+            out[index, 2 * number : 2 * number + 2] = pair
+            left[index] -= pair @ np.linalg.lstsq(pair, left[index], rcond=None)[0]
+        yield out
+
+
+def _power(shape: Array, values: Array) -> Array:
+    """Squares (f,) that cosine and sine take of values (n,)."""
+    return np.asarray(np.sum(np.tensordot(values, shape, 1) ** 2, axis=-1) * 2.0 / len(values))
+
+
+def _chance(power: Array, parts: int, resolved: float) -> Array:
+    """Chance (f,) of a power beside the mean of its neighbours, for noise of a smooth spectrum.
+
+    Both are sums of squares, the neighbours' of as many as they resolve.
+    """
+    place = np.arange(power.size)
+    apart = np.abs(place[:, None] - place)
+    near = (apart >= NEAR * resolved) & (apart <= FAR * resolved)
+    mean = near @ power / near.sum(axis=1)
+    freedom = 2.0 * parts * near.sum(axis=1) / resolved
+    return np.asarray(f_distribution.sf(power / np.maximum(mean, 1e-300), 2.0 * parts, freedom))

@@ -12,7 +12,7 @@ import os
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -114,6 +114,7 @@ class McapFile:
             raise RecordingError(f"{path}: compression {compression!r} is not one of zstd, lz4, none")
         self.path = path
         self._compression = "" if compression == "none" else compression
+        self._compress = _compressor(compression)
         self._definitions: dict[int, Definition] = {}
         self._preambles: dict[int, bytes] = {}
         self._metadata_index: list[MetadataIndex] = []
@@ -221,7 +222,7 @@ class McapFile:
     def _chunk(self, content: bytes, span: tuple[int, int]) -> Chunk:
         return Chunk(
             compression=self._compression,
-            data=_compress(self._compression, content),
+            data=self._compress(content),
             message_start_time=span[0],
             message_end_time=span[1],
             uncompressed_crc=zlib.crc32(content),
@@ -269,10 +270,11 @@ class McapFile:
         )
 
 
-def _compress(kind: str, content: bytes) -> bytes:
+def _compressor(kind: str) -> Callable[[bytes], bytes]:
+    """One for the whole file: a context for every chunk is half a megabyte, allocated and freed five times a second."""
     if kind == "zstd":
-        return zstandard.ZstdCompressor(write_content_size=True).compress(content)
-    return bytes(lz4.frame.compress(content)) if kind == "lz4" else content
+        return zstandard.ZstdCompressor(write_content_size=True).compress
+    return lz4.frame.compress if kind == "lz4" else bytes
 
 
 def _message_index(channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]) -> tuple[int, bytes]:

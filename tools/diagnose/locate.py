@@ -6,18 +6,22 @@ once for every covariate that varies along with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import norm
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose import changes, heldout, where
-from tools.diagnose.evidence import log_bayes
+from tools.diagnose.evidence import Signature, log_bayes
+from tools.diagnose.generic import size_of
 from tools.diagnose.result import Location
-from tools.diagnose.rig import Index, Stack
+from tools.diagnose.rig import Bools, Index, Stack
+from tools.diagnose.scans import WAVE, candidates
 from tools.diagnose.scores import Beside, Scores
-from tools.diagnose.select import Model, Search
+from tools.diagnose.screen import tail_chance
+from tools.diagnose.select import Model, Search, rescreen
 from tools.diagnose.signatures import highest_order
 
 DISCOVERY = 0.05  # false-discovery rate of the list
@@ -33,13 +37,18 @@ Found = tuple[float, Location]  # with the nats that it takes
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A smooth function of a covariate in one channel: its columns, nats beyond chance and the chance of as many."""
+    """Functions of a covariate in one channel: their columns, nats beyond chance and the chance of as many."""
 
     channel: str
     name: str
     own: Index
     nats: float
     p: float
+    wave: Signature | None = None  # in time or along the bed, the likeliest of all frequencies
+
+    @property
+    def log_share(self) -> float:
+        return self.wave.prior if self.wave else 0.0
 
 
 def locate(search: Search, model: Model) -> tuple[Location, ...]:
@@ -47,13 +56,8 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
     stack = search.problem.stack
     residual = stack.measured - heldout.held_out(model.fitted, heldout.run_folds(stack)).predicted
     points = changes.find(search, model)
-    names, columns = _columns(search, points)
     beside = Beside(search, model)
-    board = beside.scores(np.column_stack(columns), np.ones(stack.size, bool))
-    ends = np.cumsum([0, *(c.shape[1] for c in columns)])
-    families = [
-        _family(board, name, np.arange(start, end)) for name, start, end in zip(names, ends[:-1], ends[1:], strict=True)
-    ]
+    board, families = _families(search, model, beside, points)
     q = dict(zip(families, _false_discovery(np.array([f.p for f in families])), strict=True))
     found: list[Found] = []
     for channel in stack.rig.channels:
@@ -68,22 +72,71 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
     return tuple({(place.channel, place.covariate): place for _, place in reversed(found)}.values())[::-1][:MOST]
 
 
-def _columns(search: Search, points: changes.Changes) -> tuple[list[str], list[Array]]:
-    """Names and columns of all smooth functions, steps at the change points of a covariate among them."""
-    names, columns = [], []
+def _families(search: Search, model: Model, beside: Beside, points: changes.Changes) -> tuple[Scores, list[Family]]:
+    """All smooth functions, steps at the change points of a covariate among them; and the likeliest waves."""
+    stack, waves = search.problem.stack, _waves(search, model, beside)
+    names, columns = [s.name for s in (*search.generics, *waves)], []
     for signature in search.generics:
         channel, _, covariate = signature.name.partition("~")
         steps = points.get((channel, covariate), ())
-        more = [changes.columns(search.problem.stack, channel, covariate, steps)] if steps else []
-        names.append(signature.name)
+        more = [changes.columns(stack, channel, covariate, steps)] if steps else []
         columns.append(np.column_stack((signature.columns, *more)))
-    return names, columns
+    columns += [wave.columns for wave in waves]
+    board = beside.scores(np.column_stack(columns), np.ones(stack.size, bool))
+    ends = np.cumsum([0, *(c.shape[1] for c in columns)])
+    spans = [np.arange(start, end) for start, end in pairwise(ends.tolist())]
+    smooth = len(search.generics)
+    families = [_family(board, name, own) for name, own in zip(names[:smooth], spans[:smooth], strict=True)]
+    chance = (search.screens.get(model.names) or rescreen(search, model)).chance
+    for wave, own in zip(waves, spans[smooth:], strict=True):
+        families.append(replace(_family(board, wave.name, own), p=chance[wave.name], wave=wave))
+    return board, families
+
+
+def _waves(search: Search, model: Model, beside: Beside) -> list[Signature]:
+    """The likeliest wave of each channel and axis, where no ripple of the wheel is as likely: at a steady speed, or in
+    one run, a ripple of the wheel is a wave in time and along the bed too."""
+    every = [f for f in search.scans if f.kind == WAVE]
+    found: dict[str, Signature] = {}
+    for wave in candidates(every, search.problem, model.fitted):
+        found.setdefault(wave.name, wave)
+    turning = {c: _turning(search, beside, c) for c in {name.partition("~")[0] for name in found}}
+    kept = []
+    for wave in found.values():
+        own = search.problem.stack.of(channel := wave.name.partition("~")[0])
+        alone = beside.scores(wave.columns[own], own)
+        if float(log_bayes(alone.a, alone.b[:, 0], (0,) * len(alone.a))) + wave.prior > turning[channel]:
+            kept.append(wave)
+    return kept
+
+
+def _turning(search: Search, beside: Beside, channel: str) -> float:
+    """Evidence of the likeliest ripple of the wheel in a channel."""
+    stack = search.problem.stack
+    orders = np.arange(1.0, highest_order(stack))
+    if not orders.size:
+        return -np.inf
+    own = stack.of(channel)
+    waves = _turns(stack, own, orders) * np.sqrt(2.0) * size_of(stack, channel)
+    left = beside.scores(np.column_stack((waves.real, waves.imag)), own)
+    pairs = ([k, k + orders.size] for k in range(orders.size))
+    return max(float(log_bayes(left.a[np.ix_(k, k)], left.b[k, 0], (0, 0))) for k in pairs) - float(np.log(orders.size))
+
+
+def _turns(stack: Stack, own: Bools, orders: Array) -> Array:
+    """Ripples of a channel's values while the wheel turns, cosine and sine as one complex number (n, orders)."""
+    moving = stack.covariate("speed")[own] > 0.0
+    return np.asarray(np.exp(1j * np.outer(stack.covariate("wheel_angle")[own], orders)) * moving[:, None])
 
 
 def _place(
     stack: Stack, residual: Array, family: Family, here: list[Family], points: changes.Changes, share: float, q: float
 ) -> Location:
     """A product of covariates is filed under the one that takes most alone."""
+    if family.wave:
+        axis, at = family.name.partition(" ")[0], family.wave.shape["at"]
+        said = where.wave(stack, residual, family.channel, axis, at, share)
+        return Location(family.channel, axis, share, family.p, q, said)
     alone = {f.name: f.nats for f in here}
     covariate = max(family.name.split("·"), key=lambda n: alone.get(n, 0.0))
     places = points.get((family.channel, covariate), ())
@@ -107,7 +160,7 @@ def _gain(board: Scores, own: Index) -> tuple[float, float]:
     smooth = np.linalg.inv(board.a[np.ix_(own, own)] + np.eye(own.size))
     nats = 0.5 * np.sum(board.b[own] * (smooth @ board.b[own]), axis=0)
     value, nulls = float(nats[0]), nats[1:]
-    return max(value - float(nulls.mean()), 0.0), float((1 + np.sum(nulls >= value)) / (1 + nulls.size))
+    return max(value - float(nulls.mean()), 0.0), tail_chance(nulls, value)
 
 
 def _taken_up(board: Scores, families: list[Family], certain: set[str]) -> list[Family]:
@@ -125,7 +178,8 @@ def _evidence(board: Scores, families: list[Family]) -> float:
     if not families:
         return 0.0
     own = np.concatenate([f.own for f in families])
-    return float(log_bayes(board.a[np.ix_(own, own)], board.b[own, 0], (0,) * own.size))
+    found = log_bayes(board.a[np.ix_(own, own)], board.b[own, 0], (0,) * own.size)
+    return float(found) + sum(f.log_share for f in families)
 
 
 def _false_discovery(p: Array) -> Array:
@@ -146,19 +200,18 @@ def ripples(search: Search, beside: Beside, board: Scores, families: list[Family
     orders = np.arange(3.0, highest_order(stack))
     found: list[Found] = []
     for channel in stack.rig.channels if orders.size else ():
-        own = stack.of(channel)
-        moving = stack.covariate("speed")[own] > 0.0
-        waves = np.exp(1j * np.outer(stack.covariate("wheel_angle")[own], orders)) * moving[:, None]
-        smooth = np.column_stack([s.columns[own] for s in search.generics if s.name.startswith(f"{channel}~")])
-        size = float(np.sqrt(np.mean(smooth**2))) if own.any() else 0.0
-        if size <= 0.0:
+        own, here = stack.of(channel), [f for f in families if f.channel == channel]
+        waves, size = _turns(stack, own, orders), size_of(stack, channel)
+        if size <= 0.0 or not here:
             continue
-        columns = np.column_stack((size * waves.real, size * waves.imag, smooth))
+        smooth = [s.columns[own] for s in search.generics if s.name.startswith(f"{channel}~")]
+        others = np.column_stack((*smooth, *(f.wave.columns[own] for f in here if f.wave)))
+        columns = np.column_stack((size * waves.real, size * waves.imag, others))
         left = beside.scores(columns, own).without_columns(slice(2 * orders.size, columns.shape[1]))
         nats = np.stack([_pair(left, k, k + orders.size) for k in range(orders.size)])
         best = int(np.argmax(nats[:, 0]))
-        p = float((1 + np.sum(nats[:, 1:].max(axis=0) >= nats[best, 0])) / nats.shape[1])
-        whole = _gain(board, np.concatenate([f.own for f in families if f.channel == channel]))[0]
+        p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
+        whole = _gain(board, np.concatenate([f.own for f in here]))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
         if p <= RIPPLE and share >= LEAST:
             amplitude = size * _amplitude(left, best, best + orders.size)

@@ -78,6 +78,16 @@ def tail_quantile(values: Array, level: float) -> float:
     return start + float(beyond.mean()) * np.log(0.1 / level) if beyond.size else start
 
 
+def tail_chance(values: Array, value: float) -> float:
+    """Chance of a value among nulls: counted, or where fewer than ten reach it by the tail of `tail_quantile`."""
+    counted = float((1 + np.sum(values >= value)) / (1 + values.size))
+    start = float(np.quantile(values, 0.9))
+    beyond = values[values > start] - start
+    if counted > 10.0 / (1 + values.size) or not beyond.size:
+        return counted
+    return min(counted, 0.1 * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12))))
+
+
 def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:
     """All columns whitened in one pass."""
     if not signatures:
@@ -124,7 +134,7 @@ def _ranked(found: dict[str, list[tuple[Array, Whitened]]], searched: Mapping[st
         means[name] = logsumexp(np.stack([v for v, _ in shapes]) + prior, axis=0)
     usual = {name: _usual(mean[1:]) for name, mean in means.items()}
     largest = np.max([(mean[1:] - usual[name][0]) / usual[name][1] for name, mean in means.items()], axis=0)
-    chance = {n: float((1 + np.sum(mean[1:] >= mean[0])) / mean.size) for n, mean in means.items()}
+    chance = {name: tail_chance(mean[1:], float(mean[0])) for name, mean in means.items()}
     return Screen({n: float(mean[0]) for n, mean in means.items()}, usual, best, order, largest, chance)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose import changes
+from tools.diagnose import changes, lines
 from tools.diagnose.rig import Bools, Stack
 from tools.report.words import covariate_shown, fixed, listed, name_of, number, percent, shown, spaced
 
@@ -54,6 +54,24 @@ def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: fl
     """A ripple of so many times a turn and its amplitude in the channel's unit."""
     size = _amplitude(stack, channel, amplitude)
     return _started(f"{name_of(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit")
+
+
+def wave(stack: Stack, residual: Array, channel: str, axis: str, frequency: float, share: float) -> str:
+    """A wave in time [1/s] or along the bed [1/m], its amplitude the root of the mean square over the stretches."""
+    x, squares, count = stack.covariate(axis), 0.0, 0
+    for index in lines.stretches(stack, channel):
+        pair = lines.waves(x[index], np.array([frequency]))[:, 0]
+        fitted = np.linalg.lstsq(np.column_stack((pair, np.ones(index.size))), residual[index], rcond=None)[0]
+        squares, count = squares + index.size * float(fitted[0] ** 2 + fitted[1] ** 2), count + index.size
+    size = _amplitude(stack, channel, float(np.sqrt(squares / max(count, 1))))
+    length = _wavelength(stack, axis, 1.0 / frequency)
+    said = f"oscillates with a period of {length}" if axis == "time" else f"waves of {length} along the bed"
+    return _started(f"{name_of(channel)}, {said}, {size}; {percent(share)} of its misfit")
+
+
+def _wavelength(stack: Stack, axis: str, length: float) -> str:
+    unit, factor = shown(stack.rig.units[axis])
+    return spaced(length * factor, unit, 3)
 
 
 def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:

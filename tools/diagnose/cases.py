@@ -19,7 +19,7 @@ from estimator.recording import RunInfo
 from estimator.settings import Calibration, Settings, Uncertain
 from estimator.situation import Motion
 from estimator.terramechanics.soil import Array, Soil
-from tools.diagnose.load import Signals, block_mean, slope
+from tools.diagnose.load import Signals, block_mean, doubt, slope
 from tools.diagnose.noise import Colour, coloured
 from tools.schedule import Schedule, Segment, motion_of
 from tools.simulate import soil_of
@@ -166,7 +166,10 @@ def _recorded(plan: Plan, number: int, acting: Sequence[Effect], rng: np.random.
         start_position=float(np.max(motion.start_position)),
     )
     middle = 0.5 * (edges[1:] + edges[:-1]) - edges[0]
-    return Signals(info.name, Path(f"{info.name}.mcap"), info, float(edges[0]), middle, *wheel, *carriage, analogue, ())
+    return Signals(
+        info.name, Path(f"{info.name}.mcap"), info, float(edges[0]), middle, *wheel[:2], *carriage[:2],
+        doubt(wheel, carriage), analogue, (),
+    )  # fmt: skip
 
 
 def _servo(motion: Motion, rng: np.random.Generator) -> Motion:

@@ -80,6 +80,11 @@ class DriveRig:
         """A constant that is not known is nothing, give or take ten times what would take all of the torque."""
         return 10.0 * USUAL * self.unit / _size(values)
 
+    @property
+    def unsure(self) -> Sequence[Mapping[str, Array]]:
+        """Nothing: both sides of the comparison go through one filter."""
+        return [{"torque": np.zeros_like(run.time)} for run in self.runs]
+
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
         torques = [self._torque(m, inertia / self.unit, damping / self.unit, effects) for m in self._motions]

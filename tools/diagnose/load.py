@@ -10,9 +10,10 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter
+from scipy.ndimage import median_filter, minimum_filter
 
 from estimator.recording import RunInfo
 from estimator.recording.salvage import Recording, read
@@ -24,7 +25,8 @@ from tools.diagnose.rig import Index
 NS = 1e-9
 LEAST = 0.3  # share of the usual number of readings below which an interval is not used
 OUTLIER = 6.0  # [σ] from the interval's mean: one such reading is left out
-QUICK, STEADY = 1, 4  # intervals to either side over which an encoder's slope is fitted
+QUICK, STEADY, LONG = 1, 4, 12  # intervals to either side over which an encoder's slope is fitted
+GROWN = 1.2  # what the longest line may leave, in what short ones leave
 CALM = 4.0  # [σ] within which the two slopes are the same
 
 
@@ -44,6 +46,7 @@ class Signals:
     wheel_speed: Array  # [rad/s]
     carriage_angle: Array
     carriage_rate: Array  # [rad/s] of the pulley
+    doubt: Array  # relative standard deviation of the ratio of both speeds, of what the encoders' counts leave of it
     analogue: dict[str, Array]  # sinkage, current, temperature, drawbar_pull, load, axle_torque; those there are
     damage: tuple[str, ...]
 
@@ -111,8 +114,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
     if count < 5:
         raise _too_little(recording, f"{max(end - start, 0.0):.2f} s of both encoders together", "some seconds")
     edges = start + np.arange(count + 1) / rate
-    wheel_angle, wheel_speed = slope(*encoders[0], edges)
-    carriage_angle, carriage_rate = slope(*encoders[1], edges)
+    wheel, carriage = (slope(*encoder, edges) for encoder in encoders)
     analogue = {name: block_mean(*values, edges) for name, values in _analogue(recording, settings, series).items()}
     return Signals(
         recording.run.name or recording.path.stem,
@@ -120,10 +122,9 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         recording.run,
         start,
         0.5 * (edges[1:] + edges[:-1]) - start,
-        wheel_angle,
-        wheel_speed,
-        carriage_angle,
-        carriage_rate,
+        *wheel[:2],
+        *carriage[:2],
+        doubt(wheel, carriage),
         {name: values for name, values in analogue.items() if np.isfinite(values).any()},
         tuple(recording.damage),
     )
@@ -204,34 +205,57 @@ def _mean(block: Index, values: Array, n: int) -> tuple[Array, Array]:
     return np.bincount(block, weights=values, minlength=n) / np.maximum(count, 1.0), count
 
 
-def slope(time: Array, values: Array, edges: Array) -> tuple[Array, Array]:
+class Turned(NamedTuple):
+    """An encoder on the grid (n,)."""
+
+    angle: Array
+    rate: Array
+    sigma: Array  # of the rate
+
+
+def doubt(wheel: Turned, carriage: Turned) -> Array:
+    """Relative standard deviation of the ratio of two speeds (n,); 0 where one of them stands."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.hypot(wheel.sigma / wheel.rate, carriage.sigma / carriage.rate)
+    return np.where(np.isfinite(share), share, 0.0)
+
+
+def slope(time: Array, values: Array, edges: Array) -> Turned:
     """Value and slope of an encoder at the middle of each interval.
 
     By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is steady within its
-    own noise, STEADY to either side: at creeping speed one count is much of the slip.
+    own noise, STEADY or LONG to either side, if that line leaves no more than the short one: at creeping speed one
+    count is much of the slip, and counts that beat with the sampling make slow waves of what was steady.
     """
-    at, quick = _line(time, values, edges, QUICK)
-    far, steady = _line(time, values, edges, STEADY)
-    off = np.abs(np.nan_to_num(quick - steady))
-    calm = minimum_filter(off <= CALM * 1.4826 * np.median(off), 2 * STEADY + 1, mode="nearest")
-    calm &= np.isfinite(steady)
-    return np.where(calm, far, at), np.where(calm, steady, quick)
+    best, left = _line(time, values, edges, QUICK)
+    quick, calm = best.rate, np.ones(best.rate.size, bool)
+    for reach in (STEADY, LONG):
+        far, more = _line(time, values, edges, reach)
+        off = np.abs(np.nan_to_num(quick - far.rate))
+        usual = median_filter(left, 2 * reach + 1, mode="nearest")
+        same = (off <= CALM * 1.4826 * np.median(off)) & ((reach == STEADY) | (more <= GROWN * usual))
+        calm = calm & minimum_filter(same, 2 * reach + 1, mode="nearest") & np.isfinite(far.rate)
+        best = Turned(*(np.where(calm, one, other) for one, other in zip(far, best, strict=True)))
+    return best
 
 
-def _line(time: Array, values: Array, edges: Array, reach: int) -> Series:
-    """Value and slope (n,) of lines fitted over each interval and `reach` more on either side."""
+def _line(time: Array, values: Array, edges: Array, reach: int) -> tuple[Turned, Array]:
+    """Lines fitted over each interval and `reach` more on either side; the r.m.s. of what they leave (n,)."""
     n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     block = np.searchsorted(edges, time, side="right") - 1
     inside = (block >= 0) & (block < n)
     block, t, y = block[inside], time[inside] - edges[0], values[inside]
     y = y - (first := y[0] if y.size else 0.0)
-    weights = (np.ones(t.size), t, t * t, y, t * y)
-    s0, s1, s2, y0, y1 = (_spread(np.bincount(block, weights=w, minlength=n).astype(float), reach) for w in weights)
+    weights = (np.ones(t.size), t, t * t, y, t * y, y * y)
+    s0, s1, s2, y0, y1, y2 = (_spread(np.bincount(block, weights=w, minlength=n).astype(float), reach) for w in weights)
     with np.errstate(invalid="ignore", divide="ignore"):
-        rate = (s0 * y1 - s1 * y0) / (s0 * s2 - s1 * s1)
+        spread = s2 - s1 * s1 / s0
+        rate = (y1 - s1 * y0 / s0) / spread
         at = first + y0 / s0 + rate * (middle - s1 / s0)
+        left = np.sqrt(np.maximum(y2 - y0 * y0 / s0 - rate * (y1 - s1 * y0 / s0), 0.0) / s0)
     enough = s0 >= LEAST * np.median(s0)
-    return np.where(enough, at, np.nan), np.where(enough, rate, np.nan)
+    found = (np.where(enough, x, np.nan) for x in (at, rate, left / np.sqrt(spread)))
+    return Turned(*found), np.where(enough, left, 0.0)
 
 
 def _spread(sums: Array, most: int) -> Array:

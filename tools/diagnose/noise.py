@@ -52,13 +52,13 @@ class Noise:
     stack: Stack
     colours: tuple[Colour, ...]
     draws: tuple[tuple[Colour, ...], ...]  # per channel
-    blur: Array  # (N,) what the grid itself blurs where the prediction bends, same unit as the value
+    uncertain: Array  # (N,) what adds to the noise of single values, same unit as the value
 
     @cached_property
     def loose(self) -> Array:
         """(N,) by how much a value's noise exceeds its channel's."""
         sigma = np.array([c.sigma for c in self.colours])[self.stack.channel]
-        return np.asarray(np.sqrt(1.0 + (self.blur / sigma) ** 2))
+        return np.asarray(np.sqrt(1.0 + (self.uncertain / sigma) ** 2))
 
     @cached_property
     def whitener(self) -> sparse.csr_matrix:
@@ -112,6 +112,11 @@ def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
     return np.where(off > SPIKE * sigma, off, 0.0)
 
 
+def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) what adds to the noise of single values: blur, spikes, and what is left open of the motion."""
+    return np.hypot(np.hypot(blur(stack, predicted), spikes(stack, predicted, colours)), stack.unsure)
+
+
 def first_guess(stack: Stack, predicted: Array) -> Noise:
     """White noise from the differences between neighbours, which a slow misfit hardly touches."""
     residual, colours = stack.measured - predicted, []
@@ -120,8 +125,7 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         step = np.diff(residual, prepend=0.0)[inside]
         sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
-    loose = np.hypot(blur(stack, predicted), spikes(stack, predicted, colours))
-    return Noise(stack, tuple(colours), tuple((c,) for c in colours), loose)
+    return Noise(stack, tuple(colours), tuple((c,) for c in colours), uncertain(stack, predicted, colours))
 
 
 def fit(
@@ -137,14 +141,21 @@ def fit(
     The saturated mean: columns (N, p), of which the leading directions count, columns (N, r) which all count, and the
     means of the cells (N,), −1 where there is none (see replicates.py).
     """
-    steady = before.loose < STEADY
     found = [
-        _fit_channel(stack, channel, stack.measured - predicted, saturated, cells, steady & stack.of(channel), rng)
+        _fit_channel(stack, channel, stack.measured - predicted, saturated, cells, _steady(stack, channel, before), rng)
         for channel in stack.rig.channels
     ]
     colours = tuple(f[0] for f in found)
-    loose = np.hypot(blur(stack, predicted), spikes(stack, predicted, colours))
-    return Noise(stack, colours, tuple(f[1:] for f in found), loose)
+    return Noise(stack, colours, tuple(f[1:] for f in found), uncertain(stack, predicted, colours))
+
+
+def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
+    """Values of a channel that are hardly noisier than it is; at least half of them."""
+    own = stack.of(channel)
+    if not own.any():
+        return own
+    steady: Bools = own & (before.loose <= max(STEADY, float(np.median(before.loose[own]))))
+    return steady
 
 
 def _fit_channel(

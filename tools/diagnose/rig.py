@@ -92,6 +92,10 @@ class Rig(Protocol):
     def smooth(self) -> tuple[tuple[str, ...], ...]:
         """Covariates, alone or multiplied, on which a smooth misfit may depend."""
 
+    @property
+    def unsure(self) -> Sequence[Mapping[str, Array]]:
+        """Per run, standard deviation of every channel's prediction by what is left open of the motion."""
+
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         """Every channel of every run, for constants u (in prior σ) and effects beyond the baseline."""
 
@@ -123,6 +127,10 @@ class Stack:
     @cached_property
     def measured(self) -> Array:
         return self.joined([run.measured for run in self.rig.runs])
+
+    @cached_property
+    def unsure(self) -> Array:
+        return self.joined(self.rig.unsure)
 
     @cached_property
     def gaps(self) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -88,6 +89,7 @@ class WheelRig:
         self._inner = np.ones(lengths.size, bool)  # (N,) with a neighbour of the same run on either side
         for part in self._campaign.parts:
             self._inner[[part.start, part.stop - 1]] = False
+        self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
 
     # ---- prediction --------------------------------------------------------------------------------------------------
@@ -146,6 +148,19 @@ class WheelRig:
         if wrench is None or all(w.known for w in self._weights):
             return OWN * common
         return float(np.hypot(OWN * common, wrench.load.offset.sigma / load))
+
+    @cached_property
+    def unsure(self) -> Sequence[Mapping[str, Array]]:
+        """By the encoders' counts: slip is uncertain by what a carriage would make of it that is off by as much."""
+        place = next(i for i, known in enumerate(self.constants) if known.name == "carriage_scale")
+        u = np.zeros(len(self.constants))
+        before = self.predict(u, ())
+        u[place] = 1.0
+        share = [doubt / self.constants[place].sigma for doubt in self._doubt]
+        return [
+            {c: np.abs(after[c] - was[c]) * s for c in self.channels}
+            for was, after, s in zip(before, self.predict(u, ()), share, strict=True)
+        ]
 
     def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
         """Channels under a proposed experiment (see proposals.py), for constants and effects as fitted."""

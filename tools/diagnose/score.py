@@ -32,6 +32,7 @@ def _rows(none: Results, one: Results, cousin: Results, pair: Results, strange: 
     return [
         ("detected at 3-5 times the limit", _rate(len(alarmed), len(one))),
         ("right name first, or in its group", _rate(sum(_first(r) for r in one), len(one))),
+        ("a wrong name", _rate(sum(r["verdict"] == "explained" and not _first(r) for r in one), len(one))),
         ("among the first three", _rate(sum(_three(r) for r in one), len(one))),
         ("false alarms without effect", _rate(sum(r["verdict"] in ("explained", "unlisted") for r in none), len(none))),
         ("right name of another published form", _rate(sum(_first(r) for r in cousin), len(cousin))),

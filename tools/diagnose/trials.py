@@ -27,7 +27,7 @@ from estimator import config
 from estimator.effects import EFFECTS
 from estimator.effects.base import Effect
 from tools.diagnose import heldout
-from tools.diagnose.cases import Plan, draw, record, scaled
+from tools.diagnose.cases import LACKS, Plan, draw, record, scaled
 from tools.diagnose.cousins import COUSINS
 from tools.diagnose.decide import Decision, decide
 from tools.diagnose.engine import said
@@ -57,10 +57,11 @@ class Case:
     truth: tuple[str, ...]
     seed: int
     strength: tuple[float, float] | None = None  # times the limit; the stratum's own if not given
+    lack: str = ""  # what the campaign is without (cases.LACKS)
 
 
 def cases(
-    count: int, seed: int, only: Sequence[str] = (), strength: tuple[float, float] | None = None
+    count: int, seed: int, only: Sequence[str] = (), strength: tuple[float, float] | None = None, lack: str = ""
 ) -> Iterator[Case]:
     """Strata in turn: a sixth without effect, single effects, other forms, pairs, strangers."""
     rng = np.random.default_rng(seed)
@@ -77,7 +78,7 @@ def cases(
             truth = PAIRS[int(rng.integers(len(PAIRS)))]
         if only and stratum not in only and not set(only) & set(truth):
             continue
-        yield Case(stratum, truth, int(rng.integers(1 << 31)), strength)
+        yield Case(stratum, truth, int(rng.integers(1 << 31)), strength, lack)
 
 
 def trial(case: Case) -> dict[str, Any]:
@@ -100,7 +101,7 @@ def _trial(case: Case) -> dict[str, Any]:
     settings = config.load(packaged()).settings
     own: dict[str, type[Effect]] = {t.__name__: t for t in (*STRANGERS, *COUSINS)}
     types = [EFFECTS.get(n) or own[n] for n in case.truth]
-    drawn = _drawn(settings, types, case.strength, rng)
+    drawn = _drawn(settings, types, case, rng)
     if drawn is None:
         return {"skipped": True}
     plan, acting = drawn
@@ -127,14 +128,14 @@ def work(search: Search, decision: Decision) -> dict[str, Any]:
 
 
 def _drawn(
-    settings: Any, types: list[type[Effect]], strength: tuple[float, float] | None, rng: np.random.Generator
+    settings: Any, types: list[type[Effect]], case: Case, rng: np.random.Generator
 ) -> tuple[Plan, list[Effect]] | None:
     for _ in range(DRAWS):
-        plan = draw(settings, rng)
+        plan = draw(settings, rng, case.lack)
         if not types:
             return plan, []
         prepared = prepare(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
-        span = strength or (STRANGE if types[0] in STRANGERS else STRONG)
+        span = case.strength or (STRANGE if types[0] in STRANGERS else STRONG)
         acting = [_strong(prepared, t, span, rng) for t in types]
         if all(a is not None for a in acting):
             return plan, [a for a in acting if a is not None]
@@ -229,10 +230,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", nargs="*", default=[], help="strata or effects")
     parser.add_argument("--strength", nargs=2, type=float, metavar=("LOW", "HIGH"), help="times the limit, all strata")
+    parser.add_argument(
+        "--lack", choices=LACKS, default="", help="campaigns of one run, of one load, without force sensor"
+    )
     parser.add_argument("--out", type=Path, help="one JSON line a case")
     arguments = parser.parse_args(argv)
     strength = tuple(arguments.strength) if arguments.strength else None
-    chosen = list(cases(arguments.cases, arguments.seed, arguments.only, strength))
+    chosen = list(cases(arguments.cases, arguments.seed, arguments.only, strength, arguments.lack))
     results = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for number, result in enumerate(pool.map(trial, chosen), 1):

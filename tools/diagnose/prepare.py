@@ -14,7 +14,7 @@ from tools.diagnose.rig import Rig, Stack
 from tools.diagnose.screen import noise_draws
 from tools.diagnose.signatures import raw_signatures, ripple_columns
 
-TOLERANCE = 3e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
+TOLERANCE = 1.5e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
 
 

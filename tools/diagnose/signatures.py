@@ -13,7 +13,7 @@ from tools.diagnose.evidence import Signature
 from tools.diagnose.rig import Index, Rig, Stack
 
 HIGHEST_ORDER = 200.0  # ripples a turn
-NYQUIST = 0.35  # of the grid's rate: faster ripples are damped too much by the averaging
+NYQUIST = 0.45  # of the grid's rate: the averaging damps faster ripples too much
 TURNS = 1.5  # ripples a run must hold to be told from a trend
 STRONGEST = 3  # orders of a channel that do not count as its noise
 ORDERS = 120  # at most

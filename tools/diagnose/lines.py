@@ -95,11 +95,10 @@ def _lines(stack: Stack, channel: str, axis: str, left: Array) -> Iterator[Array
     if tried.size < 2 * FAR:
         return
     x = stack.covariate(axis)
-    resolved = 1.0 / (max(float(np.ptp(x[index])) for index in parts) * (tried[1] - tried[0]))  # in steps of the scan
-    shapes = [waves(x[index], tried) for index in parts]
+    shapes, near = [waves(x[index], tried) for index in parts], neighbours(stack, channel, axis, tried)
     for _ in range(STRONGEST):
         power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
-        chance = _chance(np.asarray(power), len(parts), resolved)
+        chance = _chance(np.asarray(power), len(parts), near)
         best = int(np.argmin(chance))
         if chance[best] * tried.size > CHANCE:
             return
@@ -116,14 +115,18 @@ def _power(shape: Array, values: Array) -> Array:
     return np.asarray(np.sum(np.tensordot(values, shape, 1) ** 2, axis=-1) * 2.0 / len(values))
 
 
-def _chance(power: Array, parts: int, resolved: float) -> Array:
+def neighbours(stack: Stack, channel: str, axis: str, tried: Array) -> Array:
+    """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it itself."""
+    longest = max(float(np.ptp(stack.covariate(axis)[index])) for index in stretches(stack, channel))
+    apart = np.abs(tried[:, None] - tried) * longest
+    return ((apart >= NEAR) & (apart <= FAR)).astype(float)
+
+
+def _chance(power: Array, parts: int, near: Array) -> Array:
     """Chance (f,) of a power beside the mean of its neighbours, for noise of a smooth spectrum.
 
     Both are sums of squares, the neighbours' of as many as they resolve.
     """
-    place = np.arange(power.size)
-    apart = np.abs(place[:, None] - place)
-    near = (apart >= NEAR * resolved) & (apart <= FAR * resolved)
-    mean = near @ power / near.sum(axis=1)
-    freedom = 2.0 * parts * near.sum(axis=1) / resolved
-    return np.asarray(f_distribution.sf(power / np.maximum(mean, 1e-300), 2.0 * parts, freedom))
+    count = near.sum(axis=1)
+    freedom = 2.0 * parts * np.maximum(count / FINER, 1.0)
+    return np.asarray(f_distribution.sf(power * count / np.maximum(near @ power, 1e-300), 2.0 * parts, freedom))

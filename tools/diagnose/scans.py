@@ -3,7 +3,9 @@
 A family is one channel along one axis, with a wave at every frequency that the grid shows, or a step at every place.
 Its evidence is the average over all of them, in the recordings and in every surrogate alike, so that the number of
 frequencies and places tried is paid for. Cosine and sine of a wave are of one size and at a right angle to each other;
-so are those of one stretch to another's: what this leaves out is small, and the same for the surrogates.
+so are those of one stretch to another's: what this leaves out is small, and the same for the surrogates. Where a wave's
+neighbours in the spectrum hold more than the noise that is assumed, its power counts by so much less: a line stands out
+of what is near it, whatever the colour.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.special import logsumexp
+from scipy.special import digamma, logsumexp
 
 from estimator.terramechanics.soil import Array
 from tools.diagnose import generic, lines
@@ -28,6 +30,7 @@ PLACES = 48  # of a step along an axis
 FEW = 8  # values on either side of a step
 WIDTH = 0.015  # of a step, relative to the whole stretch: a wheel is on both sides of it for a while
 PEAKS = 4  # shapes of a family that are fitted
+TINY = 1e-12
 HARMONICS, LARGE = 4, 3.0  # of a ripple that is known; their standard deviation in expected sizes
 FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the scan
 
@@ -50,6 +53,7 @@ class Family:
     kind: str
     at: Array
     blocks: tuple[Block, ...]
+    near: Array | None = None  # (f, f) 1 for neighbours in the spectrum, of waves
 
     @property
     def name(self) -> str:
@@ -62,14 +66,14 @@ class Family:
             return (True,)
         return (False,) if self.axis == "time" else (False, True)
 
-    def evidence(self, left: Left) -> Array:
-        """Log Bayes factor (forms, f, 1 + draws) of every shape."""
+    def evidence(self, left: Left, near: Array | None = None) -> Array:
+        """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands out of them."""
         found = [left.of(block) for block in self.blocks]
-        return np.stack([_weighed(found, self.at.size, shared) for shared in self.shared])
+        return np.stack([_weighed(found, self.at.size, shared, near) for shared in self.shared])
 
     def average(self, left: Left) -> Array:
         """Log Bayes factor (1 + draws,) of the family."""
-        every = self.evidence(left)
+        every = self.evidence(left, self.near)
         return np.asarray(logsumexp(every, axis=(0, 1)) - np.log(every.shape[0] * every.shape[1]))
 
 
@@ -97,19 +101,28 @@ class Left:
         return np.sum(flat**2, axis=0), inside, score
 
 
-def _weighed(found: Sequence[tuple[Array, Array, Array]], count: int, shared: bool) -> Array:
+def _weighed(found: Sequence[tuple[Array, Array, Array]], count: int, shared: bool, near: Array | None) -> Array:
     """Log Bayes factor (count, draws) from squares, coordinates and scores of every block."""
     if shared:
         squares, inside, score = (np.sum([f[i] for f in found], axis=0) for i in range(3))
         found = [(squares, inside, score)]
-    parts = np.zeros((len(SCALES), count, found[0][2].shape[1]))
-    for squares, inside, score in found:
-        net = np.maximum(squares - np.sum(inside**2, axis=0), 0.0).reshape(count, -1)
-        width, size = net.shape[1], net.mean(axis=1)[:, None]
-        power = np.sum(score.reshape(count, width, -1) ** 2, axis=1)
+    width = found[0][0].size // count
+    sizes = [np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)[:, None] for s, i, _ in found]
+    powers = [np.sum(score.reshape(count, width, -1) ** 2, axis=1) for _, _, score in found]
+    level = 1.0 if near is None else _level(sizes, powers, near)
+    parts = np.zeros((len(SCALES), *powers[0].shape))
+    for size, power in zip(sizes, powers, strict=True):
         for part, scale in zip(parts, SCALES, strict=True):
-            part += 0.5 * power / (size + scale**-2) - 0.5 * width * np.log1p(scale**2 * size)
+            part += 0.5 * power / level / (size + scale**-2) - 0.5 * width * np.log1p(scale**2 * size)
     return np.asarray(logsumexp(parts, axis=0) - np.log(len(SCALES)))
+
+
+def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
+    """Geometric mean (f, draws) of the neighbours' power, in that of the noise assumed; 1 at least."""
+    ratio = np.sum([power / np.maximum(size, TINY) for size, power in zip(sizes, powers, strict=True)], axis=0)
+    expected = digamma(len(sizes)) + np.log(2.0)  # of the logarithm of a χ² of two degrees each
+    share = near / np.maximum(near.sum(axis=1, keepdims=True), 1.0)
+    return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, TINY)) - expected), 0.0)))
 
 
 # ---- what is searched ----------------------------------------------------------------------------------------------
@@ -133,7 +146,8 @@ def waves(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, fre
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
         blocks.append(_block(noise, nulls, rows, raw))
-    return Family(channel, axis, WAVE, frequencies, tuple(blocks))
+    near = lines.neighbours(stack, channel, axis, frequencies) if blocks else None
+    return Family(channel, axis, WAVE, frequencies, tuple(blocks), near)
 
 
 def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at: Array) -> Family:

@@ -51,6 +51,15 @@ def test_who_is_refused_by_the_lock_does_not_wait_for_numpy() -> None:
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
+def test_digits_do_not_depend_on_the_number_of_cores() -> None:
+    """Linear algebra on several threads adds in another order: one thread, unless the user says otherwise."""
+    script = "import os; from tools.cli import main; main(['check-config']); print(os.environ['OPENBLAS_NUM_THREADS'])"
+    bare = {name: value for name, value in os.environ.items() if "NUM_THREADS" not in name}
+    for given, expected in ((bare, "1"), (bare | {"OPENBLAS_NUM_THREADS": "3"}, "3")):
+        done = subprocess.run([sys.executable, "-c", script], env=given, capture_output=True, text=True, check=True)
+        assert done.stdout.split()[-1] == expected
+
+
 def test_packaged_configuration_is_valid_and_summarised() -> None:
     run = gritd("check-config")
     assert (run.returncode, run.stderr) == (0, "")

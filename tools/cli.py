@@ -35,6 +35,7 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
     _speak_as_the_terminal_does()
+    _calculate_alike_everywhere()
     parser = _parser()
     given = sys.argv[1:] if argv is None else argv
     if not given:
@@ -62,6 +63,12 @@ def _speak_as_the_terminal_does() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _calculate_alike_everywhere() -> None:
+    """One thread for linear algebra: sums in another order end in other digits; commands have their own `--jobs`."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -64,7 +64,7 @@ def shares(stack: Stack, own: Bools) -> Array:
 
 def _families(stack: Stack) -> Iterator[tuple[str, Array]]:
     moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)
-    yield "constant", np.ones((stack.size, 1))
+    yield "constant", np.column_stack((moving, 1.0 - moving))  # friction acts while the wheel turns, an offset always
     for names in stack.rig.smooth:
         parts = [_standard(stack.covariate(name), moving > 0) for name in names]
         if any(p is None for p in parts):

@@ -79,13 +79,16 @@ def tail_quantile(values: Array, level: float) -> float:
 
 
 def tail_chance(values: Array, value: float) -> float:
-    """Chance of a value among nulls: counted, or where fewer than ten reach it by the tail of `tail_quantile`."""
-    counted = float((1 + np.sum(values >= value)) / (1 + values.size))
+    """Chance of a value among nulls: counted; where fewer than ten reach it by the tail of `tail_quantile`, which is
+    not trusted beyond a tenth of what can be counted."""
+    least = 1.0 / (1 + values.size)
+    counted = float(1 + np.sum(values >= value)) * least
     start = float(np.quantile(values, 0.9))
     beyond = values[values > start] - start
-    if counted > 10.0 / (1 + values.size) or not beyond.size:
+    if counted > 10.0 * least or not beyond.size:
         return counted
-    return min(counted, 0.1 * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12))))
+    fitted = 0.1 * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12)))
+    return min(counted, max(fitted, 0.1 * least))
 
 
 def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:

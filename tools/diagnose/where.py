@@ -20,6 +20,7 @@ AT = {  # a value of a covariate, in words
 }  # fmt: skip
 LOW, MIDDLE, HIGH = (0.0, 0.15), (0.4, 0.6), (0.85, 1.0)  # quantiles of a covariate between which means are taken
 STANDS_OUT = 0.25  # of the difference between the ends: a middle that far outside them is said
+ALIKE = 0.15  # of a mean: two that are closer are called the same
 NAMED = 6  # runs that are all named; of more, the MOST that are farthest off
 MOST = 3
 SHOWS = 0.6  # of the squares of the runs' means
@@ -36,7 +37,7 @@ def sentence(stack: Stack, residual: Array, channel: str, family: str, places: S
     if covariate == "run":
         said = _runs(stack, residual, own, places, say)
     elif covariate == "constant":
-        said = f"everywhere {say(float(residual[own].mean()))}"
+        said = _everywhere(residual, own, stack.of(channel) & ~own, say)
     elif covariate == "wheel_angle":
         said = _turn(stack, residual, own, channel)
     elif covariate == "direction":
@@ -94,6 +95,18 @@ def _sizes(stack: Stack, channel: str) -> Say:
     """A mean residual, as more or less than the model."""
     unit, factor = shown(stack.rig.units[channel])
     return lambda mean: f"{spaced(abs(mean) * factor, unit, 2)} {'more' if mean >= 0.0 else 'less'} than the model"
+
+
+def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
+    """Friction acts while the wheel turns, an offset at rest too."""
+    mean = float(residual[own].mean())
+    if not rest.any():
+        return f"everywhere {say(mean)}"
+    still = float(residual[rest].mean())
+    if abs(still - mean) < ALIKE * abs(mean):
+        return f"at rest as while the wheel turns {say(mean)}"
+    known = "as the model" if abs(still) < ALIKE * abs(mean) else _brief(say(still))
+    return f"while the wheel turns {say(mean)}, at rest {known}"
 
 
 def _brief(said: str) -> str:

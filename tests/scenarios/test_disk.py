@@ -19,6 +19,7 @@ import pytest
 from estimator.recording import parts
 from estimator.recording.cdr import TIME, Topic
 from estimator.recording.mcapfile import RecordingError
+from estimator.recording.playback import CHECKPOINT
 from estimator.recording.salvage import read
 from tests.scenarios.rig import (
     ROOT,
@@ -89,12 +90,12 @@ m.WriterThread.__init__.__kwdefaults__["capacity"] = 3000
 """
 
 
-def test_disk_full_for_longer_than_the_queue_holds(tmp_path, small_disk, figure):
+def test_disk_full_for_longer_than_the_queue_holds(tmp_path, small_disk, seed, figure):
     """The oldest messages are dropped and counted; a new part goes on, and is verified from its checkpoint on."""
     wiring = tmp_path / "wires"
     wiring.mkdir()
     changes = {"logging": {"directory": str(small_disk)}, "prelude": SMALL_QUEUE}
-    with service(wiring, driven(40.0, 1, skip=1.0), **changes) as (_, daemon):
+    with service(wiring, driven(40.0, seed, skip=1.0), **changes) as (_, daemon):
         time.sleep(0.5)
         ballast = fill(small_disk)
         daemon.wait_status(lambda report: report["log"]["dropped"] > 2000)
@@ -170,9 +171,17 @@ def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
             back = daemon.heard("log writing") - degraded
             daemon.stop()
             assert daemon.account()[2] == 0
-    what = "during a run: logging back after 0.5 s without rights"
-    figure(READ_ONLY, f"{WIRES}, as nobody", what, back, "s", 2.5, real=True)
+    said = degraded - max(when for when in parts_asked(daemon.path()) if when < degraded)
+    level, back_again = f"{WIRES}, as nobody", "during a run: logging back after 0.5 s without rights"
+    figure(READ_ONLY, level, "during a run: said, after a part could not begin", said, "s", 1.0, real=True)
+    figure(READ_ONLY, level, back_again, back, "s", 2.5, real=True)
     assert verified(daemon.path())
+
+
+def parts_asked(path):
+    """When the loop asked for a new part, by our monotonic clock [s]."""
+    wall = time.time() - time.monotonic()
+    return [m[1] * 1e-9 - wall for recording in recordings(path) for m in recording.messages() if m[0] == CHECKPOINT]
 
 
 # --- the process dies -------------------------------------------------------------------------------------------------

@@ -134,8 +134,8 @@ estimator.daemon.clock.time = Stepping
 """
 
 
-def test_a_step_in_the_running_daemon_is_annotated(tmp_path, figure):
-    with service(tmp_path, driven(40.0, 1, skip=1.0), prelude=STEPPING) as (_, daemon):
+def test_a_step_in_the_running_daemon_is_annotated(tmp_path, seed, figure):
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=STEPPING) as (_, daemon):
         daemon.wait_status(lambda report: report["loop"]["wall_offset"] > 1.0)
         time.sleep(0.5)
         daemon.stop()
@@ -207,9 +207,9 @@ drivers.queue.ReadingQueue.__init__.__defaults__ = (2000,)
 """
 
 
-def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, figure):
+def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     flag = tmp_path / "go on"
-    with service(tmp_path, driven(40.0, 1, skip=1.0), prelude=STALLING.format(flag=str(flag))) as (_, daemon):
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=STALLING.format(flag=str(flag))) as (_, daemon):
         daemon.wait_status(lambda report: report["queue"]["dropped"] > 0)
         daemon.heard("hanging: loop")
         flag.touch()
@@ -292,8 +292,8 @@ VICTIMS = {
 
 
 @pytest.mark.parametrize("victim", VICTIMS)
-def test_a_thread_dies(tmp_path, victim, figure):
-    with service(tmp_path, driven(40.0, 1, skip=1.0), prelude=DYING + VICTIMS[victim]) as (_, daemon):
+def test_a_thread_dies(tmp_path, victim, seed, figure):
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=DYING + VICTIMS[victim]) as (_, daemon):
         daemon.until(lambda: daemon.lines("fault injected") or (victim == "publisher" and poke(daemon)), "no fault")
         code = daemon.exit_code()
         took = time.monotonic() - daemon.heard("fault injected")
@@ -325,8 +325,8 @@ m.SerialLink.read = hanging
 
 
 @pytest.mark.slow
-def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, figure):
-    with service(tmp_path, driven(40.0, 1, skip=1.0), prelude=HANGING, watchdog=0.6) as (_, daemon):
+def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, seed, figure):
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=HANGING, watchdog=0.6) as (_, daemon):
         assert daemon.strokes(2.0) > 0
         daemon.heard("hanging: reader encoders; the watchdog is not stroked")
         strokes = daemon.strokes(2.0)

@@ -18,7 +18,7 @@ def applied(configuration: Configuration, found: Diagnosis) -> str:
     effects = dict(document.get("effects") or {})
     for hypothesis in found.accepted:
         effects[hypothesis.effect] = _entry(hypothesis.effect, hypothesis.parameters)
-    if found.law is not None:
+    if found.law is not None and found.law.parameters:
         effects["empirical_law"] = _entry("empirical_law", found.law.parameters)
     document["effects"] = effects
     head = f"# made by gritd diagnose: {found.summary}\n".replace("\n", " ").rstrip() + "\n"

@@ -121,6 +121,11 @@ def nameless_evidence(search: Search, model: Model) -> float:
     return max([linear, *(_refitted(search, model, chosen[: n + 1]) for n in range(min(len(chosen), FITTED)))])
 
 
+def functions(search: Search, model: Model) -> list[Signature]:
+    """Functions without a name that act together beside a model."""
+    return _families(search, model, FAMILIES)[1]
+
+
 def _refitted(search: Search, model: Model, chosen: Sequence[Signature]) -> float:
     problem, found = search.problem, model.fitted
     columns, prior = np.column_stack([s.columns for s in chosen]), sum(s.prior for s in chosen)

@@ -51,7 +51,9 @@ def said(rig: Rig, search: Search, decision: Decision, redo: Mapping[str, Any], 
     accepted = decision.best if decision.verdict == "explained" else base
     before, after = heldout.held_out(base.fitted, folds), heldout.held_out(accepted.fitted, folds)
     location = locate.locate(search, base) if found.alarmed else ()
-    fitted_law, after_law = law.find(search, base, location) if decision.verdict == "unlisted" else (None, None)
+    fitted_law = law.find(search, base, location) if decision.verdict == "unlisted" else None
+    if fitted_law is not None:
+        after = fitted_law.held
     hypotheses = _hypotheses(search, decision, folds, conditions)
     name, value = found.largest
     return Diagnosis(
@@ -60,17 +62,17 @@ def said(rig: Rig, search: Search, decision: Decision, redo: Mapping[str, Any], 
         test=Test(name, value, found.threshold, found.p, LEVEL, len(found.nulls)),
         location=location,
         hypotheses=hypotheses,
-        soil=_soil(rig, base.fitted, accepted.fitted),
-        fit=_fit(rig, stack, before, after if after_law is None else after_law, search),
-        law=fitted_law,
+        soil=_soil(rig, base.fitted, fitted_law.fitted if fitted_law else accepted.fitted),
+        fit=_fit(rig, stack, before, after, search),
+        law=fitted_law.law if fitted_law else None,
         next_experiment=next_experiment(search, decision),
         caveats=tuple(_caveats(rig, search)),
         remaining=_remaining(decision),
         nuisance=_constants(rig, accepted.fitted, soil=False),
         noise=_noise(rig, search),
         baseline=tuple(e.name for e in rig.baseline),
-        traces=evidence_files.traces(search, before, after if after_law is None else after_law),
-        scatters=evidence_files.scatters(search, location, before, after if after_law is None else after_law),
+        traces=evidence_files.traces(search, before, after),
+        scatters=evidence_files.scatters(search, location, before, after),
         redo={**redo, "seed": seed},
     )
 

@@ -61,8 +61,13 @@ def _thirds(time: Array, run: Index) -> Index:
     return out
 
 
-def held_out(fitted: Fitted, folds: Sequence[Bools]) -> Held:
-    """Density and prediction of every fold by the model fitted to the others."""
+def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> Held:
+    """Density and prediction of every fold by the model fitted to the others.
+
+    beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the channels' units.
+    """
+    own = np.zeros((fitted.predicted.size, 0)) if beside is None else beside
+    last = fitted.jacobian.shape[1] - own.shape[1]
     j, r = fitted.jacobian, fitted.residual
     size = len(fitted.u) + len(fitted.x)
     centre = np.concatenate((fitted.u, fitted.x, np.zeros_like(fitted.slack)))  # r is the residual without tolerance
@@ -73,7 +78,7 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> Held:
         inside = j[fold]
         less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]
         step = np.linalg.solve(less, pulled)
-        predicted[fold] = fitted.predicted[fold] + fitted.raw[fold] @ step[:size]
+        predicted[fold] = fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
         density.append(_log_density(r[fold] - inside @ step, inside, less))
     return Held(np.array(density), predicted)
 

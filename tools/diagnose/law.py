@@ -1,25 +1,30 @@
-"""A law for what has no name: few terms of slip, sinkage and speed, fitted with the soil, in one channel.
+"""A law for what has no name: steps and waves, then few terms of slip, sinkage and speed, fitted with the soil.
 
 The terms are those of effect `empirical_law`, so that simulator and filter can use what was found. They are taken up
-one at a time while their evidence pays for them.
+one at a time while their evidence pays for them. Steps and waves belong to this campaign: where they are is said, and
+soil and calibration are freed of them, but they are no part of a configuration.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from estimator.effects.empirical_law import EmpiricalLaw
 from estimator.terramechanics.soil import Array
-from tools.diagnose.decide import remaining
-from tools.diagnose.evidence import log_bayes
-from tools.diagnose.fit import Fitted, Free
+from tools.diagnose import where
+from tools.diagnose.decide import functions, remaining
+from tools.diagnose.evidence import Signature, log_bayes
+from tools.diagnose.fit import WIDE, Fitted, Free, Problem
 from tools.diagnose.heldout import Held, held_out, run_folds
 from tools.diagnose.noise import whiten
 from tools.diagnose.result import Law, Location, Quantity
+from tools.diagnose.rig import Stack
+from tools.diagnose.scans import WAVE, in_step
 from tools.diagnose.select import Model, Search
 from tools.diagnose.signatures import signature
 from tools.diagnose.wheel_rig import WheelRig
@@ -29,28 +34,81 @@ TERMS = {"constant": "1", "slip": "i", "slip_squared": "i²", "sinkage": "z/r", 
 PAYS = 3.0  # [nats] a term must gain
 
 
-def find(search: Search, model: Model, location: Sequence[Location]) -> tuple[Law | None, Held | None]:
-    """The law on top of a model, and its held-out prediction; None where the rig or the channel has none."""
+@dataclass(frozen=True)
+class Found:
+    """A law on top of a model: its fit, soil and calibration fitted with it, and its held-out prediction."""
+
+    law: Law
+    fitted: Fitted
+    held: Held
+
+
+def find(search: Search, model: Model, location: Sequence[Location]) -> Found | None:
+    """The law on top of a model; None where the rig or the channel has none."""
     stack = search.problem.stack
     prefix = next((PREFIX[place.channel] for place in location if place.channel in PREFIX), None)
     if prefix is None or not any(k.soil for k in stack.rig.constants):
-        return None, None
-    parameters = {p.name: p for p in EmpiricalLaw.parameters()}
-    names = [f"{prefix}_{term}" for term in TERMS]
-    domain = _domain(search)
-    made = signature(stack, model.fitted.u, model.fitted.predicted, EmpiricalLaw, _edges(domain), model.fitted.acting)
+        return None
+    start = _with_functions(search, model)
+    domain, names = _domain(search), [f"{prefix}_{term}" for term in TERMS]
+    terms = _terms(search, start, names, domain)
+    fitted = _with_terms(start, terms, _edges(domain)) if terms else start.fitted
+    if not terms and not start.functions:
+        return None
+    law = _law(search, model, replace(start, fitted=fitted), prefix, terms, domain)
+    return Found(law, fitted, held_out(fitted, run_folds(stack), start.columns))
+
+
+# ---- steps and waves -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Start:
+    """A model with the steps and waves beside it that were found; columns (N, m), each one standard deviation."""
+
+    problem: Problem
+    fitted: Fitted
+    functions: tuple[Signature, ...]
+    columns: Array
+
+
+def _with_functions(search: Search, model: Model) -> Start:
+    problem, found = search.problem, model.fitted
+    chosen = [s for s in functions(search, model) if "at" in s.shape]
+    if not chosen:
+        return Start(problem, found, (), np.zeros((problem.stack.size, 0)))
+    chosen = [in_step(search.scans, problem, found, s) for s in chosen]
+    columns = WIDE * np.column_stack([s.columns for s in chosen])
+    beside = problem.beside(columns)
+    return Start(beside, beside.descend(found.effects, found.free, found.u, found.x), tuple(chosen), columns)
+
+
+def _said(stack: Stack, start: Start) -> Iterator[tuple[str, str]]:
+    """Channel and words of every step and wave, with its size in the channel's unit."""
+    taken = start.fitted.slack[len(start.fitted.slack) - start.columns.shape[1] :]
+    ends = np.cumsum([0, *(s.columns.shape[1] for s in start.functions)])
+    for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
+        channel, _, name = function.name.partition("~")
+        added = start.columns[:, first:last] @ taken[first:last]
+        size = float(added[np.argmax(np.abs(added))])
+        axis, _, kind = name.partition(" ")
+        yield channel, where.term(stack, channel, axis, kind == WAVE, function.shape["at"], size)
+
+
+# ---- terms ---------------------------------------------------------------------------------------------------------
+
+
+def _terms(search: Search, start: Start, names: list[str], domain: dict[str, tuple[float, float]]) -> tuple[Free, ...]:
+    """Terms of slip, sinkage and speed that pay."""
+    fitted, parameters = start.fitted, {p.name: p for p in EmpiricalLaw.parameters()}
+    edges = _edges(domain)
+    made = signature(search.problem.stack, fitted.u, fitted.predicted, EmpiricalLaw, edges, fitted.acting)
     if made is None:
-        return None, None
+        return ()
     strengths = [p.name for p in parameters.values() if p.role == "strength"]
     columns = whiten(search.problem.noise, made.columns[:, [strengths.index(n) for n in names]])
-    kept = _forward(model.fitted, columns)
-    if not kept:
-        return None, None
-    free = tuple(Free(EmpiricalLaw, parameters[names[i]], EmpiricalLaw.name) for i in kept)
-    fitted = _with_terms(search, model, free, _edges(domain))
-    return _law(search, model, fitted, prefix, [names[i] for i in kept], free, domain), held_out(
-        fitted, run_folds(stack)
-    )
+    kept = _forward(fitted, columns)
+    return tuple(Free(EmpiricalLaw, parameters[names[i]], EmpiricalLaw.name) for i in kept)
 
 
 def _forward(fitted: Fitted, columns: Array) -> list[int]:
@@ -71,12 +129,12 @@ def _value(a: Array, b: Array, index: list[int]) -> float:
     return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
-def _with_terms(search: Search, model: Model, free: tuple[Free, ...], edges: dict[str, float]) -> Fitted:
+def _with_terms(start: Start, free: tuple[Free, ...], edges: dict[str, float]) -> Fitted:
     """Full fit of the chosen terms; the domain's edges stay."""
-    law = partial(EmpiricalLaw, **edges)
+    law, found = partial(EmpiricalLaw, **edges), start.fitted
     free = tuple(replace(f, effect=law) for f in free)
-    x = np.concatenate((model.fitted.x, np.zeros(len(free))))
-    return search.problem.descend((*model.fitted.effects, law), (*model.fitted.free, *free), model.fitted.u, x)
+    x = np.concatenate((found.x, np.zeros(len(free))))
+    return start.problem.descend((*found.effects, law), (*found.free, *free), found.u, x)
 
 
 def _domain(search: Search) -> dict[str, tuple[float, float]]:
@@ -97,20 +155,35 @@ def _edges(domain: dict[str, tuple[float, float]]) -> dict[str, float]:
 
 
 def _law(
-    search: Search, model: Model, fitted: Fitted, prefix: str, names: list[str], free: tuple[Free, ...],
+    search: Search, model: Model, start: Start, prefix: str, free: tuple[Free, ...],
     domain: dict[str, tuple[float, float]],
 ) -> Law:  # fmt: skip
-    sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) + len(model.fitted.x) :]
-    values = fitted.x[len(model.fitted.x) :]
-    found = {
-        n: Quantity(f.value(float(x)), float(s) * f.parameter.sigma, f.parameter.unit)
-        for n, f, x, s in zip(names, free, values, sigma, strict=False)
-    }
-    terms = [f"{q.value:+.3g}·{TERMS[n.partition('_')[2]]}" for n, q in found.items()]
+    fitted, stack = start.fitted, search.problem.stack
     channel = {"torque": "torque", "pull": "drawbar_pull", "depth": "sinkage"}[prefix]
+    found = _quantities(fitted, len(model.fitted.x), free)
+    terms = [f"{q.value:+.3g}·{TERMS[n.partition('_')[2]]}" for n, q in found.items()]
+    parts = [f"{channel} {' '.join(terms)}, ν = ln((rω + 1 mm/s)/(21 mm/s))"] if terms else []
+    parts += [f"{of} {words}" for of, words in _said(stack, start)]
     gained = 0.5 * (model.fitted.objective - fitted.objective)
     left, _ = remaining(search, Model(fitted, (*model.names, "empirical_law"), 0.0))
+    along = {f.name.partition("~")[2].partition(" ")[0] for f in start.functions}
+    ranges = {n: (float(np.min(x)), float(np.max(x))) for n in sorted(along) for x in [stack.covariate(n)]}
+    edges = _edged(domain) if found else {}
+    return Law(
+        channel, "; ".join(parts), {**(domain if found else {}), **ranges},
+        gained / max(gained + left, 1e-9), {**found, **edges},
+    )  # fmt: skip
+
+
+def _quantities(fitted: Fitted, before: int, free: tuple[Free, ...]) -> dict[str, Quantity]:
+    first = len(fitted.u) + before
+    sigma = np.sqrt(np.diag(fitted.covariance()))[first : first + len(free)]
+    return {
+        f.parameter.name: Quantity(f.value(float(x)), float(s) * f.parameter.sigma, f.parameter.unit)
+        for f, x, s in zip(free, fitted.x[before:], sigma, strict=True)
+    }
+
+
+def _edged(domain: dict[str, tuple[float, float]]) -> dict[str, Quantity]:
     units = {p.name: p.unit for p in EmpiricalLaw.parameters()}
-    edges = {n: Quantity(v, 0.0, units[n]) for n, v in _edges(domain).items()}
-    expression = f"{channel} {' '.join(terms)}, ν = ln((rω + 1 mm/s)/(21 mm/s))"
-    return Law(channel, expression, domain, gained / max(gained + left, 1e-9), {**found, **edges})
+    return {n: Quantity(v, 0.0, units[n]) for n, v in _edges(domain).items()}

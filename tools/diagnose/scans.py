@@ -31,6 +31,7 @@ FEW = 8  # values on either side of a step
 WIDTH = 0.015  # of a step, relative to the whole stretch: a wheel is on both sides of it for a while
 PEAKS = 4  # shapes of a family that are fitted
 TINY = 1e-12
+FINER = 4.0  # frequencies tried in each that the whole campaign resolves
 HARMONICS, LARGE = 4, 3.0  # of a ripple that is known; their standard deviation in expected sizes
 FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the scan
 
@@ -68,8 +69,11 @@ class Family:
 
     def evidence(self, left: Left, near: Array | None = None) -> Array:
         """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands out of them."""
-        found = [left.of(block) for block in self.blocks]
-        return np.stack([_weighed(found, self.at.size, shared, near) for shared in self.shared])
+        return np.stack([self.form(left, shared, near) for shared in self.shared])
+
+    def form(self, left: Left, shared: bool, near: Array | None = None) -> Array:
+        """The same (f, 1 + draws), with one coefficient for all blocks or one for each."""
+        return _weighed([left.of(block) for block in self.blocks], self.at.size, shared, near)
 
     def average(self, left: Left) -> Array:
         """Log Bayes factor (1 + draws,) of the family."""
@@ -214,7 +218,26 @@ def _refined(family: Family, problem: Problem, left: Left, place: int, shared: b
     near = family.at[place] + FINE * (family.at[1] - family.at[0] if family.at.size > 1 else 0.0)
     none = np.zeros((problem.stack.size, 0))
     finer = waves(problem.stack, problem.noise, none, family.channel, family.axis, near)
-    return float(near[int(np.argmax(finer.evidence(left)[finer.shared.index(shared), :, 0]))])
+    return float(near[int(np.argmax(finer.form(left, shared)[:, 0]))])
+
+
+def in_step(search: Sequence[Family], problem: Problem, fitted: Fitted, found: Signature) -> Signature:
+    """A wave in time with one phase for all runs, where that is likelier than one for each; else as it was."""
+    family = next(f for f in search if f.name == found.name)
+    if family.kind != WAVE or family.axis != "time" or found.shape["shared"]:
+        return found
+    stack, left = problem.stack, Left(without_harmonics(problem, fitted))
+    x = stack.covariate("time")[stack.of(family.channel)]
+    reach = float(family.at[1] - family.at[0]) if family.at.size > 1 else 0.0
+    count = int(min(2.0 * reach * FINER * np.ptp(x), lines.MOST)) + 1
+    tried = found.shape["at"] + reach * np.linspace(-1.0, 1.0, count)
+    finer = waves(stack, problem.noise, np.zeros((stack.size, 0)), family.channel, "time", tried)
+    value = finer.form(left, True)[:, 0] - np.log(count)
+    best = int(np.argmax(value))
+    if value[best] < finer.form(left, False)[:, 0].max():
+        return found
+    columns = shape_columns(stack, family.channel, "time", WAVE, float(tried[best]), True)
+    return Signature(found.name, columns, (0, 0), {"at": float(tried[best]), "shared": 1.0}, found.prior)
 
 
 def shape_columns(stack: Stack, channel: str, axis: str, kind: str, at: float, shared: bool) -> Array:

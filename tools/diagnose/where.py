@@ -70,6 +70,13 @@ def wave(stack: Stack, residual: Array, channel: str, axis: str, frequency: floa
     return _started(f"{name_of(channel)}, {said}, {size}; {percent(share)} of its misfit")
 
 
+def term(stack: Stack, channel: str, axis: str, wave: bool, place: float, size: float) -> str:
+    """A wave of a frequency [1/s, 1/m] or a step at a place, as a term of a law; size in the channel's unit."""
+    if wave:
+        return f"{_amplitude(stack, channel, abs(size))} every {_wavelength(stack, axis, 1.0 / place)}"
+    return f"{_signed(size, stack.rig.units[channel])} beyond {at(stack, axis, place)}"
+
+
 def _wavelength(stack: Stack, axis: str, length: float) -> str:
     unit, factor = shown(stack.rig.units[axis])
     return spaced(length * factor, unit, 3)

@@ -11,6 +11,7 @@ from estimator import config
 from estimator.recording import RunInfo, RunWriter
 from tools import simulate
 from tools.command import DAMAGED, USAGE, CommandError
+from tools.diagnose import provenance
 from tools.diagnose.command import main
 from tools.diagnose.load import read_all, signals
 
@@ -70,3 +71,14 @@ def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: 
     settings = config.load(packaged()).settings
     with pytest.raises(CommandError, match="found no readings of wheel_encoder; expected both encoders"):
         signals(read_all([empty])[0], settings, 10.0)
+
+
+def test_another_testbed_than_the_recorded_one_is_said(run: Path) -> None:
+    """The wrong file after --config makes a mismatch that no physics explains."""
+    text = packaged().read_text(encoding="utf-8")
+    other = config.loads(text.replace("radius: 72 mm", "radius: 80 mm", 1), "other.yaml", packaged().parent).settings
+    recordings = read_all([run])
+    assert provenance.remarks(recordings, config.load(packaged()).settings) == []
+    assert provenance.remarks(recordings, other) == [
+        "run.mcap was recorded with wheel.radius 0.072 (configuration: 0.08)."
+    ]

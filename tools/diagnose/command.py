@@ -22,7 +22,7 @@ from estimator.recording import RecordingError, versions
 from estimator.recording.salvage import Recording
 from estimator.settings import Settings
 from tools.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
-from tools.diagnose import campaigns, redo
+from tools.diagnose import campaigns, provenance, redo
 from tools.diagnose.apply import applied
 from tools.diagnose.drive_rig import RATE as DRIVE_RATE
 from tools.diagnose.drive_rig import DriveRig
@@ -150,7 +150,8 @@ def of_files(
         found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
         found = with_innovations(found, configuration, recordings, soil=isinstance(rig, WheelRig))
     damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
-    return replace(found, caveats=(*found.caveats, *(f"Damaged: {line}" for line in damage))), damage
+    said = [*provenance.remarks(recordings, configuration.settings), *(f"Damaged: {line}" for line in damage)]
+    return replace(found, caveats=(*found.caveats, *said)), damage
 
 
 def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:

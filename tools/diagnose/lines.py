@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose.noise import basis
+from tools.diagnose.noise import saturated_mean
 from tools.diagnose.rig import Index, Stack
 
 AXES = ("time", "position")
@@ -26,6 +26,7 @@ FEW = 12  # values a stretch must hold
 CHANCE = 0.01  # of any line of a channel by noise of a smooth spectrum
 NEAR, FAR = 1.5, 7.0  # neighbours of a line, in resolved frequencies
 STRONGEST = 3  # lines of a channel along an axis that may stand out
+LONG = 6  # waves of the bed that are too long to have neighbours, at most
 SHARE = 8  # of a channel's values, those that lines may take
 
 
@@ -67,42 +68,63 @@ def waves(x: Array, frequency: Array) -> Array:
     return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
 
 
-def standing(stack: Stack, residual: Array, explained: Array) -> Array:
+def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells: Index) -> Array:
     """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of the noise.
 
     Noise has a smooth spectrum. A line of more power than that of its neighbours by a factor that chance gives one
     channel in a hundred is none, and is not taken for it; of noise alone nothing is taken, so its size and colour stay
-    what they are. explained: (N, p) what else is no noise, left out first.
+    what they are. Long waves of the bed, the same in all runs, have too few neighbours: they are left out of the noise
+    whether they stand out or not, as lost freedom. The others as in `noise.fit`: what else is no noise, left out first.
     """
-    columns = []
+    columns = [_long(stack, channel) for channel in stack.rig.channels]
     for channel in stack.rig.channels:
         own = np.flatnonzero(stack.of(channel))
-        taken = basis(explained[own])
+        taken = saturated_mean(explained[own], sure[own], cells[own])
         left = np.zeros(stack.size)
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
         room = own.size // SHARE
-        for axis in AXES:
-            for pairs in _lines(stack, channel, axis, left):
+        for axis, parts in _phases(stack, channel):
+            for pairs in _lines(stack.covariate(axis), frequencies(stack, channel, axis), parts, left):
                 room -= pairs.shape[1]
                 if room >= 0:
                     columns.append(pairs)
-    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+    return np.column_stack(columns)
 
 
-def _lines(stack: Stack, channel: str, axis: str, left: Array) -> Iterator[Array]:
+def _long(stack: Stack, channel: str) -> Array:
+    """Waves along the bed (N, m), one phase for all runs, too long to have neighbours; of a single run none."""
+    parts, tried = stretches(stack, channel), frequencies(stack, channel, "position")
+    if len(parts) < 2 or not tried.size:
+        return np.zeros((stack.size, 0))
+    index, x = np.concatenate(parts), stack.covariate("position")
+    longest = max(float(np.ptp(x[part])) for part in parts)
+    found = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
+    out = np.zeros((stack.size, 2 * found.shape[1]))
+    out[index] = found.reshape(index.size, -1)
+    return out
+
+
+def _phases(stack: Stack, channel: str) -> Iterator[tuple[str, list[Index]]]:
+    """Axes, and the values that share a phase."""
+    parts = stretches(stack, channel)
+    yield "time", parts
+    if len(parts) > 1:
+        yield "position", [np.concatenate(parts)]
+    yield "position", parts
+
+
+def _lines(x: Array, tried: Array, parts: list[Index], left: Array) -> Iterator[Array]:
     """Columns of one line after the other; `left` (N,) loses them."""
-    tried, parts = frequencies(stack, channel, axis), stretches(stack, channel)
     if tried.size < 2 * FAR:
         return
-    x = stack.covariate(axis)
-    shapes, near = [waves(x[index], tried) for index in parts], neighbours(stack, channel, axis, tried)
+    shapes, near = [waves(x[index], tried) for index in parts], neighbours(x, parts, tried)
     for _ in range(STRONGEST):
         power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
         chance = _chance(np.asarray(power), len(parts), near)
         best = int(np.argmin(chance))
         if chance[best] * tried.size > CHANCE:
             return
-        out = np.zeros((stack.size, 2 * len(parts)))
+        out = np.zeros((x.size, 2 * len(parts)))
         for number, (shape, index) in enumerate(zip(shapes, parts, strict=True)):
             pair = shape[:, best]
             out[index, 2 * number : 2 * number + 2] = pair
@@ -115,18 +137,23 @@ def _power(shape: Array, values: Array) -> Array:
     return np.asarray(np.sum(np.tensordot(values, shape, 1) ** 2, axis=-1) * 2.0 / len(values))
 
 
-def neighbours(stack: Stack, channel: str, axis: str, tried: Array) -> Array:
+def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
     """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it itself."""
-    longest = max(float(np.ptp(stack.covariate(axis)[index])) for index in stretches(stack, channel))
+    longest = max(float(np.ptp(x[index])) for index in parts)
     apart = np.abs(tried[:, None] - tried) * longest
     return ((apart >= NEAR) & (apart <= FAR)).astype(float)
 
 
 def _chance(power: Array, parts: int, near: Array) -> Array:
-    """Chance (f,) of a power beside the mean of its neighbours, for noise of a smooth spectrum.
+    """Chance (f,) of a power beside the mean of its neighbours on either side, for noise of a smooth spectrum.
 
-    Both are sums of squares, the neighbours' of as many as they resolve.
+    All are sums of squares, the neighbours' of as many as they resolve. The side that holds more counts: the spectrum
+    of slow noise falls steeply. Without neighbours on both sides nothing is known.
     """
-    count = near.sum(axis=1)
-    freedom = 2.0 * parts * np.maximum(count / FINER, 1.0)
-    return np.asarray(f_distribution.sf(power * count / np.maximum(near @ power, 1e-300), 2.0 * parts, freedom))
+    out = np.zeros(power.size)
+    for side in (np.tril(near), np.triu(near)):
+        count = side.sum(axis=1)
+        freedom = 2.0 * parts * np.maximum(count / FINER, 1.0)
+        beside = f_distribution.sf(power * count / np.maximum(side @ power, 1e-300), 2.0 * parts, freedom)
+        out = np.maximum(out, np.where(count > FINER, beside, 1.0))
+    return out

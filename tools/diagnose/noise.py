@@ -167,7 +167,7 @@ def _fit_channel(
     own: Bools,
     rng: np.random.Generator,
 ) -> tuple[Colour, ...]:
-    columns = np.column_stack((_saturated(saturated[0][own], saturated[1][own], cells[own]), residual[own]))
+    columns = np.column_stack((saturated_mean(saturated[0][own], saturated[1][own], cells[own]), residual[own]))
     colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
     colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
     likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
@@ -208,7 +208,7 @@ def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 
 
-def _saturated(columns: Array, sure: Array, cells: Index) -> Array:
+def saturated_mean(columns: Array, sure: Array, cells: Index) -> Array:
     """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal."""
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
     held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))

@@ -37,8 +37,9 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     smooth = [n for n, e in rig.effects.items() if not any(p.scan and not p.unit for p in e.parameters())]
     explained = [s.columns for s in (*raw_signatures(stack, rough.u, rough.predicted, smooth), *generics)]
     left, likely = stack.measured - rough.predicted, np.column_stack([*explained, rough.raw])
-    sure = np.column_stack((ripple_columns(stack, left), lines.standing(stack, left, likely)))
-    found = noise.fit(stack, rough.predicted, (likely, sure), replicates.cells(stack), first, rng)
+    ripples, cells = ripple_columns(stack, left), replicates.cells(stack)
+    sure = np.column_stack((ripples, lines.standing(stack, left, likely, ripples, cells)))
+    found = noise.fit(stack, rough.predicted, (likely, sure), cells, first, rng)
     spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
     problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))
     base = problem.descend((), (), rough.u, np.zeros(0))

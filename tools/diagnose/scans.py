@@ -150,7 +150,7 @@ def waves(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, fre
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
         blocks.append(_block(noise, nulls, rows, raw))
-    near = lines.neighbours(stack, channel, axis, frequencies) if blocks else None
+    near = lines.neighbours(x, lines.stretches(stack, channel), frequencies) if blocks else None
     return Family(channel, axis, WAVE, frequencies, tuple(blocks), near)
 
 

@@ -91,4 +91,45 @@ class StickySinkage(Effect):
         return replace(reaction, sinkage=reaction.sinkage + self.size * grown)
 
 
-STRANGERS: tuple[type[Effect], ...] = (BearingFriction, HungryPull, BentRail, CableDrag, SpeedBump, StickySinkage)
+@dataclass(frozen=True)
+class NextDoor(Effect):
+    """A machine next door shakes the bed, and the force sensor feels it."""
+
+    size: float = _size(0.5)
+    stage = "testbed"
+    fingerprint = Fingerprint("drawbar_pull", "time", "")
+
+    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+        shaken = self.size * np.sin(2.0 * np.pi * situation.time / 1.7)
+        return replace(reaction, drawbar_pull=reaction.drawbar_pull + shaken)
+
+
+@dataclass(frozen=True)
+class RailJoint(Effect):
+    """Beyond a joint of the rails the carriage drags."""
+
+    size: float = _size(1.5)
+    stage = "testbed"
+    fingerprint = Fingerprint("drawbar_pull", "position", "")
+
+    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+        beyond = 0.5 + 0.5 * np.tanh((situation.position - 0.2) / 0.003)
+        return replace(reaction, drawbar_pull=reaction.drawbar_pull - self.size * beyond)
+
+
+@dataclass(frozen=True)
+class SlippedBracket(Effect):
+    """The potentiometer's bracket slips once, in the midst of the campaign."""
+
+    size: float = _size(5e-4)
+    stage = "sensor"
+    fingerprint = Fingerprint("sinkage", "time", "")
+
+    def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
+        return replace(sensed, sinkage=sensed.sinkage + self.size * np.heaviside(situation.time - 70.0, 0.0))
+
+
+STRANGERS: tuple[type[Effect], ...] = (
+    BearingFriction, HungryPull, BentRail, CableDrag, SpeedBump, StickySinkage,
+    NextDoor, RailJoint, SlippedBracket,
+)  # fmt: skip

@@ -320,5 +320,5 @@ def test_the_index_in_memory_gives_back_every_record(
         indexes.add(start, length, (first, last), size, list(lengths.items()))
         ended = position - start - length
         written.append(ChunkIndex(length, start, "zstd", length - 53, last, ended, offsets, first, size))
-        assert indexes.records() == record_bytes(*written)
+        assert b"".join(indexes.records()) == record_bytes(*written)
     assert indexes.count == len(chunks)

@@ -15,6 +15,8 @@ from mcap.records import ChunkIndex
 
 _ROW = struct.Struct("<5QH")  # gap before, length, first log_time since the last one, span, unpacked size; channels
 _CHANNEL = struct.Struct("<HQ")  # its number, length of its MessageIndex record
+TOGETHER = 100  # records
+PIECE = 1024  # [bytes] unpacked at once
 _MASK = (1 << 64) - 1  # differences wrap: a log_time may be anything
 _HEAD = 9 + 8 + 8 + 8 + 4 + 4 + 8  # [bytes] of a chunk record before its data, without the name of the compression
 
@@ -44,26 +46,24 @@ class ChunkIndexes:
         self._time = times[0]
         self.count += 1
 
-    def records(self) -> bytes:
-        """All ChunkIndex records, one after the other."""
+    def records(self) -> Iterator[bytes]:
+        """All ChunkIndex records in their order, some at a time: together they are megabytes."""
         builder = RecordBuilder()
-        for record in self._unpacked():
+        for number, record in enumerate(self._unpacked(), start=1):
             record.write(builder)
-        return bytes(builder.end())  # type: ignore[no-untyped-call]
+            if number % TOGETHER == 0:
+                yield bytes(builder.end())  # type: ignore[no-untyped-call]
+        yield bytes(builder.end())  # type: ignore[no-untyped-call]
 
     def _unpacked(self) -> Iterator[ChunkIndex]:
-        rows = zlib.decompress(self._packed + self._packer.copy().flush())
-        place = end = time = 0
-        while place < len(rows):
-            gap, length, later, span, size, channels = _ROW.unpack_from(rows, place)
+        end = time = 0
+        for (gap, length, later, span, size, _), indexes in self._rows():
             start, time = end + gap, time + later & _MASK
-            place += _ROW.size
             end = start + length
             offsets = {}
-            for channel, taken in _CHANNEL.iter_unpack(rows[place : place + channels * _CHANNEL.size]):
+            for channel, taken in indexes:
                 offsets[channel] = end
                 end += taken
-            place += channels * _CHANNEL.size
             yield ChunkIndex(
                 chunk_length=length,
                 chunk_start_offset=start,
@@ -75,3 +75,17 @@ class ChunkIndexes:
                 message_start_time=time,
                 uncompressed_size=size,
             )
+
+    def _rows(self) -> Iterator[tuple[tuple[int, ...], list[tuple[int, int]]]]:
+        """What `add` packed: the row and its channels."""
+        unpack, rows = zlib.decompressobj(), bytearray()
+        packed = self._packed + self._packer.copy().flush()
+        for start in range(0, len(packed), PIECE):
+            rows += unpack.decompress(packed[start : start + PIECE])
+            while len(rows) >= _ROW.size:
+                row = _ROW.unpack_from(rows)
+                end = _ROW.size + row[-1] * _CHANNEL.size
+                if len(rows) < end:
+                    break
+                yield row, list(_CHANNEL.iter_unpack(rows[_ROW.size : end]))
+                del rows[:end]

@@ -12,7 +12,7 @@ import os
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -195,7 +195,14 @@ class McapFile:
 
     def finish(self) -> None:
         """Write index and summary; nothing may be added then. The medium may not have them yet."""
-        self._append(self._ending())
+        before = self._length, self._crc
+        try:
+            for piece in self._ending():
+                self._append(piece)
+        except RecordingError:
+            self._length, self._crc = before
+            self._rewind()
+            raise
 
     def abandon(self) -> None:
         """Close without an index; what was written stays readable."""
@@ -229,30 +236,32 @@ class McapFile:
             uncompressed_size=len(content),
         )
 
-    def _ending(self) -> bytes:
+    def _ending(self) -> Iterator[bytes]:
+        """What comes after the last chunk, in pieces: whole, an index of hours would leave its mark on the memory."""
         data_end = record_bytes(DataEnd(self._crc))
-        start = self._length + len(data_end)
-        groups = self._summary_groups()
-        summary, offsets = b"", b""
-        for opcode, group in groups:
-            if group:
-                place = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(group))
-                offsets += record_bytes(place)
-                summary += group
-        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
-        summary += offsets
-        crc = zlib.crc32(summary + record_bytes(footer)[:-4])
-        return data_end + summary + record_bytes(Footer(start, footer.summary_offset_start, crc)) + MAGIC
+        start = place = self._length + len(data_end)
+        crc, offsets = 0, b""
+        yield data_end
+        for opcode, group in self._summary_groups():
+            began = place
+            for piece in group:
+                yield piece
+                crc, place = zlib.crc32(piece, crc), place + len(piece)
+            if place > began:
+                offsets += record_bytes(SummaryOffset(opcode, began, place - began))
+        footer = Footer(summary_start=start, summary_offset_start=place, summary_crc=0)
+        crc = zlib.crc32(offsets + record_bytes(footer)[:-4], crc)
+        yield offsets + record_bytes(Footer(start, place, crc)) + MAGIC
 
-    def _summary_groups(self) -> list[tuple[Opcode, bytes]]:
+    def _summary_groups(self) -> list[tuple[Opcode, Iterable[bytes]]]:
         used = [self._definitions[channel] for channel in sorted(self._counts)]
         schemas = {schema.id: schema for schema, _ in used if schema}
         return [
-            (Opcode.SCHEMA, record_bytes(*schemas.values())),
-            (Opcode.CHANNEL, record_bytes(*(channel for _, channel in used))),
-            (Opcode.STATISTICS, record_bytes(self._statistics(len(schemas)))),
+            (Opcode.SCHEMA, [record_bytes(*schemas.values())]),
+            (Opcode.CHANNEL, [record_bytes(*(channel for _, channel in used))]),
+            (Opcode.STATISTICS, [record_bytes(self._statistics(len(schemas)))]),
             (Opcode.CHUNK_INDEX, self._chunk_indexes.records()),
-            (Opcode.METADATA_INDEX, record_bytes(*self._metadata_index)),
+            (Opcode.METADATA_INDEX, [record_bytes(*self._metadata_index)]),
         ]
 
     def _statistics(self, schemas: int) -> Statistics:

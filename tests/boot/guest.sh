@@ -150,7 +150,7 @@ second_boot() {
   systemctl stop gritd
 
   say "recordings"
-  for recording in $(ls /var/lib/gritd/*.mcap | grep -v '\.[0-9]*\.mcap$'); do timeout 600 gritd replay --verify "$recording"; done
+  for recording in $(ls /var/lib/gritd/*.mcap | grep -v '\.[0-9]*\.mcap$'); do timeout 600 gritd replay --verify "$recording" 2>&1 | cat; done
 
   say "uninstall"
   make -s -C /root/gritd uninstall

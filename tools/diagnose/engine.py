@@ -180,7 +180,7 @@ def _caveats(rig: Rig, search: Search) -> list[str]:
 def _remaining(decision: Decision) -> str:
     if not decision.left_significant:
         return "Nothing above the noise remains."
-    return f"Smooth functions of the covariates would gain {decision.left:.0f} nats more: something remains."
+    return f"Functions without a name would gain {decision.left:.0f} nats more: something remains."
 
 
 def _summary(decision: Decision, hypotheses: tuple[Hypothesis, ...], location: Any, p: float) -> str:

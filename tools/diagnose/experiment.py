@@ -166,7 +166,7 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     if not evidence:
         return None
     name = max(evidence, key=lambda n: evidence[n])
-    key = ALONG.get(name.partition("~")[2].split("·")[0], "slip_step")
+    key = ALONG.get(name.partition("~")[2].partition("·")[0].partition(" ")[0], "slip_step")
     gain = float(np.clip(evidence[name] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
     return _foretold(key, gain)
 

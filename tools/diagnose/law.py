@@ -90,8 +90,9 @@ def _said(stack: Stack, start: Start) -> Iterator[tuple[str, str]]:
     for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
         channel, _, name = function.name.partition("~")
         added = start.columns[:, first:last] @ taken[first:last]
-        size = float(added[np.argmax(np.abs(added))])
         axis, _, kind = name.partition(" ")
+        acting = added[added != 0.0]
+        size = float(np.sqrt(2.0 * np.mean(acting**2)) if kind == WAVE else acting[np.argmax(np.abs(acting))])
         yield channel, where.term(stack, channel, axis, kind == WAVE, function.shape["at"], size)
 
 

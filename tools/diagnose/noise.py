@@ -302,6 +302,14 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
     return np.asarray(colour.sigma * out)
 
 
+def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
+    """Of noise of a colour (n, n) at times (n,)."""
+    apart = np.abs(time[:, None] - time[None, :])
+    slow, fast = np.exp(-apart / colour.time), np.exp(-apart / (FAST_TIME * _step(gaps)))
+    white = (1.0 - colour.slow - colour.fast) * np.eye(len(time))
+    return np.asarray(colour.sigma**2 * (white + colour.slow * slow + colour.fast * fast))
+
+
 def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
     """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then where it is used."""
     step = _step(gaps)

@@ -38,9 +38,9 @@ def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
     explained = [s.columns for s in (*raw_signatures(stack, rough.u, rough.predicted, smooth), *generics)]
     left, likely = stack.measured - rough.predicted, np.column_stack([*explained, rough.raw])
     ripples, cells = ripple_columns(stack, left), replicates.cells(stack)
-    sure = np.column_stack((ripples, lines.standing(stack, left, likely, ripples, cells)))
-    found = noise.fit(stack, rough.predicted, (likely, sure), cells, first, rng)
-    spread = replicates.between_runs(stack, stack.measured - rough.predicted, found.colours)
-    problem = Problem(stack, found, np.column_stack((tolerance, replicates.run_columns(stack, spread))))
+    standing = lines.standing(stack, left, likely, ripples, cells)
+    found = noise.fit(stack, rough.predicted, (likely, np.column_stack((ripples, standing))), cells, first, rng)
+    own = replicates.own_columns(stack, left, found.colours, standing)
+    problem = Problem(stack, found, np.column_stack((tolerance, own)))
     base = problem.descend((), (), rough.u, np.zeros(0))
     return Prepared(problem, base, generics, noise_draws(found, base.jacobian.shape[1], rng))

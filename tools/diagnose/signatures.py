@@ -45,13 +45,22 @@ def signature(
     shape: Mapping[str, float],
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
-    """None where the effect changes nothing that is measured, or runs away however weak it is."""
+    """None where the effect changes nothing that is measured, runs away however weak it is, or turns too little."""
+    if not _turns(stack.rig, effect):
+        return None
     found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
     columns = np.column_stack(found)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
     return Signature(effect.name, columns, sign, dict(shape))
+
+
+def _turns(rig: Rig, effect: type[Effect]) -> bool:
+    """Whether some run is long enough to tell what goes with a turn of the wheel from a drift."""
+    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
+    once = effect.fingerprint.covariate == "wheel_angle" and not any(p.scan for p in effect.parameters())
+    return turned >= TURNS or not once
 
 
 def _derivative(

@@ -51,6 +51,7 @@ class Situation:
     direction: Scalar  # +1 forward, −1 backward, 0 at rest; smooth in between
     load: Scalar  # weights on the axle [N]
     temperature: Scalar | None = None  # [°C]
+    travel: Scalar = 0.0  # away from where the run began [m]
     # the soil stage
     cohesion: Scalar = 0.0  # c [Pa]
     tan_phi: Scalar = 0.0
@@ -118,6 +119,7 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
         direction=direction,
         load=motion.load,
         temperature=motion.temperature,
+        travel=np.abs(motion.carriage_position),
     )
 
 

@@ -8,16 +8,20 @@ import numpy as np
 
 from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from estimator.situation import ContactLaw, Reaction, Situation
-from estimator.terramechanics.soil import Wheel
+from estimator.terramechanics.soil import Scalar, Wheel
+
+HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
 
 
 @dataclass(frozen=True)
 class Grousers(Effect):
-    """Lugs on the rim shear the soil at a larger radius, grip better than smooth metal, and make N ripples a turn.
+    """Lugs on the rim shear the soil at a larger radius, grip, carry soil away as they slip, and make N ripples a turn.
 
-    r_s = r + λ h;  (c, tan φ) · (1 + g);  q = a cos Nψ + b sin Nψ;  T(1 + q),  DP + qT/r,  z − q h;   ψ wheel angle
+    r_s = r + λ h;  (c, tan φ) · (1 + g);  z + d i/(1 − i), i from 0 to 0.95;
+    q = a cos Nψ + b sin Nψ;  T(1 + q),  DP + qT/r,  z − q h;   ψ wheel angle
 
-    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; ripple Skonieczny,
+    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; lugs that carry away
+    the soil between them Reece (1965), J. Terramechanics 2(2), d = h where all of it is carried; ripple Skonieczny,
     Moreland, Wettergreen (2012), IEEE/RSJ IROS; soil-to-soil against soil-to-metal friction Wong (2008), section 2.4.
     """
 
@@ -25,14 +29,22 @@ class Grousers(Effect):
     grip: float = strength("gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=1.0)
     ripple_cos: float = strength("relative ripple of torque in phase, a", "", typical=0.15, low=-0.5, high=0.5)
     ripple_sin: float = strength("relative ripple of torque in quadrature, b", "", typical=0.15, low=-0.5, high=0.5)
+    digging: float = strength("height of the soil that the lugs carry away, d", "m", typical=2e-3, low=0.0, high=0.02)
     count: float = shape("lugs on the rim, N", "", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True)
     share: float = shape("share of the height that shears, λ", "", mean=0.6, sigma=0.2, low=0.0, high=1.0)
 
     stage = "wheel"
     fingerprint = Fingerprint(
-        "drawbar_pull", "wheel_angle", "N ripples a turn in drawbar pull, torque and sinkage; more pull"
+        "drawbar_pull",
+        "wheel_angle",
+        "N ripples a turn in drawbar pull, torque and sinkage; more pull; deeper at high slip",
     )
-    confusable_with = told_apart(gear_ripple="load_step", wheel_eccentricity="lifted_spin", wheel_radius_error="tape")
+    confusable_with = told_apart(
+        gear_ripple="load_step",
+        wheel_eccentricity="lifted_spin",
+        wheel_radius_error="tape",
+        slip_sinkage="smooth_wheel",
+    )
 
     def geometry(self, wheel: Wheel) -> Wheel:
         return replace(wheel, radius=wheel.radius + self.share * self.height)
@@ -47,5 +59,11 @@ class Grousers(Effect):
             reaction,
             torque=reaction.torque + ripple * situation.torque,
             drawbar_pull=reaction.drawbar_pull + ripple * situation.torque / situation.radius,
-            sinkage=reaction.sinkage - ripple * self.height,
+            sinkage=reaction.sinkage - ripple * self.height + self.digging * _carried(situation.slip),
         )
+
+
+def _carried(slip: Scalar) -> Scalar:
+    """i/(1 − i): travel of the rim that does not drive, over the travel; a wheel that hardly moves digs in for long."""
+    driving = np.clip(slip, 0.0, HIGHEST_SLIP)
+    return driving / (1.0 - driving)

@@ -106,10 +106,11 @@ def moduli(path: Path) -> tuple[float, float]:
 def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -> list[Asked]:
     channels = dict.fromkeys(place["channel"] for place in second.found["location"])
     group = listed(sorted(second.group)) or second.found["verdict"]
+    differ = "Do grip and sinking differ?"
     named = "Does it name grousers, or a group that holds them?"
     asked = [
         _of_modulus(first, pressed),
-        Asked("Do grip and sinking differ?", "drawbar_pull, sinkage", listed(channels), set(CHANNELS) <= set(channels)),
+        Asked(differ, "drawbar_pull, sinkage", listed(channels), set(CHANNELS) <= set(channels), REASON),
         Asked(named, "grousers", group, "grousers" in second.group, REASON),
         _of_frame(first, second),
     ]
@@ -153,9 +154,9 @@ either.
 """
 
 REASON = """
-Steady means hold no ripple, the one thing that only grousers make. What is left is more grip and, at high slip, more
-sinkage, as the grousers dig soil out. The library's grousers grip and enlarge the wheel, which makes it sink less, not
-more, so other effects that pull more and sink deeper with slip stand in their place.
+Steady means hold no ripple, the one thing that only grousers make. What is left is sinkage that grows with slip, as the
+lugs carry soil away, which another dependence on slip or speed describes as well; and 1 to 3 N more pull, half of which
+cohesion and friction angle take up within what was learnt of them on the smooth wheel.
 """
 
 GROUSERS = Proof(

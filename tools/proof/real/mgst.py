@@ -134,8 +134,7 @@ def _of_drivetrain(said: Said, held: Sequence[Held]) -> list[Asked]:
 
 REASON_LOSS = """
 At one speed and one load a loss and an error of the torque constant differ only by how they go with the torque itself,
-6.5 and 9.3 N·m. The bed was not level: sinkage drifts by up to 6 mm along a trial, otherwise in each, which no listed
-effect stands for and which leads the search; slip-sinkage comes next, and one more effect has to pay for both.
+6.5 and 9.3 N·m, and strength of the soil takes up part of either.
 """
 
 DRIVETRAIN = Proof(

@@ -51,7 +51,7 @@ SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from
 PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
-STOP = 1.8  # [s] for everything to end: half of it for the readers, a quarter for the loop
+STOP = 1.5  # [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s more
 MIN_PART = 1.0  # [s] a part is at least this long
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
 

@@ -341,6 +341,26 @@ def test_sigterm_under_load(tmp_path, seed, figure):
     assert verified(daemon.path()) and not any("hanging" in line for line in log_lines(daemon.path()))
 
 
+SLOW_MEDIUM = """
+import time, estimator.recording.writer as m
+began, sync = time.monotonic(), m.sync
+def waiting(file):
+    if time.monotonic() > began + 3.0: time.sleep(3600)
+    sync(file)
+m.sync = waiting
+"""
+
+
+def test_sigterm_while_the_medium_hangs(tmp_path, seed, figure):
+    """It is not waited for: the kernel has everything, and the last line says that the medium has not confirmed it."""
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=SLOW_MEDIUM) as (_, daemon):
+        time.sleep(3.0)
+        took = daemon.stop()
+    assert daemon.text.endswith("the medium has not confirmed the last of it")
+    figure(TERM, f"{WIRES}, a sync that never returns", "to exit 0", took, "s", 2.0, real=True)
+    assert read(daemon.path()).complete and verified(daemon.path())
+
+
 def test_the_open_part_is_never_deleted(tmp_path, figure):
     """Parts of a second under a cap of 1 MB: the oldest go first, what remains is verified part by part."""
     old = tmp_path / "old.mcap"

@@ -14,10 +14,12 @@ import pytest
 from config import packaged
 from estimator import config
 from estimator.effects import make
+from estimator.effects.base import Effect
 from tests.diagnose.campaigns import plan
 from tools.diagnose import changes
 from tools.diagnose.cases import draw, record
-from tools.diagnose.locate import locate
+from tools.diagnose.fit import free_of
+from tools.diagnose.locate import bare, locate
 from tools.diagnose.prepare import prepare
 from tools.diagnose.result import Location
 from tools.diagnose.select import Model, Search
@@ -37,6 +39,13 @@ def searched(rig: WheelRig) -> tuple[Search, Model]:
     return Search(prepared.problem, prepared.generics, prepared.draws), Model(prepared.base, (), 0.0)
 
 
+def explained(search: Search, base: Model, effect: Effect) -> Model:
+    """The fit with an effect, from where it is."""
+    free = free_of((type(effect),))
+    at = [(getattr(effect, f.parameter.name) - f.parameter.centre) / f.parameter.sigma for f in free]
+    return Model(search.problem.descend((type(effect),), free, base.fitted.u, np.array(at)), (effect.name,), 0.0)
+
+
 @cache
 def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Location, ...]:
     """Places of the misfit that one effect makes; `repeated`: the same drive in every run, each another pass."""
@@ -45,7 +54,10 @@ def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Loc
         first = drawn.motions[0]
         again = (replace(first, time=np.asarray(first.time) + 40.0 * n, pass_number=1.0 + n) for n in range(4))
         drawn = replace(drawn, motions=tuple(again))
-    return locate(*searched(WheelRig(record(drawn, (make(name, parameters),)), drawn.settings)))
+    effect = make(name, parameters)
+    search, base = searched(WheelRig(record(drawn, (effect,)), drawn.settings))
+    alone = bare(search, explained(search, base, effect))
+    return locate(search, alone, alone.fitted.predicted)
 
 
 def test_a_patch_is_given_from_where_to_where() -> None:
@@ -72,7 +84,7 @@ def test_passes_differ_from_the_second_on() -> None:
     places = [p for p in located("multipass", repeated=True, stiffening=0.6, passes=0.5) if p.covariate == "run"]
     assert {p.channel for p in places} >= {"torque", "sinkage"}
     assert all(p.changes and p.changes[0] == 2.0 for p in places)
-    assert "in run1" in places[0].where
+    assert "from run2 to run4" in places[0].where
 
 
 @pytest.mark.slow

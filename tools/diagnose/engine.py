@@ -50,7 +50,9 @@ def said(rig: Rig, search: Search, decision: Decision, redo: Mapping[str, Any], 
     folds, conditions = heldout.run_folds(stack), heldout.condition_folds(stack)
     accepted = decision.best if decision.verdict == "explained" else base
     before, after = heldout.held_out(base.fitted, folds), heldout.held_out(accepted.fitted, folds)
-    location = locate.locate(search, base) if found.alarmed else ()
+    bare = base if accepted is base else locate.bare(search, accepted)
+    seen = before if bare is base else Held(before.log_density, bare.fitted.predicted)
+    location = locate.locate(search, bare, seen.predicted) if found.alarmed else ()
     fitted_law = law.find(search, base, location) if decision.verdict == "unlisted" else None
     if fitted_law is not None:
         after = fitted_law.held

@@ -51,10 +51,30 @@ class Family:
         return self.wave.prior if self.wave else 0.0
 
 
-def locate(search: Search, model: Model) -> tuple[Location, ...]:
-    """Places of the misfit of a model, by share; only those that survive false-discovery control."""
+def bare(search: Search, accepted: Model) -> Model:
+    """The base model held at the constants found beside the accepted effects: what it misses is what they do.
+
+    Fitted for itself, the base model moves soil and calibration until they hide what they can of the misfit, and what
+    is left shows where they cannot follow, not where the misfit was made.
+    """
+    fit = accepted.fitted
+    alone = search.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
+    held = replace(
+        alone, u=np.zeros_like(fit.u), jacobian=np.zeros_like(alone.jacobian),
+        residual=alone.residual - search.problem.tolerance @ fit.slack,
+    )  # fmt: skip
+    return Model(held, (), 0.0)
+
+
+def locate(search: Search, model: Model, predicted: Array | None = None) -> tuple[Location, ...]:
+    """Places of the misfit of a model, by share; only those that survive false-discovery control.
+
+    predicted: (N,) against which the sentences are said; without it the model's, each value's own run held out.
+    """
     stack = search.problem.stack
-    residual = stack.measured - heldout.held_out(model.fitted, heldout.run_folds(stack)).predicted
+    if predicted is None:
+        predicted = heldout.held_out(model.fitted, heldout.run_folds(stack)).predicted
+    residual = stack.measured - predicted
     points = changes.find(search, model)
     beside = Beside(search, model)
     board, families = _families(search, model, beside, points)
@@ -62,18 +82,24 @@ def locate(search: Search, model: Model) -> tuple[Location, ...]:
     found: list[Found] = []
     for channel in stack.rig.channels:
         here = [f for f in families if f.channel == channel]
-        whole = _gain(board, np.concatenate([f.own for f in here]))[0] if here else 0.0
-        for family in _taken_up(board, here, {c for (of, c) in points if of == channel}):
-            share = float(np.clip(family.nats / max(whole, 1e-9), 0.0, 1.0))
+        whole = _gain(board, _joined(here))[0]
+        told: list[Family] = []
+        for family in _taken_up(board, here):
+            before, told = _gain(board, _joined(told))[0], [*told, family]
+            nats = _gain(board, _joined(told))[0] - before
+            share = float(np.clip(nats / max(whole, 1e-9), 0.0, 1.0))
             if q[family] <= DISCOVERY and share >= LEAST:
-                found.append((family.nats, _place(stack, residual, family, here, points, share, float(q[family]))))
+                found.append((nats, _place(stack, residual, family, here, points, share, float(q[family]))))
     found += _strains(stack, model) + ripples(search, beside, board, families)
     found.sort(key=lambda item: -item[0])
     return tuple({(place.channel, place.covariate): place for _, place in reversed(found)}.values())[::-1][:MOST]
 
 
 def _families(search: Search, model: Model, beside: Beside, points: changes.Changes) -> tuple[Scores, list[Family]]:
-    """All smooth functions, steps at the change points of a covariate among them; and the likeliest waves."""
+    """All smooth functions, steps at the change points of a covariate among them; and the likeliest waves.
+
+    Each about a mean of its own: what grows with slip from nothing is not told as a constant and a slope.
+    """
     stack, waves = search.problem.stack, _waves(search, model, beside)
     names, columns = [s.name for s in (*search.generics, *waves)], []
     for signature in search.generics:
@@ -86,6 +112,8 @@ def _families(search: Search, model: Model, beside: Beside, points: changes.Chan
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     spans = [np.arange(start, end) for start, end in pairwise(ends.tolist())]
     smooth = len(search.generics)
+    always = {n.partition("~")[0]: own for n, own in zip(names, spans, strict=True) if n.endswith("~constant")}
+    spans = [np.union1d(own, always[n.partition("~")[0]]) for n, own in zip(names, spans, strict=True)]
     families = [_family(board, name, own) for name, own in zip(names[:smooth], spans[:smooth], strict=True)]
     chance = (search.screens.get(model.names) or rescreen(search, model)).chance
     for wave, own in zip(waves, spans[smooth:], strict=True):
@@ -155,18 +183,25 @@ def _family(board: Scores, name: str, own: Index) -> Family:
     return Family(channel, covariate, own, *_gain(board, own))
 
 
+def _joined(families: list[Family]) -> Index:
+    """The columns of several families, each once."""
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(f.own for f in families)]))
+
+
 def _gain(board: Scores, own: Index) -> tuple[float, float]:
     """Nats gained beyond chance, and the chance of as many."""
+    if not own.size:
+        return 0.0, 1.0
     smooth = np.linalg.inv(board.a[np.ix_(own, own)] + np.eye(own.size))
     nats = 0.5 * np.sum(board.b[own] * (smooth @ board.b[own]), axis=0)
     value, nulls = float(nats[0]), nats[1:]
     return max(value - float(nulls.mean()), 0.0), tail_chance(nulls, value)
 
 
-def _taken_up(board: Scores, families: list[Family], certain: set[str]) -> list[Family]:
-    """Families of a channel by evidence, each beside those before it; first those with change points."""
-    taken = [f for f in families if f.name in certain]
-    best = _evidence(board, taken)
+def _taken_up(board: Scores, families: list[Family]) -> list[Family]:
+    """Families of a channel by evidence, each beside those before it."""
+    taken: list[Family] = []
+    best = 0.0
     while True:
         tried = {f: _evidence(board, [*taken, f]) for f in families if f not in taken}
         if not tried or tried[first := max(tried, key=lambda f: tried[f])] < best + max(BESIDE, LEAST * best):
@@ -177,7 +212,7 @@ def _taken_up(board: Scores, families: list[Family], certain: set[str]) -> list[
 def _evidence(board: Scores, families: list[Family]) -> float:
     if not families:
         return 0.0
-    own = np.concatenate([f.own for f in families])
+    own = _joined(families)
     found = log_bayes(board.a[np.ix_(own, own)], board.b[own, 0], (0,) * own.size)
     return float(found) + sum(f.log_share for f in families)
 
@@ -211,7 +246,7 @@ def ripples(search: Search, beside: Beside, board: Scores, families: list[Family
         nats = np.stack([_pair(left, k, k + orders.size) for k in range(orders.size)])
         best = int(np.argmax(nats[:, 0]))
         p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
-        whole = _gain(board, np.concatenate([f.own for f in here]))[0]
+        whole = _gain(board, _joined(here))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
         if p <= RIPPLE and share >= LEAST:
             amplitude = size * _amplitude(left, best, best + orders.size)

@@ -46,7 +46,7 @@ def signature(
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
     """None where the effect changes nothing that is measured, runs away however weak it is, or turns too little."""
-    if not _turns(stack.rig, effect):
+    if not _turns(stack, effect):
         return None
     found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
     columns = np.column_stack(found)
@@ -56,11 +56,12 @@ def signature(
     return Signature(effect.name, columns, sign, dict(shape))
 
 
-def _turns(rig: Rig, effect: type[Effect]) -> bool:
+def _turns(stack: Stack, effect: type[Effect]) -> bool:
     """Whether some run is long enough to tell what goes with a turn of the wheel from a drift."""
-    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
-    once = effect.fingerprint.covariate == "wheel_angle" and not any(p.scan for p in effect.parameters())
-    return turned >= TURNS or not once
+    if effect.fingerprint.covariate != "wheel_angle" or any(p.scan for p in effect.parameters()):
+        return True
+    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in stack.rig.runs) / (2.0 * np.pi)
+    return turned >= TURNS
 
 
 def _derivative(

@@ -229,9 +229,11 @@ class RunWriter:
         self._file.abandon()
 
     def adopt(self, other: RunWriter) -> None:
-        """Take over what `other` could not write, and its numbering; both must have been made with the same topics."""
+        """Take over what `other` could not write, and its numbering; both must have been made with the same topics and
+        the same compression."""
         self._pending, other._pending = other._pending, self._pending
         self._encoders = other._encoders
+        self._file.adopt(other._file)
 
     def fileno(self) -> int:
         return self._file.fileno()

@@ -151,6 +151,10 @@ class McapFile:
     def fileno(self) -> int:
         return self._file.fileno()
 
+    def adopt(self, other: McapFile) -> None:
+        """Take over the compressor of a file that is about to be closed: its half megabyte stays where it is."""
+        self._compress = other._compress
+
     def define(self, schema: Schema | None, channel: Channel) -> None:
         """Make a channel known; its definition is written into every chunk that uses it."""
         self._definitions[channel.id] = (schema, channel)

@@ -26,7 +26,7 @@ class RunningIn(Effect):
     depth: float = strength(
         "slip-sinkage still wanting at the start, at slip 1, d", "m", typical=3e-3, low=0.0, high=0.05
     )
-    length: float = shape("travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.005, high=0.5)
+    length: float = shape("travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.005, high=0.12)
 
     stage = "wheel"
     fingerprint = Fingerprint(

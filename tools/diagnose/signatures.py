@@ -45,23 +45,13 @@ def signature(
     shape: Mapping[str, float],
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
-    """None where the effect changes nothing that is measured, runs away however weak it is, or turns too little."""
-    if not _turns(stack, effect):
-        return None
+    """None where the effect changes nothing that is measured, or runs away however weak it is."""
     found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
     columns = np.column_stack(found)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
     return Signature(effect.name, columns, sign, dict(shape))
-
-
-def _turns(stack: Stack, effect: type[Effect]) -> bool:
-    """Whether some run is long enough to tell what goes with a turn of the wheel from a drift."""
-    if effect.fingerprint.covariate != "wheel_angle" or any(p.scan for p in effect.parameters()):
-        return True
-    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in stack.rig.runs) / (2.0 * np.pi)
-    return turned >= TURNS
 
 
 def _derivative(

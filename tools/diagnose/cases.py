@@ -73,9 +73,15 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
         float(rng.choice([0.05, 0.3, 1.0, 3.0])),
         bool(rng.random() < 0.8) and lack != "force",
         _errors(settings, rng),
-        tuple((rng.standard_normal() + rng.standard_normal(count)) * np.sqrt(0.5) * _relative(settings.load.nominal)),
+        tuple((rng.standard_normal() + _plates(loads, rng)) * np.sqrt(0.5) * _relative(settings.load.nominal)),
         int(rng.integers(1 << 31)),
     )
+
+
+def _plates(loads: Array, rng: np.random.Generator) -> Array:
+    """What the plates of each run are off by for themselves, in σ; the same load hangs on the same plates."""
+    drawn = rng.standard_normal(loads.size)
+    return drawn if np.ptp(loads) > 0.0 else np.full(loads.size, drawn[0])
 
 
 def _known(settings: Settings, rng: np.random.Generator) -> Settings:

@@ -20,9 +20,10 @@ class Grousers(Effect):
     r_s = r + λ h;  (c, tan φ) · (1 + g);  z + d i/(1 − i), i from 0 to 0.95;
     q = a cos Nψ + b sin Nψ;  T(1 + q),  DP + qT/r,  z − q h;   ψ wheel angle
 
-    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; lugs that carry away
-    the soil between them Reece (1965), J. Terramechanics 2(2), d = h where all of it is carried; ripple Skonieczny,
+    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; ripple Skonieczny,
     Moreland, Wettergreen (2012), IEEE/RSJ IROS; soil-to-soil against soil-to-metal friction Wong (2008), section 2.4.
+    Lugs that carry the soil between them away: i/(1 − i) is attributed to Reece (1965), whose paper was not at hand;
+    d = h where all of it is carried.
     """
 
     height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)

@@ -16,8 +16,8 @@ class RunningIn(Effect):
 
     DP + f W e,  z − d |i| e,   e = e^(−s/λ),   s travel since the run began
 
-    Source: a first-order approach to the steady state of Eqs. (1)-(10), over a length like that of the contact;
-    slip-sinkage as transport of soil, Reece (1965), J. Terramechanics 2(2).
+    Source: none published. A first-order approach to the steady state of Eqs. (1)-(10) over a length like that of the
+    contact; the form was chosen here, after single-wheel trials that start from rest (MGST, docs/proof.md).
     """
 
     pull: float = strength(

@@ -30,9 +30,7 @@ FAMILIES, FITTED = 4, 2  # functions without a name that may act together; that 
 WEIGHED = 5  # models at most, of one effect and of more
 NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
 WHOLE, MUCH = 0.9, 20.0  # share of the misfit that an explanation takes, if it leaves so many nats
-PART = (
-    0.1  # belief in one that takes less: of eleven such in simulated cases none was right, of eight that took more all
-)
+PART = 0.1  # belief in one that takes less: of eleven such in simulated cases none was right, of eight others all
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
@@ -76,13 +74,19 @@ def judged(search: Search, weighed: Sequence[Weighed], nameless: float, calibrat
     left, significant = remaining(search, best)
     gained = 0.5 * (search.models[0].fitted.objective - best.fitted.objective)
     share = gained / max(gained + left, 1e-9)
-    believed = (PART if significant and left > MUCH and share < WHOLE else 1.0) * (1.0 - calibration.lapse)
+    beyond = left - max((_bending(w) for w in weighed if w.model is best), default=0.0)
+    believed = (PART if significant and beyond > MUCH and share < WHOLE else 1.0) * (1.0 - calibration.lapse)
     unlisted = 1.0 - calibration.lapse - believed * -float(np.expm1(unnamed - total))
     return Decision(
         "explained" if weighed and unlisted < 0.5 * (1.0 - calibration.lapse) else "unlisted",
         best, share, left, significant, _probabilities(weighed, weights - total + np.log(believed)), unlisted,
         _groups(weighed, weights, best), tuple(weighed), nameless,
     )  # fmt: skip
+
+
+def _bending(weighed: Weighed) -> float:
+    """Nats that another published form of the same effects takes of what they leave."""
+    return float(weighed.evidence.max() - weighed.evidence[0])
 
 
 def _best(weighed: Sequence[Weighed], weights: Array) -> Model:

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from tools.diagnose.evidence import SCALES, Base, log_bayes
-from tools.diagnose.noise import Colour, _restricted, coloured, whiten_unit
+from tools.diagnose.noise import Colour, coloured, restricted, whiten_unit
 from tools.diagnose.result import plain
 from tools.diagnose.screen import tail_quantile
 
@@ -43,7 +43,8 @@ def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:
     columns = np.column_stack([np.cos(np.pi * k * np.arange(600) / 600) for k in range(30)])
     noise = coloured(GAPS, 1, Colour(0.2, 0.5, 0.5), rng)[:, 0]
     misfit = columns @ rng.normal(0.0, 3.0, 30)
-    _, variance = _restricted(np.column_stack((columns, noise + misfit)), GAPS, [Colour(1.0, 0.5, 0.5)])
+    whitened, log_det = whiten_unit(np.column_stack((columns, noise + misfit)), GAPS, [Colour(1.0, 0.5, 0.5)])
+    _, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, 600)
     assert np.sqrt(variance[0]) == pytest.approx(0.2, rel=0.15)
 
 

@@ -28,7 +28,7 @@ class Cousin(Effect):
 
 @dataclass(frozen=True)
 class ReeceSlipSinkage(Cousin):
-    """Sinkage grows as h i/(1 − i) (Reece 1965)."""
+    """Sinkage grows as h i/(1 − i), a form attributed to Reece (1965)."""
 
     size: float = _size(3e-3)
     stage = "wheel"

@@ -112,7 +112,7 @@ def weigh(search: Search) -> list[Weighed]:
 def remaining(search: Search, model: Model) -> tuple[float, bool]:
     """Nats that smooth functions of the covariates would still gain; whether any of them stands out of the noise."""
     found = search.screens.get(model.names) or rescreen(search, model)
-    standing = [n for n in found.evidence if "~" in n and found.surprise(n) > found.threshold]
+    standing = [n for n in found.stands_out if "~" in n] if found.alarmed else []
     return (_families(search, model, FAMILIES)[0] if standing else 0.0), bool(standing)
 
 

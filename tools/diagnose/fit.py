@@ -129,7 +129,7 @@ class Problem:
 
     def __init__(self, stack: Stack, noise: Noise, tolerance: Array) -> None:
         """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be off by."""
-        self.stack, self.noise = stack, noise
+        self.stack, self.noise, self.allowed = stack, noise, tolerance
         self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
         self.measured = whiten(noise, stack.measured)
 
@@ -137,6 +137,7 @@ class Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands for."""
         other = copy(self)
         other.tolerance = np.column_stack((self.tolerance, whiten(self.noise, columns)))
+        other.allowed = np.column_stack((self.allowed, columns))
         return other
 
     def descend(

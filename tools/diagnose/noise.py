@@ -168,16 +168,26 @@ def _fit_channel(
     rng: np.random.Generator,
 ) -> tuple[Colour, ...]:
     columns = np.column_stack((saturated_mean(saturated[0][own], saturated[1][own], cells[own]), residual[own]))
-    colours = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
-    colours += [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
-    likelihood, variance = _restricted(columns, stack.gaps_of(own), colours)
-    step = _step(stack.gaps)
-    posterior = likelihood - RARE * np.log([_slow_power(c, step) for c in colours])
+    tried = colours()
+    whitened, log_det = whiten_unit(columns, stack.gaps_of(own), tried)
+    likelihood, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, len(columns))
+    posterior = likelihood + log_prior(tried, stack.gaps)
     weight = np.exp(posterior - posterior.max())
     least = _least(stack, channel)
-    sized = [replace(c, sigma=max(float(np.sqrt(v)), least)) for c, v in zip(colours, variance, strict=True)]
+    sized = [replace(c, sigma=max(float(np.sqrt(v)), least)) for c, v in zip(tried, variance, strict=True)]
     chosen = rng.choice(len(sized), SURROGATE_COLOURS, p=weight / weight.sum())
-    return _careful(sized, weight / weight.sum(), step), *(sized[i] for i in chosen)
+    return _careful(sized, weight / weight.sum(), _step(stack.gaps)), *(sized[i] for i in chosen)
+
+
+def colours() -> list[Colour]:
+    """All that are tried, of unit size."""
+    slow = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
+    return slow + [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
+
+
+def log_prior(tried: Sequence[Colour], gaps: Array) -> Array:
+    """Of each colour, up to a constant."""
+    return np.asarray(-RARE * np.log([_slow_power(c, _step(gaps)) for c in tried]))
 
 
 def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
@@ -193,17 +203,17 @@ def _slow_power(colour: Colour, step: float) -> float:
     return 1.0 - colour.slow + 2.0 * colour.slow * colour.time / step
 
 
-def _restricted(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
-    """Restricted log-likelihood of each colour with the size maximised out, and the variance."""
-    whitened, log_det = whiten_unit(columns, gaps, colours)
-    mean, y = whitened[:, :, :-1], whitened[:, :, -1]
-    gram = mean.transpose(0, 2, 1) @ mean
-    size = gram.shape[1]
-    gram += RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] / max(size, 1) * np.eye(size)
-    root = np.linalg.cholesky(gram)
-    taken = np.linalg.solve(root, np.einsum("gni,gn->gi", mean, y)[:, :, None])[:, :, 0]
-    free = max(y.shape[1] - size, 3)
-    variance = np.maximum(np.sum(y**2, axis=1) - np.sum(taken**2, axis=1), 1e-300) / free
+def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
+    """Restricted log-likelihood of each colour with the size maximised out, and the variance.
+
+    gram: (g, m + 1, m + 1) products of the whitened columns of the mean, and of the values last; of so many values.
+    """
+    inner, size = gram[:, :-1, :-1], gram.shape[1] - 1
+    inner = inner + RIDGE * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(size, 1) * np.eye(size)
+    root = np.linalg.cholesky(inner)
+    taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
+    free = max(count - size, 3)
+    variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), 1e-300) / free
     spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 

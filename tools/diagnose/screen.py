@@ -23,6 +23,8 @@ from tools.diagnose.noise import Noise, surrogates, whiten
 LEVEL = 0.01  # false alarms aimed at, half of what is allowed
 NULLS = 300
 LEAST = 2.0  # no surprise below this is an alarm, however quiet the nulls
+KINDS = 10  # of misfit that count as independent, of all that are tried
+SURE = float(np.log(KINDS / LEVEL))  # [nats] a likelihood ratio that is chance as rarely
 TENTH = 0.9  # quantile from which evidence is counted
 
 
@@ -44,6 +46,7 @@ class Screen:
     shapes: dict[str, list[dict[str, float]]]  # of each name, the most likely first
     nulls: Array  # (draws,) the largest surprise of all names
     chance: dict[str, float] = field(default_factory=dict)  # of as much evidence under a name by noise alone
+    open: float = np.inf  # [nats] the evidence that is left with the noise's colour open (open_noise.py)
 
     @property
     def threshold(self) -> float:
@@ -64,11 +67,19 @@ class Screen:
 
     @property
     def p(self) -> float:
-        return float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
+        """Of the largest surprise, among the nulls; where it was weighed with the noise's colour open, no less than the
+        chance of such a likelihood ratio in any kind of misfit (Markov's inequality)."""
+        counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
+        return max(counted, min(KINDS * float(np.exp(-max(self.open, 0.0))), 1.0))
+
+    @property
+    def stands_out(self) -> list[str]:
+        """Names beyond the threshold, the most surprising first."""
+        return sorted((n for n in self.evidence if self.surprise(n) > self.threshold), key=lambda n: -self.surprise(n))
 
     @property
     def alarmed(self) -> bool:
-        return self.largest[1] > self.threshold
+        return self.largest[1] > self.threshold and self.open > SURE
 
 
 def tail_quantile(values: Array, level: float) -> float:

@@ -13,9 +13,10 @@ from estimator.terramechanics.soil import Array
 from tools.diagnose import scans
 from tools.diagnose.evidence import Base, Signature
 from tools.diagnose.fit import Fitted, Free, Maker, Problem, free_of
+from tools.diagnose.open_noise import OpenNoise
 from tools.diagnose.parallel import each
 from tools.diagnose.ripples import LOUDEST, loudest, order_of
-from tools.diagnose.screen import Screen, Whitened, screen, whitened
+from tools.diagnose.screen import SURE, Screen, Whitened, screen, whitened
 from tools.diagnose.signatures import shape_grid, signature, strengths
 
 REACH = 0.35  # of the best effect's evidence: less cannot catch up in the nonlinear fit
@@ -23,6 +24,7 @@ MOST = 9  # effects fitted at the first step
 PAIRS = 2  # first effects from which a second step starts
 SECOND = 5  # effects fitted at each further step
 STEPS = 3  # effects at most
+WEIGHED = 6  # names that stand out whose evidence is weighed with the noise's colour open
 AGAIN = 4  # shapes of an effect that a later screen tries
 QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
 HOPELESS, BEHIND = 12.0, 0.15  # [nats] behind the best after the first fit, or this share of what the best gained
@@ -79,8 +81,25 @@ def rescreen(search: Search, model: Model) -> Screen:
     left = scans.Left(beside, noise, _resized(strain, beside))
     searched = {family.name: family.average(left) for family in search.scans}
     found = screen(base, ready, (noise, _resized(strain, base)), searched)
-    search.screens[model.names] = found
+    search.screens[model.names] = found = replace(found, open=_open(search, model, found))
     return found
+
+
+def _open(search: Search, model: Model, found: Screen) -> float:
+    """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends the search."""
+    names = found.stands_out[:WEIGHED]
+    families = [f for f in search.scans if f.name in names]
+    searched = scans.candidates(families, search.problem, model.fitted)
+    peaks = {s.name: s for s in reversed(searched)}
+    chosen = [found.best[n].signature if n in found.best else peaks[n] for n in names if n in found.best or n in peaks]
+    if not chosen:
+        return np.inf
+    weighed, most = OpenNoise(search.problem, model.fitted, chosen), -np.inf
+    for number in range(len(chosen)):
+        most = max(most, weighed.gain(number))
+        if most > SURE:
+            break
+    return most
 
 
 def _beside(search: Search, model: Model) -> Iterator[Signature]:

@@ -1,6 +1,6 @@
 """How it holds out: simulated hours through the pipeline, then the real daemon on wires under load.
 
-python -m tools.soak [--hours 100] [--minutes 60] [--busy 2]
+python -m tools.soak [--hours 100] [--minutes 60] [--busy 2] [--part 2]
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -58,6 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--thin", type=int, default=5, help="of the readings of 250 Hz take one in so many; default 5")
     parser.add_argument("--minutes", type=float, default=60.0, help="of the daemon on wires; default 60, 0: none")
     parser.add_argument("--busy", type=int, default=2, help="busy processes beside the daemon; default 2")
+    parser.add_argument(
+        "--part", type=float, default=2.0, help="minutes of a part of the recording: many ends an hour; default 2"
+    )
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args(argv)
     failures = simulated(arguments) if arguments.hours else []
@@ -146,6 +150,7 @@ def on_wires(arguments: Namespace) -> list[str]:
         told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
         with Child(Ending(), "testbed", "tools.testbed", *told) as testbed:
             path = testbed.wait_for("configuration ", PREPARED).split(" ", 1)[1]
+            shorten_parts(Path(path), arguments.part)
             with Child(
                 Ending(), "daemon", "tools.cli", "run", "--config", path, "--name", "soak", "--status", "0"
             ) as daemon:
@@ -155,6 +160,13 @@ def on_wires(arguments: Namespace) -> list[str]:
                 looks = list(watched(Path(name) / "gritd.sock", seconds))
                 words = daemon.stop()
     return judged(looks, words, arguments)
+
+
+def shorten_parts(path: Path, minutes: float) -> None:
+    """Let a part of the recording end after so long: what the end of a part needs has then settled when it counts."""
+    text, found = re.subn(r"(?m)^( +part_time:).*$", rf"\g<1> {minutes:g} min", path.read_text(encoding="utf-8"))
+    assert found == 1, f"{path}: part_time stands there {found} times"
+    path.write_text(text, encoding="utf-8")
 
 
 def unit_environment() -> dict[str, str]:
@@ -196,7 +208,7 @@ def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Nam
     grown = {what: more(what, looks) for what in ("descriptors", "threads")}
     print(
         f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
-        f" memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
+        f" {arguments.part:g} min a part, memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
         f" {last['descriptors']} descriptors, {last['threads']} threads, real time: {last['real_time']},"
         f" load average {np.median([look['load'] for look in looks]):.1f} (median)"
     )

@@ -81,7 +81,9 @@ def rescreen(search: Search, model: Model) -> Screen:
     left = scans.Left(beside, noise, _resized(strain, beside))
     searched = {family.name: family.average(left) for family in search.scans}
     found = screen(base, ready, (noise, _resized(strain, base)), searched)
-    search.screens[model.names] = found = replace(found, open=_open(search, model, found))
+    if not model.names:  # whether there is a mismatch at all; beside an effect, explanations compete on even terms
+        found = replace(found, open=_open(search, model, found))
+    search.screens[model.names] = found
     return found
 
 

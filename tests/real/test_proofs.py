@@ -59,7 +59,7 @@ def test_cmu_predicts_the_pull_of_unseen_states_of_the_other_wheel(tmp_path: Pat
     finding, asked = proved(cmu.GROUSERS, tmp_path)
     smooth = finding.said[0]
     assert "slip_sinkage" in smooth.group, "the smooth wheel sinks deeper with slip"
-    assert asked["Does it name grousers, or a group that holds them"].met
+    assert asked["Does it name grousers"].met
     assert asked["Is nothing said of the frame's yielding that the rigid stop denies"].met
     assert asked["Is the sinkage [mm] of unseen states predicted better"].met
     if not asked["Is the drawbar pull [N] of unseen states predicted better"].met:

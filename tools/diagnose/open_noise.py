@@ -27,7 +27,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from estimator.terramechanics.soil import Array
-from tools.diagnose import noise, scans
+from tools.diagnose import noise
 from tools.diagnose.evidence import SCALES, Signature
 from tools.diagnose.fit import Fitted, Problem
 from tools.diagnose.rig import Index
@@ -63,8 +63,7 @@ class OpenNoise:
     def __init__(self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature]) -> None:
         stack = problem.stack
         centre = np.concatenate((fitted.u, fitted.x))
-        allowed = [problem.allowed, *scans.harmonics(stack, fitted)]
-        base = np.column_stack((fitted.raw / fitted.penalty[: len(centre)], *allowed))
+        base = np.column_stack((fitted.raw / fitted.penalty[: len(centre)], problem.allowed))
         y = stack.measured - fitted.predicted + fitted.raw @ centre
         columns = np.column_stack((base, *(s.columns for s in signatures), y))
         self._base = np.arange(base.shape[1])

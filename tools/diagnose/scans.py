@@ -261,15 +261,14 @@ def without_harmonics(problem: Problem, fitted: Fitted) -> Base:
 
     At a steady speed they are waves in time and along the bed, and another published form of the ripple has them.
     """
-    base, columns = fitted.base(), list(harmonics(problem.stack, fitted))
+    base, columns = fitted.base(), list(_harmonics(problem.stack, fitted))
     if not columns:
         return base
     more = whiten(problem.noise, np.column_stack(columns))
     return Base(np.column_stack((base.jacobian, more)), base.residual, np.append(base.u, np.zeros(more.shape[1])))
 
 
-def harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
-    """Columns (N,) of unit prior: each harmonic of a ripple that a fit holds, in every channel."""
+def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
     for effect in fitted.acting:
         if effect.fingerprint.covariate == "wheel_angle":
             name = order_of(type(effect))

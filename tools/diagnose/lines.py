@@ -79,7 +79,7 @@ def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells
     columns = [_long(stack, channel) for channel in stack.rig.channels]
     for channel in stack.rig.channels:
         own = np.flatnonzero(stack.of(channel))
-        taken = saturated_mean(explained[own], sure[own], cells[own])
+        taken = saturated_mean(residual[own], explained[own], sure[own], cells[own])
         left = np.zeros(stack.size)
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
         room = own.size // SHARE

@@ -33,6 +33,7 @@ STEADY = 1.3  # values noisier than this share of their channel's, for blur, say
 CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
 RARE = 0.5  # prior: density of a colour falls as its slow power to this, since instruments drift less than they hiss
 COLUMNS = 40  # of the saturated mean, at most
+SLIGHT = 1e-4  # of the residual: what changes less at its expected size explains nothing, it is a solver's rounding
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,8 @@ def _fit_channel(
     own: Bools,
     rng: np.random.Generator,
 ) -> tuple[Colour, ...]:
-    columns = np.column_stack((saturated_mean(saturated[0][own], saturated[1][own], cells[own]), residual[own]))
+    mean = saturated_mean(residual[own], saturated[0][own], saturated[1][own], cells[own])
+    columns = np.column_stack((mean, residual[own]))
     tried = colours()
     whitened, log_det = whiten_unit(columns, stack.gaps_of(own), tried)
     likelihood, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, len(columns))
@@ -218,12 +220,17 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 
 
-def saturated_mean(columns: Array, sure: Array, cells: Index) -> Array:
-    """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal."""
+def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -> Array:
+    """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal.
+
+    Of the others those that would explain some of the residual (n,) at their expected size.
+    """
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
     held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
     held = basis(held, held.shape[1])
-    return np.column_stack((held, basis(columns - held @ (held.T @ columns))))
+    beside = columns - held @ (held.T @ columns)
+    acting = np.linalg.norm(beside, axis=0) > SLIGHT * np.linalg.norm(residual)
+    return np.column_stack((held, basis(beside[:, acting])))
 
 
 def basis(columns: Array, most: int = COLUMNS) -> Array:

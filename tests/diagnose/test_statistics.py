@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from tools.diagnose.evidence import SCALES, Base, log_bayes
-from tools.diagnose.noise import Colour, coloured, restricted, whiten_unit
+from tools.diagnose.noise import Colour, coloured, restricted, saturated_mean, whiten_unit
 from tools.diagnose.result import plain
 from tools.diagnose.screen import tail_quantile
 
@@ -46,6 +46,19 @@ def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:
     whitened, log_det = whiten_unit(np.column_stack((columns, noise + misfit)), GAPS, [Colour(1.0, 0.5, 0.5)])
     _, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, 600)
     assert np.sqrt(variance[0]) == pytest.approx(0.2, rel=0.15)
+
+
+def test_rounding_is_no_direction_of_the_saturated_mean() -> None:
+    """What an effect does not change comes out of a solver as 1e-12: scaled to unit size it would take noise away."""
+    rng = np.random.default_rng(7)
+    residual, effects, sure = rng.standard_normal(400), rng.standard_normal((400, 3)), rng.standard_normal((400, 2))
+    held = effects @ [1.0, 2.0, 3.0]
+    cells = np.repeat([0, 1, -1, -1], 100)
+    alone = saturated_mean(residual, effects, sure, cells)
+    beside = saturated_mean(residual, np.column_stack((1e-9 * rng.standard_normal((400, 50)), effects)), sure, cells)
+    assert alone.shape == beside.shape == (400, 7)
+    np.testing.assert_allclose(beside @ beside.T, alone @ alone.T, atol=1e-9)
+    np.testing.assert_allclose(alone @ (alone.T @ held), held, atol=1e-9)
 
 
 def test_log_bayes_is_the_integral() -> None:

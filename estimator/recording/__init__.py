@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -127,7 +128,8 @@ def _checksum(name: str, entries: Mapping[str, str]) -> str:
     return f"{zlib.crc32(text.encode()):08x}"
 
 
-def versions() -> dict[str, str]:
+@cache
+def versions() -> Mapping[str, str]:
     """What computed this run: a replay that differs can say what changed."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for package in ("gritd", "numpy", "filterpy", "scipy"):

@@ -33,8 +33,7 @@ STEADY = 1.3  # values noisier than this share of their channel's, for blur, say
 CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
 RARE = 0.5  # prior: density of a colour falls as its slow power to this, since instruments drift less than they hiss
 COLUMNS = 40  # of the saturated mean, at most
-SLIGHT = 1e-3  # of the residual's length: a direction in which less is expected explains nothing, or is rounding
-DEPENDENT = 3e-4  # length of a direction, of what its columns could have together, below which it is none of its own
+SLIGHT = 1e-4  # of the residual: what changes less at its expected size explains nothing, it is a solver's rounding
 
 
 @dataclass(frozen=True)
@@ -224,28 +223,26 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -> Array:
     """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal.
 
-    The columns hold what each effect, constant and smooth function is expected to change, so the directions lead in
-    which most of the residual (n,) may be explained (Karhunen-Loève), no more than a quarter of the rows.
+    Of the others those that would explain some of the residual (n,) at their expected size.
     """
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
-    held = basis(np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)])))
+    held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
+    held = basis(held, held.shape[1])
     beside = columns - held @ (held.T @ columns)
-    most = max(min(len(residual) // 4, COLUMNS), 1)
-    return np.column_stack((held, leading(beside, SLIGHT * float(np.linalg.norm(residual)))[:, -most:]))
+    acting = np.linalg.norm(beside, axis=0) > SLIGHT * np.linalg.norm(residual)
+    return np.column_stack((held, basis(beside[:, acting])))
 
 
-def basis(columns: Array) -> Array:
-    """Orthonormal columns that span the same space, no more than a quarter of the rows."""
+def basis(columns: Array, most: int = COLUMNS) -> Array:
+    """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    return leading(columns, DEPENDENT * np.sqrt(columns.shape[1]))[:, -max(columns.shape[0] // 4, 1) :]
-
-
-def leading(columns: Array, least: float) -> Array:
-    """Orthonormal directions in which the columns are together longer than `least`, the longest last."""
+    if not columns.size:
+        return np.zeros((columns.shape[0], 0))
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > least**2
-    return np.asarray(columns @ (vectors[:, kept] / np.sqrt(values[kept])))
+    kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[-max(min(columns.shape[0] // 4, most), 1) :]
+    basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
+    return basis
 
 
 def _least(stack: Stack, channel: str) -> float:

@@ -50,11 +50,12 @@ def test_a_quiet_rig_gives_no_alarm() -> None:
 def test_coloured_noise_of_unknown_size_gives_no_alarm(slow_time: float, allowed: int, noise: float) -> None:
     """iid tests cry wolf; the configured noise is half or twice the true one.
 
-    Noise with 3 s of memory makes a trend in runs of 14 s by chance, in a few campaigns of a hundred: one of eight may.
+    Noise with 3 s of memory makes a trend in runs of 14 s by chance, in a few campaigns of a hundred: one of the later
+    seeds may.
     """
     every = [diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed)) for seed in range(1, 9)]
-    alarms = [found.summary for found in every if found.verdict not in ("consistent", "insufficient")]
-    assert len(alarms) <= allowed, alarms
+    alarms = [number for number, found in enumerate(every) if found.verdict not in ("consistent", "insufficient")]
+    assert len(alarms) <= allowed and not {0, 1} & set(alarms), [every[number].summary for number in alarms]
 
 
 @pytest.mark.slow

@@ -38,11 +38,12 @@ from tools.cli import guarded
 from tools.command import DONE, FAILED, Parser
 from tools.demo import Child
 from tools.status import connected, reports
-from tools.testbed import experiment
+from tools.testbed import PLAYED, experiment
 
 LAP = 300.0  # [s] the simulated run that is driven again and again
 SLOPE = 1.0  # [MB/h] largest growth of memory
 PREPARED, READY = 1200.0, 120.0  # [s] the longest it may take to simulate the run, and to open the devices
+DRAINED = 1.0  # [s] in which the daemon takes what is still on the wires
 SETTLED = 0.2  # share of the time after which memory has settled
 READ = [
     TICK_NAMES.index(name) for name in ("cohesion", "tan_phi", "cohesion_sigma", "tan_phi_sigma", "resets", "updates")
@@ -158,8 +159,12 @@ def on_wires(arguments: Namespace) -> list[str]:
                 daemon.wait_for("device ", READY)
                 testbed.tell("play")
                 looks = list(watched(Path(name) / "gritd.sock", seconds))
+                testbed.stop()
+                time.sleep(DRAINED)
+                last = look(Path(name) / "gritd.sock")
                 words = daemon.stop()
-    return judged(looks, words, arguments)
+        played = json.loads((Path(name) / PLAYED).read_text(encoding="utf-8"))
+    return [*judged(looks, words, arguments), *unreported(last, played)]
 
 
 def shorten_parts(path: Path, minutes: float) -> None:
@@ -188,18 +193,36 @@ def busy(number: int) -> Iterator[None]:
 
 
 def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
-    """A look at the daemon every few seconds: its report, memory, descriptors and threads."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        with connected(str(path)) as connection:
-            report = next(reports(connection))
-        pid = report["pid"]
-        report["memory"] = resident(pid)
-        report["descriptors"] = len(os.listdir(f"/proc/{pid}/fd"))
-        report["threads"] = len(os.listdir(f"/proc/{pid}/task"))
-        report["load"] = os.getloadavg()[0]
-        yield report
+    """A look at the daemon every few seconds, and a line of it every tenth of the time."""
+    began, told = time.monotonic(), 0
+    while (passed := time.monotonic() - began) < seconds:
+        yield (report := look(path))
+        if int(10.0 * passed / seconds) > told:
+            told = int(10.0 * passed / seconds)
+            print(f"after {passed / 60:.1f} min: {report['memory']:.2f} MB, load {report['load']:.1f}", flush=True)
         time.sleep(min(5.0, seconds / 50))
+
+
+def look(path: Path) -> dict[str, Any]:
+    """The daemon's report, with its memory, descriptors and threads."""
+    with connected(str(path)) as connection:
+        report = next(reports(connection))
+    pid = report["pid"]
+    report["memory"] = resident(pid)
+    report["descriptors"] = len(os.listdir(f"/proc/{pid}/fd"))
+    report["threads"] = len(os.listdir(f"/proc/{pid}/task"))
+    report["load"] = os.getloadavg()[0]
+    return report
+
+
+def unreported(last: dict[str, Any], played: dict[str, Any]) -> list[str]:
+    """What was sent and neither received nor counted as lost at either end; a reading is a message or more."""
+    devices = last["devices"].values()
+    known = sum(device["lost"] + device["bad"] for device in devices) + sum(played["lost"].values())
+    received = last["queue"]["received"]
+    print(f"testbed: {played['readings']} readings sent, {received} received, {known} messages known to be lost")
+    missing = played["readings"] - received
+    return [f"{missing} readings missing, {known} messages counted as lost"] * (missing > known)
 
 
 def judged(looks: Sequence[dict[str, Any]], words: Sequence[str], arguments: Namespace) -> list[str]:

@@ -24,8 +24,12 @@ from estimator.daemon import notify
 from estimator.daemon.health import Pulse, silent
 from estimator.daemon.notify import Notifier
 from estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
+from estimator.readings import Reading
 from estimator.record import CHANNEL_BITS
+from estimator.recording import RunInfo
 from estimator.recording.retention import sweep, trim
+from estimator.recording.salvage import read
+from estimator.recording.writer import WriterThread
 from tools import monitor, status
 from tools.command import CommandError
 
@@ -135,6 +139,17 @@ def test_what_a_killed_daemon_had_only_begun_is_swept_away(tmp_path):
         (tmp_path / name).touch()
     sweep(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == [".gritd.lock", "a.mcap", "b.new"]
+
+
+def test_a_recording_whose_name_a_power_cut_took_back_gets_it_again(tmp_path):
+    """The folder may reach the medium later than the file: simulated by renaming a recording to its draft."""
+    path = tmp_path / "a.mcap"
+    thread = WriterThread(path, [], "a: 1\n", RunInfo("a"))
+    thread.put([Reading(10**18 + i, "wheel_encoder", i, 10**18 + i) for i in range(10)])
+    thread.stop()
+    path.rename(tmp_path / ".a.mcap.new")
+    assert sweep(tmp_path) == [path]
+    assert read(path).arrays("/raw/wheel_encoder")["count"].tolist() == list(range(10))
 
 
 def test_the_oldest_closed_recordings_go_first(tmp_path):

@@ -19,7 +19,7 @@ from estimator.readings import Reading
 from estimator.recording import RecordingError, RunInfo, parts
 from estimator.recording.mcapfile import McapFile
 from estimator.recording.salvage import read
-from estimator.recording.writer import WriterStatus, WriterThread
+from estimator.recording.writer import WriterStatus, WriterThread, _Syncer
 from tests.test_recording import MIXED, T0, mixed_values
 
 REPOSITORY = Path(__file__).parent.parent
@@ -209,6 +209,31 @@ def test_a_failed_sync_is_said(writer: WriterThread, monkeypatch: pytest.MonkeyP
     wait_for(lambda: "cannot sync: Input/output error" in writer.status().error)
     monkeypatch.undo()
     wait_for(lambda: writer.status().state == "writing")
+
+
+def test_what_is_asked_for_while_the_medium_is_busy_is_synced_before_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last batch and the index come while an earlier sync is under way: the end waits for them too."""
+    synced: list[int] = []
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(file: int) -> None:
+        begun.set()
+        go.wait()
+        synced.append(os.fstat(file).st_ino)
+
+    monkeypatch.setattr("estimator.recording.writer.sync", slow)
+    syncer = _Syncer()
+    syncer.start()
+    with (tmp_path / "a").open("wb") as first, (tmp_path / "b").open("wb") as second:
+        syncer.request(first.fileno())
+        begun.wait()
+        syncer.request(second.fileno())
+        assert not syncer.stop(0.05) and syncer.waiting() > 0.0
+        go.set()
+        assert syncer.stop(10.0) and syncer.waiting() == 0.0
+        assert synced == [os.fstat(file.fileno()).st_ino for file in (first, second)]
 
 
 def test_a_disk_that_fails_to_the_end_costs_what_it_costs_and_is_counted(disk: FailingDisk, tmp_path: Path) -> None:

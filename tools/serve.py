@@ -46,7 +46,8 @@ def _serve(configuration: Configuration, folder: Path, run: RunInfo, socket: Pat
     clock, queue = Clock(), ReadingQueue()
     notice = real_time()
     readers = build_readers(configuration.settings, clock.now, queue)
-    sweep(folder)
+    for found in sweep(folder):
+        say(f"{found}: a power cut had taken its name; it has it again")
     path = run_path(folder, run.name, clock.now())
     daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock)
     publisher = Publisher(socket, Reporter(daemon, readers, queue, notice))

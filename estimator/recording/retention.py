@@ -5,13 +5,31 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from estimator.recording.mcapfile import DRAFT
+from estimator.recording.blocks import Walk
+from estimator.recording.mcapfile import DRAFT, RecordingError
 
 
-def sweep(folder: Path) -> None:
-    """Delete what a killed daemon had just begun: drafts, without a message in them. Raises OSError."""
-    for draft in folder.glob(f".*.mcap{DRAFT}"):
-        draft.unlink()
+def sweep(folder: Path) -> list[Path]:
+    """Delete what a killed daemon had just begun: drafts, without a message in them. Raises OSError.
+
+    A draft with messages had its name, and a power cut took it back: it gets it again. Those are returned.
+    """
+    found = []
+    for draft in sorted(folder.glob(f".*.mcap{DRAFT}")):
+        path = draft.with_name(draft.name[1:].removesuffix(DRAFT))
+        if not _messages(draft):
+            draft.unlink()
+        elif not path.exists():
+            found.append(draft.rename(path))
+    return found
+
+
+def _messages(draft: Path) -> bool:
+    with draft.open("rb") as file:
+        try:
+            return bool(Walk(file, draft.stat().st_size).run().blocks)
+        except RecordingError:
+            return False
 
 
 def trim(folder: Path, cap: float, open_files: Collection[Path]) -> list[Path]:

@@ -116,6 +116,11 @@ class WriterThread:
         """Whether both threads run."""
         return self._thread.is_alive() and self._sync.alive
 
+    @property
+    def unconfirmed(self) -> float:
+        """How long the medium has not confirmed what it was last asked to keep [s]; 0 where nothing is asked."""
+        return self._sync.waiting()
+
     def stop(self, timeout: float = 2.0) -> WriterStatus:
         """Write what is queued, close the file with its index, and return the final counters.
 
@@ -298,6 +303,7 @@ class _Parts:
         self._make = partial(RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize)  # see _flush
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
         self.files = [path]
+        self._sync_name(path)
 
     def next(self, lost: int, config_yaml: str = "") -> None:
         """Go on in a new file, with what the old one could not take, and with another configuration if one is given.
@@ -314,6 +320,16 @@ class _Parts:
             self.writer.finish(self._sync)
         self.writer = new
         self.files.append(path)
+        self._sync_name(path)
+
+    def _sync_name(self, path: Path) -> None:
+        """A file's name is its folder's: without this, a power cut may leave the file under the name of its draft."""
+        with suppress(OSError):  # a folder that may be written but not read
+            folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                self._sync(folder)
+            finally:
+                os.close(folder)
 
 
 class _Syncer:
@@ -325,6 +341,7 @@ class _Syncer:
         self._files: dict[tuple[int, int], int] = {}  # device and inode -> a descriptor of our own
         self._error: OSError | None = None
         self._stopped = False
+        self._since = 0.0  # when the sync under way began [s]; 0: there is none
         self._thread = threading.Thread(target=self._run, name="writer-sync", daemon=True)
 
     @property
@@ -357,15 +374,23 @@ class _Syncer:
         if error:
             raise RecordingError(f"{path}: cannot sync: {error.strerror}", error.errno) from error
 
+    def waiting(self) -> float:
+        """How long the medium has left a request unconfirmed [s]."""
+        since = self._since
+        return time.monotonic() - since if since else 0.0
+
     def _run(self) -> None:
-        while not self._stopped:
+        last = False
+        while not last:
             self._wake.wait()
             self._wake.clear()
+            last = self._stopped  # what was asked for until then is still synced
             self._sync()
 
     def _sync(self) -> None:
         with self._lock:
             files, self._files = self._files, {}
+        self._since = time.monotonic()
         for file in files.values():
             try:
                 sync(file)
@@ -374,3 +399,4 @@ class _Syncer:
                     self._error = error
             finally:
                 os.close(file)
+        self._since = 0.0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+import select
 import sys
 from collections.abc import Sequence
 from math import degrees
@@ -19,6 +21,8 @@ from estimator.recording.retention import trim
 from estimator.yamltree import ConfigError
 
 TIDY = 5.0  # [s] between looks at the disk
+MEDIUM_PATIENCE = 10.0  # [s] after which a medium that confirms nothing is worth a line
+LISTENING = 50  # [ms] given to whoever reads our lines and is behind
 
 
 class Watcher:
@@ -32,6 +36,7 @@ class Watcher:
         self._every = every
         self._states = {reader.device: "" for reader in readers}
         self._writing, self._files, self._hanging, self._untidy = "writing", 1, "", ""
+        self._dropped, self._overflowing, self._unconfirmed = 0, False, False
         self._calls = 0
         self._ready = self._reload_asked = False
 
@@ -42,6 +47,7 @@ class Watcher:
     def __call__(self, daemon: Daemon) -> None:
         for reader in self._readers:
             self._follow(daemon, reader.stats())
+        self._follow_queue(daemon)
         self._follow_writer(daemon)
         self._follow_health(daemon)
         if self._reload_asked:
@@ -67,7 +73,23 @@ class Watcher:
         trouble = stats.state not in ("OPEN", "ENDED")
         self._tell(daemon, WARNING if trouble else INFO, f"device {stats.device} {stats.state} {stats.last_error}")
 
+    def _follow_queue(self, daemon: Daemon) -> None:
+        """Readings that the loop did not take in time: the oldest are dropped; said once a second at most."""
+        dropped, begins = self._queue.counts().dropped, False
+        if dropped > self._dropped and not self._overflowing:
+            begins = self._overflowing = True
+        if begins or (self._overflowing and self._due(1.0)):
+            new, self._dropped = dropped - self._dropped, dropped
+            self._overflowing = new > 0
+            if new:
+                self._tell(daemon, WARNING, f"queue: the loop fell behind, {new} readings dropped, {dropped} in all")
+
     def _follow_writer(self, daemon: Daemon) -> None:
+        waiting = daemon.writer.unconfirmed
+        if (waiting > MEDIUM_PATIENCE) != self._unconfirmed:
+            self._unconfirmed = not self._unconfirmed
+            text = f"has confirmed nothing for {waiting:.0f} s" if self._unconfirmed else "confirms again"
+            self._tell(daemon, WARNING if self._unconfirmed else INFO, f"log: the medium {text}")
         status = daemon.writer.status()
         if status.state != self._writing:
             self._writing = status.state
@@ -144,12 +166,24 @@ class Watcher:
 
 
 def say(text: str, stream: TextIO | None = None) -> None:
-    """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon goes on."""
+    """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon goes on; where somebody
+    does not read what he asked for, it goes on without the line."""
     out = stream or sys.stdout
     try:
-        print(text, file=out, flush=True)
+        if _taken(out):
+            print(text, file=out, flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), out.fileno())
+
+
+def _taken(out: TextIO) -> bool:
+    """Whether a line can be written without waiting for its reader: a full pipe would hold up the end, too."""
+    try:
+        waiting = select.poll()
+        waiting.register(out, select.POLLOUT)
+    except (ValueError, io.UnsupportedOperation):  # a stream of Python's own
+        return True
+    return bool(waiting.poll(LISTENING))
 
 
 def status_line(daemon: Daemon) -> str:

@@ -212,6 +212,7 @@ def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=STALLING.format(flag=str(flag))) as (_, daemon):
         daemon.wait_status(lambda report: report["queue"]["dropped"] > 0)
         daemon.heard("hanging: loop")
+        daemon.heard("queue: the loop fell behind")
         flag.touch()
         report = daemon.wait_status(lambda report: report["loop"]["missed"] > 100 and report["status"] == "TRACKING")
         counts = report["queue"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import pwd
 import resource
@@ -54,6 +55,25 @@ def test_nobody_listens_any_more(tmp_path, figure):
     recording = read(path)
     assert recording.complete and recording.counts["/tick"] > 100
     figure("nobody listens", WIRES, "exit code after SIGTERM", 0, "", 0)
+
+
+def test_somebody_does_not_read(tmp_path, figure):
+    """What it says goes into a pipe that is full and stays open: it ends when it is told to, all the same."""
+    command = [sys.executable, "-m", "tools.cli", "run", "--status", "0.1", "--config"]
+    with Wires(tmp_path) as wires:
+        daemon = subprocess.Popen(
+            [*command, str(wires.config)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        fcntl.fcntl(daemon.stdout, fcntl.F_SETPIPE_SZ, resource.getpagesize())
+        path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
+        wires.play(driven(40.0, 1, skip=1.0))
+        time.sleep(4.0)
+        daemon.send_signal(signal.SIGTERM)
+        assert daemon.wait(LIMIT) == 0
+        daemon.stdout.close()
+    recording = read(path)
+    assert recording.complete and recording.counts["/tick"] > 100
+    figure("nobody listens", f"{WIRES}, a full pipe", "exit code after SIGTERM", 0, "", 0)
 
 
 as_root = pytest.mark.skipif(

@@ -7,7 +7,7 @@ reading is the second of one stamp, a window is a slice between two searches, a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -97,7 +97,7 @@ def snapshots(settings: Settings, played: Played, chosen: Ints) -> list[Snapshot
         *map(measured, axes),
         means.get("motor_temperature", view.nothing).value,
         view.stale(),
-        view.stuck(wheel, carriage, means),
+        view.stuck(wheel, carriage, means, axes),
     )
     rows = zip(*(column if isinstance(column, list) else column.tolist() for column in columns), strict=True)
     return [Snapshot._make(row) for row in rows]
@@ -282,13 +282,25 @@ class View:
         latest = np.append(NEVER, np.maximum.accumulate(stream.received))
         return latest[np.searchsorted(stream.tick, self._chosen, "right")]
 
-    def stuck(self, wheel: Motion, carriage: Motion, means: Mapping[str, Series]) -> Ints:
+    def stuck(self, wheel: Motion, carriage: Motion, means: Mapping[str, Series], axes: Sequence[Series]) -> Ints:
         """CHANNEL_BITS of channels that stand still while others move; see sync.Sync."""
         bits = CHANNEL_BITS["wheel_encoder"] * (carriage.moves & (wheel.still >= STUCK_AFTER))
+        moving = wheel.moves | carriage.moves
         for name in ANALOGUE:
             if self._settings.channels[name].noise > 0.0:
-                bits = bits + CHANNEL_BITS[name] * ((wheel.moves | carriage.moves) & (means[name].still >= STUCK_AFTER))
-        return bits
+                bits = bits + CHANNEL_BITS[name] * (moving & (means[name].still >= STUCK_AFTER))
+        return np.asarray(bits + CHANNEL_BITS["wrench"] * (moving & self._frozen(axes)))
+
+    def _frozen(self, axes: Sequence[Series]) -> Bools:
+        """Whether no axis of the wrench that is measured shows one digit of noise."""
+        wrench = self._settings.wrench
+        if wrench is None:
+            return np.zeros(len(self._ticks), bool)
+        noises = (wrench.force_noise, wrench.force_noise, wrench.torque_noise)
+        live = [
+            axis.known & ((axis.still < STUCK_AFTER) | (noise <= 0.0)) for axis, noise in zip(axes, noises, strict=True)
+        ]
+        return np.asarray(np.any([axis.known for axis in axes], axis=0) & ~np.any(live, axis=0))
 
 
 def _fitted(members: Members, noise: float) -> tuple[Array, Array, Array]:

@@ -366,8 +366,8 @@ class Sync:
         """Bits of channels whose value does not change at all while the others show motion.
 
         An encoder is stuck when the other encoder moves and it does not change; a wheel that really stands still
-        while the carriage moves is dragged, which no update survives either. A potentiometer or shunt is stuck when
-        the wheel turns and not one digit of noise shows.
+        while the carriage moves is dragged, which no update survives either. A potentiometer, shunt or wrench is stuck
+        when the wheel turns and not one digit of noise shows, of the wrench on any axis.
         """
         turning, travelling = _moves(wheel), _moves(carriage)
         bits = 0
@@ -378,7 +378,13 @@ class Sync:
                 window = self._means[name]
                 if window.noise > 0.0 and window.still_for() >= STUCK_AFTER:
                     bits |= CHANNEL_BITS[name]
+            if self._wrench and self._wrench_frozen():
+                bits |= CHANNEL_BITS["wrench"]
         return bits
+
+    def _wrench_frozen(self) -> bool:
+        heard = [window for window in self._wrench.values() if window.inside]
+        return bool(heard) and all(window.noise > 0.0 and window.still_for() >= STUCK_AFTER for window in heard)
 
 
 def _moves(speed: Measured) -> bool:

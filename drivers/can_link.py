@@ -17,6 +17,7 @@ from drivers.framing_can import ERROR, EXTENDED, REMOTE, pack
 from drivers.link import POLL, Chunk, Clock
 from estimator.settings import Device
 
+LONGEST_LINE = 4096  # [bytes] of slcan; a message takes 32
 RECEIVE_BUFFER = 1 << 20  # [bytes] asked of the kernel, so that a burst waits there instead of being lost
 
 # Options an interface needs to be safe or prompt; the configuration's `options` win.
@@ -57,12 +58,22 @@ class CanLink:
             raise DeviceError(self._device.name, f"{self._device.channel} is not open")
         try:
             message = self._bus.recv(POLL)
-            return None if message is None else Chunk(self._clock(), packed(message))
+            if message is None:
+                self._discard_endless()
+                return None
+            return Chunk(self._clock(), packed(message))
         except Exception as error:  # every backend has exceptions of its own
             if not _is_damage(self._device.interface, error):
                 raise DeviceError(self._device.name, f"cannot read {self._device.channel}: {_reason(error)}") from None
             self._discard_damage(error)
             return None
+
+    def _discard_endless(self) -> None:
+        """slcan keeps a line until it ends; one of a wrong baud rate never does."""
+        line = getattr(self._bus, "_buffer", bytearray())
+        if len(line) > LONGEST_LINE:
+            self.damaged += 1
+            line.clear()
 
     def _discard_damage(self, error: Exception) -> None:
         """Count a message that could not be read, and go on."""

@@ -28,8 +28,8 @@ RESET_STEP = 500_000_000  # [ns] a device clock going back by this much, or forw
 class DeviceClock:
     """Stamps for the frames of one device clock that wraps at `modulus_us` µs.
 
-    A stamp is never later than the receive time and grows with the device time. What remains is the smallest delay of
-    the last 20 s, a constant that belongs into the channel's latency.
+    A stamp is never later than the receive time, and never goes back while the device time goes on. What remains is the
+    smallest delay of the last 20 s, a constant that belongs into the channel's latency.
     """
 
     _newest: int  # latest device time [ns], unwrapped
@@ -72,7 +72,9 @@ class DeviceClock:
         """Look at the samples of one chunk, then stamp them."""
         for time in sorted(times, reverse=True):
             self._observe(time, received)
-        return [self._stamp(time, received) for time in times]
+        newest = max(times, default=0)
+        end = (newest, self._mapped(newest, received))
+        return [self._stamp(time, received, end) for time in times]
 
     def _unwrap(self, wrapped: int, received: int) -> int:
         """Device time without wraps [ns]: the turn of the clock nearest to where our own clock expects it."""
@@ -121,15 +123,25 @@ class DeviceClock:
     def _line(self, at: float) -> float:
         return self._intercept + self._slope * at
 
-    def _stamp(self, time: int, received: int) -> int:
-        stamp = min(time + self._origin + round(self._line(float(time - self._first))), received)
+    def _mapped(self, time: int, received: int) -> int:
+        return min(time + self._origin + round(self._line(float(time - self._first))), received)
+
+    def _stamp(self, time: int, received: int, end: tuple[int, int]) -> int:
+        """end: device time and stamp of the chunk's newest sample."""
+        stamp = self._mapped(time, received)
         if self._last is None or time > self._last[0]:
-            if self._last is not None:
-                stamp = min(max(stamp, self._last[1] + 1), received)
+            if self._last is not None and stamp <= self._last[1]:
+                stamp = _between(self._last, end, time)
             self._last = (time, stamp)
         elif time == self._last[0]:
             stamp = self._last[1]
         return stamp
+
+
+def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
+    """A stamp after the last one where the line was pushed down below it: evenly up to the chunk's newest sample. Where
+    that lies below too, the last stamp again: a sample that claims a moment of its own would look like a jump."""
+    return last[1] + max(end[1] - last[1], 0) * (time - last[0]) // (end[0] - last[0])
 
 
 def hull_slope(points: Sequence[Point]) -> float:

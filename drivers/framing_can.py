@@ -150,6 +150,11 @@ class CanFraming:
             self._unknown(f"message {name}", f"there are {', '.join(m.name for m in self._database.messages)}")
         counter = next((s for s in message.signals if s.name.lower() in COUNTERS), None)
         device_time = next((s for s in message.signals if s.name.lower() == DEVICE_TIME), None)
+        for signal in filter(None, (counter, device_time)):
+            if signal.is_float or signal.multiplexer_ids:
+                kind = "a float" if signal.is_float else "multiplexed"
+                what = f"signal {name}.{signal.name} is {kind}"
+                raise DeviceSettingsError(f"device {self._device}", f"{what}; expected an integer in every message")
         gap = SequenceGap(1 << counter.length if counter else 1)
         wanted = _Wanted(message, {}, counter, device_time, gap)
         self._wanted[message.frame_id | (EXTENDED if message.is_extended_frame else 0)] = wanted

@@ -36,11 +36,11 @@ class SerialLink:
         if self._port is None:
             raise DeviceError(self._device, f"{self._path} is not open")
         try:
-            first = self._port.read(1)
-            received = self._clock()
-            if not first:
+            data = self._port.read(1)
+            if not data:
                 return None
-            return Chunk(received, first + self._port.read(self._port.in_waiting))
+            data += self._port.read(self._port.in_waiting)
+            return Chunk(self._clock(), data)  # no byte of it came later
         except _FAILURES as error:
             raise DeviceError(self._device, f"cannot read {self._path}: {_reason(error)}") from None
 

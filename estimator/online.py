@@ -34,6 +34,7 @@ class Context(NamedTuple):
     acceleration: float = 0.0  # dω/dt [rad/s²]
     sinking: float = 0.0  # dz/dt [m/s]
     memory: Mapping[str, float] = {}  # what effects remember, by name
+    origin: float = 0.0  # where the carriage stood when the run began, by its encoder [m]
 
 
 class Here(NamedTuple):
@@ -142,7 +143,7 @@ class Chain:
             time=context.time,
             wheel_angle=snapshot.wheel_angle,
             wheel_speed=snapshot.wheel_speed.value,
-            carriage_position=snapshot.carriage_position,
+            carriage_position=snapshot.carriage_position - context.origin,
             carriage_speed=snapshot.carriage_speed.value,
             load=load,
             pass_number=float(self._settings.place.pass_number),

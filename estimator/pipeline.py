@@ -14,6 +14,8 @@ from estimator.record import Flag
 from estimator.settings import Settings
 from estimator.sync import NS, Sync
 
+MOST = (1 << 32) - 1  # a tick's counters go so far
+
 TickRecord = tuple[float, ...]  # values in the order of record.TICK_FIELDS; times are integer ns
 
 
@@ -65,10 +67,7 @@ class Pipeline:
             flags,
             account.snapshot.stale,
             account.snapshot.stuck,
-            counters.late,
-            counters.duplicates,
-            counters.jumps,
-            counters.invalid,
+            *(min(count, MOST) for count in (counters.late, counters.duplicates, counters.jumps, counters.invalid)),
             *record(self.tracker, track, account, pull),
         )
         return State(sync, track, search, pull, first, counters.late, counters.jumps), fields

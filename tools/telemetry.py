@@ -15,6 +15,8 @@ from estimator.record import CHANNEL_BITS, TICK_NAMES, Flag, Status
 
 Report = dict[str, Any]
 
+LOG = ("state", "error", "accepted", "written", "dropped", "queued")  # of WriterStatus
+
 
 class Reporter:
     """Makes reports of one daemon; called by the publisher's thread, ten times a second at most."""
@@ -26,7 +28,7 @@ class Reporter:
 
     def __call__(self) -> Report:
         daemon = self._daemon
-        writer = asdict(daemon.writer.status())
+        log, disagreement = daemon.writer.status(), daemon.model.present
         return {
             "pid": os.getpid(),
             "uptime": time.monotonic() - self._began,
@@ -35,10 +37,14 @@ class Reporter:
             "real_time": self._notice or "yes",
             "configuration": daemon.configuration.source,
             **_tick(daemon),
-            "disagreement": daemon.model.present and daemon.model.present._asdict(),
+            "disagreement": disagreement and disagreement._asdict(),
             "queue": self._queue.counts()._asdict(),
             "devices": {reader.device: self._device(reader) for reader in self._readers},
-            "log": {**writer, "files": len(writer["files"]), "file": str(writer["files"][-1])},
+            "log": {
+                **{name: getattr(log, name) for name in LOG},
+                "files": len(log.files),
+                "file": str(log.files[-1]),
+            },
         }
 
     def _device(self, reader: Reader) -> Report:

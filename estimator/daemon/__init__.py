@@ -53,6 +53,7 @@ WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
 STOP = 1.5  # [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s more
 MIN_PART = 1.0  # [s] a part is at least this long
+MAX_CHUNKS = 400_000  # and of no more flushes than this: a reader takes 500,000
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
 
 # Looks (of WATCH) without a sign of life before a thread is said to hang.
@@ -145,10 +146,12 @@ class Daemon:
         self.writer.put((), [(LOG_TOPIC.name, now, (now, level, "gritd", text, "", "", 0))])
 
     def reload(self, configuration: Configuration) -> None:
-        """Go on with another configuration from the next tick, in a new part of the recording.
+        """Go on with another configuration from the next tick, in a new part of the recording; with the same, nothing.
 
         Raises DaemonError, and nothing has changed, where that needs a restart.
         """
+        if configuration.text == self.configuration.text:
+            return
         fixed = needs_restart(self.configuration.settings, configuration.settings)
         if fixed:
             raise DaemonError(f"{configuration.source}: {fixed}: changed, which needs a restart")
@@ -216,12 +219,15 @@ class Daemon:
             self.say(WARNING if self.model.present else INFO, said)
 
     def _rotate(self) -> None:
-        """Ask for a new part when the present one is large or old."""
+        """Ask for a new part when the present one is large or old, or gone."""
         logging, age = self.configuration.settings.logging, time.monotonic() - self._part_began
         status = self.writer.status()
         if age < MIN_PART or status.state != "writing":
             return
-        if age > logging.part_time or _size(status.files[-1]) > logging.part_size:
+        size, longest = _size(status.files[-1]), min(logging.part_time, MAX_CHUNKS * logging.flush_interval)
+        if size is None:
+            self.say(WARNING, f"{status.files[-1]}: deleted while it was written; a new part begins")
+        if size is None or size > logging.part_size or age > longest:
             self.loop.ask(Change(self.configuration.text))
             self._part_began = time.monotonic()
 
@@ -250,9 +256,12 @@ def _beats(reader: ReaderThread) -> int:
     return reader.beats
 
 
-def _size(path: Path) -> int:
+def _size(path: Path) -> int | None:
+    """None where nothing is."""
     try:
         return path.stat().st_size
+    except FileNotFoundError:
+        return None
     except OSError:
         return 0
 

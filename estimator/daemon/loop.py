@@ -124,7 +124,7 @@ class Loop:
         dropped = self.latest[1].log_dropped if self.latest else 0
         if self._asked:
             change = self._asked.popleft()
-            if change.pipeline is not None:
+            if change.pipeline is not None and change.configuration != self._configuration:
                 state = carried(change.pipeline, state, self._pipeline.settings)
                 self._pipeline, self._configuration = change.pipeline, change.configuration
             self._checkpoint(state, stamp, dropped, new_part=True)

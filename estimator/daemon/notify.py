@@ -5,6 +5,7 @@ Without a service manager nothing is sent, and nobody has to ask.
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import time
@@ -14,6 +15,7 @@ from collections.abc import Mapping
 READY, STOPPING, WATCHDOG = "READY=1", "STOPPING=1", "WATCHDOG=1"
 _PASSING = ("STATUS=", WATCHDOG)  # soon said again; anything else is a state the manager waits for
 _MOST = 16  # states that wait for a manager who is behind
+_LATER = (errno.EAGAIN, errno.EMFILE, errno.ENFILE)  # what passes
 
 
 def reloading() -> str:
@@ -45,13 +47,12 @@ class Notifier:
             self._send()
 
     def _send(self) -> None:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
-            try:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as out:
                 while self._waiting:
                     out.sendto(self._waiting[0].encode(), self._address)
                     self._waiting.popleft()
-            except BlockingIOError:
-                states = [text for text in self._waiting if not text.startswith(_PASSING)]
-                self._waiting = deque(states, _MOST)
-            except OSError:
-                self._waiting.clear()
+        except OSError as error:
+            later = error.errno in _LATER
+            states = [text for text in self._waiting if later and not text.startswith(_PASSING)]
+            self._waiting = deque(states, _MOST)

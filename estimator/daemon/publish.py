@@ -76,11 +76,11 @@ class Publisher:
         with suppress(OSError):  # nobody else waits, or one has left already
             while True:
                 client, _ = self._listener.accept()
-                client.setblocking(False)
-                self._clients.append(client)
-        for surplus in self._clients[MAX_CLIENTS:]:
-            surplus.close()
-        del self._clients[MAX_CLIENTS:]
+                if len(self._clients) < MAX_CLIENTS:
+                    client.setblocking(False)
+                    self._clients.append(client)
+                else:
+                    client.close()
 
     def _send(self, line: bytes) -> None:
         for client in list(self._clients):

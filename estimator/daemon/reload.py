@@ -45,11 +45,16 @@ def carried(pipeline: Pipeline, state: State, before: Settings) -> State:
 
     The windows begin empty: what stands in them was read with another calibration. The estimate is kept where the soil
     section is the same, with the prior's uncertainty, because what made it certain was read with the old configuration;
-    a new soil section is a new prior. Counters, time and the encoders' baselines go on.
+    a new soil section is a new prior. Counters, time, the encoders' baselines, the place where the run began and what
+    effects remember go on.
     """
     fresh = pipeline.start()
     fresh.sync.continued(state.sync)
-    track = fresh.track._replace(updates=state.track.updates, resets=state.track.resets)
+    old = state.track
+    recall = {name: old.recall.get(name, value) for name, value in fresh.track.recall.items()}
+    carriage = [settings.channels["carriage_encoder"].calibration for settings in (before, pipeline.settings)]
+    origin = old.origin if carriage[0] == carriage[1] else None
+    track = fresh.track._replace(updates=old.updates, resets=old.resets, began=old.began, recall=recall, origin=origin)
     if pipeline.settings.soil == before.soil:
         track = _kept(track, state.track)
     return replace(fresh, track=track, pull=state.pull, first=state.first, late=state.late, jumps=state.jumps)

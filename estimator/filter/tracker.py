@@ -100,6 +100,7 @@ class TrackState(NamedTuple):
     resets: int = 0
     streak: int = 0  # resets in a row, after the first
     started: bool = False  # every required channel has filled a window once
+    origin: float | None = None  # where the carriage stood in the first full window [m]
 
     @property
     def consistency(self) -> float:
@@ -161,6 +162,7 @@ class Tracker:
             before=now if snapshot.ready else None,
             recall=recall,
             started=state.started or snapshot.ready,
+            origin=snapshot.carriage_position if state.origin is None and snapshot.ready else state.origin,
         )
 
     def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
@@ -287,14 +289,15 @@ class Tracker:
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
-    """What the effects may know beside the snapshot: time, present estimate, rates of change, their memory."""
+    """What the effects may know beside the snapshot: time, estimate, rates of change, their memory, the start."""
     before = state.before
     acceleration = sinking = 0.0
     if before is not None and elapsed > 0.0:
         acceleration = (snapshot.wheel_speed.value - before.read[0]) / elapsed
         sinking = (snapshot.sinkage.value - before.read[1]) / elapsed
     time = 0.0 if state.began < 0 else (snapshot.evaluated - state.began) / NS
-    return Context(time, *soil(state.estimate), acceleration, sinking, state.recall)
+    origin = snapshot.carriage_position if state.origin is None else state.origin
+    return Context(time, *soil(state.estimate), acceleration, sinking, state.recall, origin)
 
 
 def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:

@@ -131,8 +131,14 @@ class WriterThread:
         if self._thread.ident is None:  # never started
             self._attempt(self._finish)
         left = waited(lambda: not self._thread.is_alive(), timeout)
-        if not self._sync.stop(left) and self._state == "closed":
-            self._error = f"{self._parts.files[-1]}: the medium has not confirmed the last of it"
+        confirmed, path = self._sync.stop(left), self._parts.files[-1]
+        if self._state == "closed" and not confirmed:
+            self._error = f"{path}: the medium has not confirmed the last of it"
+        elif self._state == "closed":
+            try:
+                self._sync.raise_error(path)
+            except RecordingError as error:
+                self._error = str(error)
         return self.status()
 
     def _run(self) -> None:
@@ -315,11 +321,11 @@ class _Parts:
         run = replace(self._run, part=number, lost_before=lost)
         new = self._make(path, config_yaml=config_yaml or self._config, run=run)
         self._config = config_yaml or self._config
-        new.adopt(self.writer)
+        old, self.writer = self.writer, new
+        self.files.append(path)  # at once: whoever tidies the folder must know which file is open
+        new.adopt(old)
         with suppress(RecordingError):  # without an index it is readable still
-            self.writer.finish(self._sync)
-        self.writer = new
-        self.files.append(path)
+            old.finish(self._sync)
         self._sync_name(path)
 
     def _sync_name(self, path: Path) -> None:
@@ -364,7 +370,10 @@ class _Syncer:
         found = os.fstat(fileno)
         with self._lock:
             if (found.st_dev, found.st_ino) not in self._files:
-                self._files[found.st_dev, found.st_ino] = os.dup(fileno)  # the writer may close its own while we wait
+                try:  # the writer may close its own while we wait
+                    self._files[found.st_dev, found.st_ino] = os.dup(fileno)
+                except OSError as error:
+                    self._error = error
         self._wake.set()
 
     def raise_error(self, path: Path) -> None:

@@ -72,9 +72,17 @@ class DeviceClock:
         """Look at the samples of one chunk, then stamp them."""
         for time in sorted(times, reverse=True):
             self._observe(time, received)
-        newest = max(times, default=0)
-        end = (newest, self._mapped(newest, received))
+        end = self._squeezed(times, received)
         return [self._stamp(time, received, end) for time in times]
+
+    def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
+        """Device time and stamp of the chunk's newest sample where its oldest new one would be stamped before the last
+        chunk's: the line was pushed down below that."""
+        last = self._last
+        fresh = [time for time in times if last is not None and time > last[0]]
+        if last is None or not fresh or self._mapped(min(fresh), received) > last[1]:
+            return None
+        return max(fresh), self._mapped(max(fresh), received)
 
     def _unwrap(self, wrapped: int, received: int) -> int:
         """Device time without wraps [ns]: the turn of the clock nearest to where our own clock expects it."""
@@ -126,11 +134,10 @@ class DeviceClock:
     def _mapped(self, time: int, received: int) -> int:
         return min(time + self._origin + round(self._line(float(time - self._first))), received)
 
-    def _stamp(self, time: int, received: int, end: tuple[int, int]) -> int:
-        """end: device time and stamp of the chunk's newest sample."""
+    def _stamp(self, time: int, received: int, end: tuple[int, int] | None) -> int:
         stamp = self._mapped(time, received)
         if self._last is None or time > self._last[0]:
-            if self._last is not None and stamp <= self._last[1]:
+            if self._last is not None and end is not None:
                 stamp = _between(self._last, end, time)
             self._last = (time, stamp)
         elif time == self._last[0]:
@@ -139,8 +146,7 @@ class DeviceClock:
 
 
 def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
-    """A stamp after the last one where the line was pushed down below it: evenly up to the chunk's newest sample. Where
-    that lies below too, the last stamp again: a sample that claims a moment of its own would look like a jump."""
+    """A stamp between the last one and that of the chunk's newest sample, evenly: no sample may look like a jump."""
     return last[1] + max(end[1] - last[1], 0) * (time - last[0]) // (end[0] - last[0])
 
 

@@ -268,6 +268,15 @@ def test_slcan_junk_costs_no_other_message(slcan, junk):
     assert stats.state == "OPEN" and stats.reopened == 0
 
 
+def test_a_line_of_slcan_that_never_ends_is_dropped(slcan):
+    """As of a wrong baud rate: python-can would keep all of it."""
+    for _ in range(20):
+        slcan.plug.deliver(b"\x00" * 1000)
+        time.sleep(0.05)
+    assert wait_until(lambda: slcan.reader.stats().bad > 0)
+    assert len(slcan.reader._link._bus._buffer) <= 8192
+
+
 def test_slcan_unplugged_and_back_without_losing_a_descriptor(slcan):
     counts = []
     for _ in range(10):

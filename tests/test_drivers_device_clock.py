@@ -84,6 +84,18 @@ def test_stamps_grow_with_the_device_time():
         last = stamp
 
 
+def test_an_adapter_that_gets_quicker_makes_no_sample_jump():
+    """Chunks of 16 ms come 7 ms earlier than all before: the line is pushed down, below what was stamped already."""
+    clock, last, gaps = DeviceClock(), None, []
+    for number in range(200):
+        times = [0.016 * number + 0.001 * k for k in range(16)]
+        received = 0.016 * (number + 1) + (0.008 if number < 100 else 0.001)
+        for stamp in clock.stamps([device_us(t) for t in times], EPOCH + int(received * NS)):
+            gaps += [] if last is None else [stamp - last]
+            last = stamp
+    assert min(gaps) > 0.5e6 and max(gaps) < 1.1e6  # of 1 ms
+
+
 def test_samples_of_one_instant_get_one_stamp():
     clock = DeviceClock()
     assert len(set(clock.stamps([1000, 1000, 1000], EPOCH))) == 1

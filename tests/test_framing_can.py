@@ -244,6 +244,23 @@ def test_broken_dbc_is_one_clear_line(tmp_path: Path, text, expected):
     assert "broken.dbc" in str(error.value) and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("signals", "expected"),
+    [
+        ('SG_ Sequence m1 : 8|8@1+ (1,0) [0|0] "" X', "Node.Sequence is multiplexed"),
+        ('SG_ DeviceTime m1 : 32|24@1+ (4,0) [0|0] "us" X', "Node.DeviceTime is multiplexed"),
+        ('SG_ DeviceTime : 32|32@1+ (1,0) [0|0] "us" X', "Node.DeviceTime is a float"),
+    ],
+)
+def test_a_counter_that_is_not_an_integer_in_every_message_is_refused(tmp_path: Path, signals, expected):
+    path = tmp_path / "node.dbc"
+    kind = "SIG_VALTYPE_ 5 DeviceTime : 1;\n" if "float" in expected else ""
+    mux = 'SG_ Kind M : 0|8@1+ (1,0) [0|0] "" X\n SG_ Count m0 : 16|16@1+ (1,0) [0|0] "" X'
+    path.write_text(f'VERSION ""\nBU_: X\nBO_ 5 Node: 8 X\n {mux}\n {signals}\n\n{kind}')
+    with pytest.raises(DeviceSettingsError, match=f"{expected}; expected an integer in every message"):
+        framing(["Node.Count"], dbc=str(path))
+
+
 def test_neither_or_both_sources_of_signals_are_refused():
     with pytest.raises(DeviceSettingsError, match="neither dbc nor signals"):
         database(can_device(dbc=""))

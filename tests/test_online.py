@@ -106,3 +106,15 @@ def test_without_the_true_stresses_c_is_a_third_too_small(undisturbed):
 
 def test_motion_covers_what_separates():
     assert len(np.unique(np.round(np.asarray(MOTION.load)))) >= 3
+
+
+def test_a_counter_that_does_not_start_at_nought_is_no_place_on_the_bed():
+    """A run that begins where the one before ended: what acts along the path begins with the run."""
+    effect = typical(EFFECTS["running_in"])
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
+    settings = replace(SETTINGS, effects=(*SETTINGS.effects, configure(effect)))
+    moved = [r._replace(value=r.value + 50_000) if r.channel == "carriage_encoder" else r for r in readings]
+    first, second = last_tick(settings, readings), last_tick(settings, moved)
+    assert second["carriage_position"] > first["carriage_position"] + 0.5
+    for quantity in ("cohesion", "tan_phi"):
+        assert abs(second[quantity] - first[quantity]) < 1e-3 * first[f"{quantity}_sigma"], quantity

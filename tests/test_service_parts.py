@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -85,6 +86,21 @@ def test_a_state_is_told_again_to_a_manager_that_was_behind(manager):
     notifier.tell(notify.READY)
     taken = drained(listener)
     assert 0 < len(taken) < 1000 and set(taken) == {b"WATCHDOG=1"}
+    notifier.tell(notify.WATCHDOG)
+    assert drained(listener) == [b"READY=1", b"WATCHDOG=1"]
+
+
+def test_a_state_is_told_again_after_a_want_of_descriptors(manager, monkeypatch):
+    listener, environment = manager
+    notifier = Notifier(environment)
+
+    def none_left(*_):
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(notify.socket, "socket", none_left)
+        notifier.tell(notify.READY)
+        notifier.tell(notify.WATCHDOG)
     notifier.tell(notify.WATCHDOG)
     assert drained(listener) == [b"READY=1", b"WATCHDOG=1"]
 

@@ -318,6 +318,21 @@ def short_recording(folder, seed):
     return daemon.path()
 
 
+def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
+    """What was in it is gone; what comes goes into a new part, and the log says so."""
+    with service(tmp_path, driven(40.0, 1, skip=1.0)) as (_, daemon):
+        time.sleep(1.5)
+        daemon.path().unlink()
+        daemon.heard("logging to", 2)
+        time.sleep(1.0)
+        daemon.stop()
+    (part,) = tmp_path.glob("run-*.mcap")
+    recording = read(part)
+    assert recording.complete and any("deleted while it was written" in line for line in log_lines(part))
+    figure("open part deleted", WIRES, "seconds in the part after it", len(recording.arrays("/tick")) / 250, "s")
+    assert verified(part)
+
+
 # --- SIGTERM ----------------------------------------------------------------------------------------------------------
 
 

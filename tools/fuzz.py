@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, cycle
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from drivers.framing_cobs import CobsFraming
 from drivers.framing_cobs import encode as encode_cobs
 from estimator import config
 from estimator.config import ConfigError
+from estimator.filter.tracker import ENGINES
 from estimator.pipeline import Pipeline, State
 from estimator.readings import Reading
 from estimator.record import TICK_NAMES
@@ -245,14 +246,16 @@ WILD = (0.0, -0.0, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 1e-9, 5
 
 def wild_inputs(_: Path) -> Case:
     """Twelve ticks of anything: values, stamps, orders, gaps. Estimates stay finite, sure of nothing false, in bounds.
+    The engines take turns.
 
     One run in four goes on from the one before, so that the filter is met in every state it can be brought into.
     """
     settings = quick(config.load(packaged()).settings)
-    pipeline = Pipeline(settings, "plain")
+    pipelines = cycle(Pipeline(settings, engine) for engine in ENGINES)
     running: list[tuple[State, int]] = []
 
     def case(rng: random.Random) -> str:
+        pipeline = next(pipelines)
         state, t = running.pop() if running and rng.random() < 0.25 else (pipeline.start(), START)
         sane = rng.random() < 0.7  # mostly plausible with wild ones in between: those get furthest
         for number in range(12):

@@ -17,7 +17,7 @@ import tempfile
 import time
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
@@ -29,18 +29,23 @@ import numpy as np
 from config import packaged
 from estimator import config
 from estimator.daemon.ending import Ending
+from estimator.filter.tracker import ENGINES
 from estimator.pipeline import Pipeline
 from estimator.readings import ENCODERS, Reading
 from estimator.record import TICK_NAMES
-from estimator.settings import Rates
+from estimator.settings import Rates, Settings
 from estimator.sync import NS
+from tools import plant
 from tools.cli import guarded
 from tools.command import DONE, FAILED, Parser
 from tools.demo import Child
+from tools.schedule import motion_of
+from tools.simulate import readings
 from tools.status import connected, reports
-from tools.testbed import PLAYED, experiment
+from tools.testbed import PLAYED
 
-LAP = 300.0  # [s] the simulated run that is driven again and again
+LAP = 300.0  # [s] a simulated run, driven again and again
+NOISES = 12  # of it: every lap has other noise than the eleven before
 SLOPE = 1.0  # [MB/h] largest growth of memory
 PREPARED, READY = 1200.0, 120.0  # [s] the longest it may take to simulate the run, and to open the devices
 DRAINED = 1.0  # [s] in which the daemon takes what is still on the wires
@@ -58,6 +63,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--tick", type=float, default=20.0, help="ticks a simulated second; default 20")
     parser.add_argument("--thin", type=int, default=5, help="of the readings of 250 Hz take one in so many; default 5")
+    parser.add_argument(
+        "--engine", choices=tuple(ENGINES), default="filterpy", help="of the pipeline; default filterpy"
+    )
     parser.add_argument("--minutes", type=float, default=60.0, help="of the daemon on wires; default 60, 0: none")
     parser.add_argument("--busy", type=int, default=2, help="busy processes beside the daemon; default 2")
     parser.add_argument(
@@ -77,28 +85,41 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def simulated(arguments: Namespace) -> list[str]:
     """Laps of the simulated testbed, one after the other without a pause; what was not right."""
-    configuration = config.load(packaged())
-    settings = replace(configuration.settings, effects=(), rates=Rates(tick=arguments.tick))  # of the linear plant
-    pipeline = Pipeline(settings, "plain")
+    settings = config.load(packaged()).settings
+    pool = [thinned(lap, arguments.thin) for lap in driven(settings, arguments.seed)]
+    settings = replace(settings, effects=(), rates=Rates(tick=arguments.tick))  # of the linear plant
+    pipeline = Pipeline(settings, arguments.engine)
     state, began, memory, ticks = pipeline.start(), time.monotonic(), [], 0
     unfit = 0
-    lap = thinned(experiment(configuration, LAP, "linear", arguments.seed).run.readings, arguments.thin)
-    for number, readings in enumerate(laps(lap, arguments.hours, round(NS / arguments.tick))):
-        for stamp, batch in readings:
+    for number, batches in enumerate(laps(pool, arguments.hours, round(NS / arguments.tick))):
+        for stamp, batch in batches:
             state, record = pipeline.step(state, batch, stamp)
             unfit += not all(math.isfinite(record[place]) for place in READ)
             ticks += 1
         memory.append((number * LAP / 3600.0, resident(os.getpid())))
+        if (number + 1) % NOISES == 0:
+            print(f"{(number + 1) * LAP / 3600.0:.0f} h of {arguments.hours:g}", end="\r", file=sys.stderr, flush=True)
     slope = growth(memory)
     found = dict(zip(TICK_NAMES, record, strict=True))
     print(
-        f"pipeline: {ticks} ticks of {arguments.tick:g} Hz, one reading in {arguments.thin}, {number + 1} laps of"
-        f" {LAP / 60:g} min ({(number + 1) * LAP / 3600:.1f} h simulated), in {time.monotonic() - began:.0f} s,"
-        f" {unfit} ticks without a finite estimate, {found['updates']} updates, {found['resets']} resets,"
-        f" memory {memory[-1][1]:.1f} MB, {slope:+.3f} MB per simulated hour",
+        f"pipeline ({arguments.engine}): {ticks} ticks of {arguments.tick:g} Hz, one reading in {arguments.thin},"
+        f" {number + 1} laps of {LAP / 60:g} min ({(number + 1) * LAP / 3600:.1f} h simulated), {len(pool)} noises,"
+        f" in {time.monotonic() - began:.0f} s, {unfit} ticks without a finite estimate, {found['updates']} updates,"
+        f" {found['resets']} resets, memory {memory[-1][1]:.1f} MB, {slope:+.3f} MB per simulated hour",
         flush=True,
     )
-    return [f"{unfit} unfit ticks"] * bool(unfit) + [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE)
+    wrong = [f"{unfit} unfit ticks"] * bool(unfit) + [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE)
+    return wrong + [f"{found['resets']} false resets"] * bool(found["resets"])
+
+
+def driven(settings: Settings, seed: int) -> Iterator[list[Reading]]:
+    """The same lap on the same soil, with noise of its own each time."""
+    soil = plant.drawn_soil(settings, np.random.default_rng(seed))
+    motion = motion_of(plant.schedule(LAP), settings.wheel.radius, settings.rates.tick)
+    response = plant.linear_response(settings, soil, motion)
+    for number in range(NOISES):
+        print(f"noise {number + 1} of {NOISES}", end="\r", file=sys.stderr, flush=True)
+        yield readings(settings, motion, response, np.random.default_rng((seed, number)))
 
 
 def thinned(readings: Sequence[Reading], by: int) -> list[Reading]:
@@ -112,18 +133,20 @@ def thinned(readings: Sequence[Reading], by: int) -> list[Reading]:
     return kept
 
 
-def laps(lap: Sequence[Reading], hours: float, period: int) -> Iterator[Iterator[tuple[int, list[Reading]]]]:
+def laps(pool: Sequence[Sequence[Reading]], hours: float, period: int) -> Iterator[Iterator[tuple[int, list[Reading]]]]:
     """(tick time, readings) of lap after lap: stamps go on, and so do the encoders' counts."""
-    length = max(reading.received for reading in lap) - lap[0].received + period
-    turned = {name: [r.value for r in lap if r.channel == name][-1] for name in ENCODERS}
-    ordered = sorted(lap, key=lambda reading: reading.received)
+    by, turned = 0, Counter(dict.fromkeys(ENCODERS, 0))
+    ordered = [sorted(lap, key=lambda reading: reading.received) for lap in pool]
     for number in range(max(1, round(hours * 3600.0 / LAP))):
-        moved = (later(r, number * length, {name: number * by for name, by in turned.items()}) for r in ordered)
+        lap, done = ordered[number % len(ordered)], dict(turned)
+        moved = (later(reading, by, done) for reading in lap)
         ticks = groupby(moved, key=lambda reading: -(-reading.received // period) * period)
         yield ((stamp, list(batch)) for stamp, batch in ticks)
+        by += lap[-1].received - lap[0].received + period
+        turned.update({name: next(r.value for r in reversed(lap) if r.channel == name) for name in ENCODERS})
 
 
-def later(reading: Reading, by: int, turned: dict[str, Any]) -> Reading:
+def later(reading: Reading, by: int, turned: Mapping[str, Any]) -> Reading:
     value = reading.value + turned[reading.channel] if reading.channel in turned else reading.value
     return reading._replace(stamp=reading.stamp + by, received=reading.received + by, value=value)
 

@@ -230,6 +230,10 @@ class RunWriter:
         """Close the file as it is, without an index. Nothing already written is lost."""
         self._file.abandon()
 
+    def expect(self, size: int) -> None:
+        """Prepare for chunks of up to so many bytes."""
+        self._file.expect(size)
+
     def adopt(self, other: RunWriter) -> None:
         """Take over what `other` could not write, and its numbering; both must have been made with the same topics and
         the same compression."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import os
+import random
 import struct
 import zlib
 from collections import Counter
@@ -150,6 +151,10 @@ class McapFile:
 
     def fileno(self) -> int:
         return self._file.fileno()
+
+    def expect(self, size: int) -> None:
+        """Let the compressor take now what chunks of up to so many bytes ask of it, not by and by for hours."""
+        self._compress(random.Random(size).randbytes(size))
 
     def adopt(self, other: McapFile) -> None:
         """Take over the compressor of a file that is about to be closed: its half megabyte stays where it is."""

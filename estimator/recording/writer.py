@@ -30,6 +30,7 @@ from estimator.recording.mcapfile import RecordingError, sync
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
+LARGEST = 1 << 17  # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
 RETRY = 1.0  # [s] between attempts at a disk that failed
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -308,6 +309,7 @@ class _Parts:
         self._config = config_yaml
         self._make = partial(RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize)  # see _flush
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
+        self.writer.expect(LARGEST)
         self.files = [path]
         self._sync_name(path)
 

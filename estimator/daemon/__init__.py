@@ -132,6 +132,7 @@ class Daemon:
         ]
         self.model = Watch()  # whether model and measurement agree
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
+        self.deleted: list[Path] = []  # parts that somebody deleted while they were written, not yet told
         self._part_began = time.monotonic()
         self._ending, self._loop_stop = Ending(), Event()
         self._failure = ""
@@ -227,7 +228,7 @@ class Daemon:
             return
         size, longest = _size(status.files[-1]), min(logging.part_time, MAX_CHUNKS * logging.flush_interval)
         if size is None:
-            self.say(WARNING, f"{status.files[-1]}: deleted while it was written; a new part begins")
+            self.deleted.append(status.files[-1])
         if size is None or size > logging.part_size or age > longest:
             self.loop.ask(Change(self.configuration.text))
             self._part_began = time.monotonic()

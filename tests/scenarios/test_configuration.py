@@ -132,7 +132,7 @@ def test_the_same_file_again_changes_nothing(tmp_path, figure):
 
 MISREAD = {
     "unsafe tag": ("testbed: !!python/object/apply:os.system [id]", "tag"),
-    "duplicate key": ("testbed: a\ntestbed: b", "twice"),
+    "duplicate key": ("testbed: a\ntestbed: b", "expected each key once"),
     "1e3 as text": (TESTBED.text.replace("gate: 5.0", "gate: 1e3"), "reads as text"),
     "no as false": (TESTBED.text.replace("compression: zstd", "compression: no"), "false"),
     "NaN": (TESTBED.text.replace("gate: 5.0", "gate: .nan"), "found .nan"),

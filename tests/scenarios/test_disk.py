@@ -328,7 +328,7 @@ def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
         daemon.stop()
     (part,) = tmp_path.glob("run-*.mcap")
     recording = read(part)
-    assert recording.complete and any("deleted while it was written" in line for line in log_lines(part))
+    assert recording.complete and any("was deleted while it was written" in line for line in log_lines(part))
     figure("open part deleted", WIRES, "seconds in the part after it", len(recording.arrays("/tick")) / 250, "s")
     assert verified(part)
 

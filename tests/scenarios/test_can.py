@@ -122,12 +122,13 @@ def test_bus_flood(tmp_path, seed, rate, seconds, figure):
     """Unwanted frames between the wanted ones: paced, none of those is lost; in a burst every loss is counted."""
     with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
-        flood(wires.bus._bus, rate, seconds)
+        sent = flood(wires.bus._bus, rate, seconds)
         time.sleep(0.5)
         lost, no_room = daemon.status()["devices"]["bus"]["lost"], dropped(wires, daemon)
         daemon.stop()
     gaps = missing_samples(rows(daemon.path(), "/raw/sinkage_pot")["stamp"])
     name = f"wanted frames lost at {rate / 1000:g} k unwanted frames/s"
+    figure(FLOOD, WIRES, f"unwanted frames really sent, of {rate / 1000:g} k/s", sent / seconds / 1000, "k/s")
     figure(FLOOD, WIRES, name, lost, "", 0 if rate <= 5000 else None, real=True)
     figure(FLOOD, WIRES, f"{name} without the kernel's doing", max(lost - no_room, 0), "", 0)
     assert gaps <= max(lost, no_room), f"{gaps} samples missing, {lost} frames counted as lost"
@@ -135,15 +136,16 @@ def test_bus_flood(tmp_path, seed, rate, seconds, figure):
 
 
 def flood(bus, rate, seconds):
-    """Frames of an id that nobody wants, in packets of 5 ms; time that the sender lost is not made up for."""
+    """Frames of an id that nobody wants, in packets of 5 ms; time that the sender lost is not made up for. How many."""
     message = can.Message(arbitration_id=UNWANTED, data=bytes(8), is_extended_id=False)
-    end, before, due = time.monotonic() + seconds, time.monotonic(), 0.0
+    end, before, due, sent = time.monotonic() + seconds, time.monotonic(), 0.0, 0
     while (now := time.monotonic()) < end:
         due, before = due + min(now - before, 0.02) * rate, now
         while due >= 1.0:
             bus.send(message)
-            due -= 1.0
+            due, sent = due - 1.0, sent + 1
         time.sleep(0.005)
+    return sent
 
 
 def missing_samples(stamps):

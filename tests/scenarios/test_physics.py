@@ -26,7 +26,7 @@ DRIVING = (3.0, 70.0, 0.3)
 def estimate_moved(ticks, status):
     """Ticks of this status, and how much the estimate moves over them, in σ."""
     held = [t for t in ticks if t["status"] == status]
-    moved = max(abs(t["cohesion"] - held[0]["cohesion"]) / t["cohesion_sigma"] for t in held)
+    moved = max(abs(t[x] - held[0][x]) / t[f"{x}_sigma"] for t in held for x in ("cohesion", "tan_phi"))
     return held, moved
 
 
@@ -34,7 +34,7 @@ def test_wheel_in_the_air(seed, figure):
     _, ticks = run(RIG, TRUTH, [DRIVING, (3.0, 2.0, 0.3), DRIVING], seed)
     held, moved = estimate_moved(ticks, Status.IN_AIR)
     assert len(held) > 20 and not any(t["torque_accepted"] for t in held)
-    figure(AIR, PLANT, "movement of c while in the air", moved, "σ", 0)
+    figure(AIR, PLANT, "movement of c and tan φ while in the air", moved, "σ", 0)
 
 
 def test_zero_slip(seed, figure):
@@ -60,6 +60,28 @@ def test_negative_slip(seed, figure):
         assert sum(t["status"] == Status.BRAKING for t in ticks) > 20
         accepted += sum(t["torque_accepted"] for t in ticks[32:])  # from the first whole window on
     figure(NEGATIVE, PLANT, "updates accepted while braking", accepted, "", 0)
+
+
+@pytest.mark.parametrize("slip", [-0.5, -0.8, -1.0])
+def test_dragged(seed, slip, figure):
+    """Beyond the closed forms, to a locked wheel: the encoder's steps of a braked run made smaller."""
+    pipeline = Pipeline(RIG, "plain")
+    state, ticks, slower = pipeline.start(), [], {}
+    for number, (t, batch) in enumerate(readings(RIG, TRUTH, [DRIVING, (3.0, 70.0, -0.3)], seed=seed)):
+        if number >= 30:
+            batch = [slowed(r, (1.0 + slip) * 1.3, slower) for r in batch]
+        state, tick = pipeline.step(state, batch, t)
+        ticks.append(dict(zip(TICK_NAMES, tick, strict=True)))
+    assert ticks[-1]["slip"] == pytest.approx(slip, abs=0.02)
+    accepted = sum(t["torque_accepted"] or t["drawbar_pull_accepted"] for t in ticks[32:])
+    figure(NEGATIVE, PLANT, f"updates accepted at a slip of {slip:g}", accepted, "", 0)
+
+
+def slowed(reading, factor, turning):
+    if reading.channel != "wheel_encoder":
+        return reading
+    at = turning.setdefault(reading.channel, reading.value)
+    return reading._replace(value=at + round((reading.value - at) * factor))
 
 
 def test_reverse_driving(seed, figure):
@@ -97,7 +119,7 @@ def test_stall(seed, kind, figure):
     held, moved = estimate_moved(ticks, Status.STALL)
     assert len(held) > 10
     figure(STALL, PLANT, f"{kind}: until it is classified", noticed, "s", 0.5)
-    figure(STALL, PLANT, "movement of c meanwhile", moved, "σ", 0)
+    figure(STALL, PLANT, "movement of c and tan φ meanwhile", moved, "σ", 0)
 
 
 def stalled(seed, kind):

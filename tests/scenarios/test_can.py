@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 import socket
 import time
+from dataclasses import replace
+from threading import Event
 
 import can
 import pytest
@@ -12,6 +14,8 @@ import pytest
 from drivers.build import build_decoder
 from drivers.can_link import CanLink
 from drivers.errors import DeviceError
+from drivers.queue import ReadingQueue
+from drivers.reader import Reader
 from estimator.settings import Device
 from tests.drivers_rig import Ticking
 from tests.scenarios.rig import TESTBED, WIRES, driven, rows, service, verified
@@ -177,3 +181,36 @@ def test_a_bus_whose_recv_raises_is_one_device_error(error, figure):
         link.read()
     link.close()
     figure(FAILING, "CAN link, bus-off simulated by a bus that raises", "exceptions that reach the reader", 0, "", 0)
+
+
+class Quiet:
+    """A bus on which nothing is said."""
+
+    def recv(self, timeout):
+        time.sleep(timeout)
+
+    def shutdown(self):
+        pass
+
+
+@pytest.mark.parametrize("error", FAILURES)
+def test_a_bus_that_raises_is_opened_again(error, monkeypatch, figure):
+    """Half a second long every bus that is opened fails; then one does not."""
+    works, back = time.monotonic() + 0.5, Event()
+
+    def bus(*_, **__):
+        if time.monotonic() < works:
+            return Raising(error)
+        back.set()
+        return Quiet()
+
+    monkeypatch.setattr(can, "Bus", bus)
+    device = TESTBED.settings.devices["bus"]
+    link = CanLink(replace(device, interface="socketcan", channel="can0"), [], time.time_ns)
+    reader = Reader("bus", link, build_decoder(TESTBED.settings, device), ReadingQueue())
+    reader.start()
+    assert back.wait(60.0)
+    took = time.monotonic() - works
+    assert reader.alive and reader.stop(60.0) and reader.stats().reopened >= 1
+    level = "reader and CAN link, bus-off simulated by a bus that raises"
+    figure(FAILING, level, "back after the bus worked again", took, "s", 5.5, real=True)

@@ -12,12 +12,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from threading import Thread
 
+import numpy as np
 import pytest
 
+from estimator.daemon.publish import MAX_CLIENTS
 from estimator.recording.salvage import read
-from tests.scenarios.rig import LIMIT, ROOT, WIRES, DaemonProcess, Wires, driven, service, verified
+from tests.scenarios.rig import LIMIT, ROOT, WIRES, DaemonProcess, Wires, driven, rows, service, verified
+from tools.command import CommandError
+from tools.status import connected, reports
 
 
 def test_second_instance(tmp_path, seed, figure):
@@ -74,6 +80,30 @@ def test_somebody_does_not_read(tmp_path, figure):
     recording = read(path)
     assert recording.complete and recording.counts["/tick"] > 100
     figure("nobody listens", f"{WIRES}, a full pipe", "exit code after SIGTERM", 0, "", 0)
+
+
+def test_watchers_do_not_slow_the_loop(tmp_path, seed, figure):
+    """Nobody watches, then as many as are let in and as many again, of whom half never read."""
+    with ExitStack() as watching, service(tmp_path, driven(40.0, seed, skip=1.0)) as (_, daemon):
+        time.sleep(3.0)
+        began = daemon.status()["loop"]["stamp"]
+        for number in range(2 * MAX_CLIENTS):
+            client = watching.enter_context(connected(daemon.socket))
+            if number % 2:
+                Thread(target=read_on, args=(client,), daemon=True).start()
+        time.sleep(3.0)
+        daemon.stop()
+    loop = rows(daemon.path(), "/loop")
+    for name, some in (("nobody watches", loop["stamp"] < began), ("32 ask for reports", loop["stamp"] > began)):
+        late = np.quantile(loop["lateness"][some], 0.99) * 1e3
+        figure("watchers", WIRES, f"lateness, 99 %, while {name}", late, "ms")
+    assert verified(daemon.path())
+
+
+def read_on(client):
+    with suppress(CommandError, OSError):
+        for _ in reports(client):
+            pass
 
 
 as_root = pytest.mark.skipif(

@@ -37,11 +37,18 @@ first_boot() {
   systemd-analyze security gritd --no-pager | tail -1
 
   say "start"
+  grep -E "ttyUSB|ttyACM" /proc/devices
   systemctl start gritd
   echo "exit $?, $(systemctl is-active gritd)"
   python3 /root/in_guest_player.py > /root/player.log 2>&1 &
   settled
   sleep 25
+
+  say "a USB serial adapter (FTDI, emulated): its name, its latency [ms], and the drivers that the unit asked for"
+  udevadm settle
+  ls /dev/gritd
+  cat /sys/bus/usb-serial/devices/ttyUSB0/latency_timer
+  grep -E "ttyUSB|ttyACM" /proc/devices
 
   say "systemctl status"
   systemctl status gritd --no-pager -l | head -10
@@ -126,6 +133,18 @@ first_boot() {
   settled
   journal | grep -E "Watchdog|Killing|Scheduled restart|Started" | tail -4
   echo "was $old, is $(pid), restarts $(systemctl show -p NRestarts --value gritd)"
+  sleep 10
+
+  say "a wrong configuration at start: not tried again"
+  cp /etc/gritd/config.yaml /root/good
+  echo "rates: {tick: no}" >> /etc/gritd/config.yaml
+  systemctl restart gritd
+  sleep 20
+  echo "$(systemctl is-active gritd): $(systemctl show -p Result,ExecMainStatus,NRestarts gritd | xargs)"
+  cp /root/good /etc/gritd/config.yaml
+  systemctl start gritd
+  settled
+  systemctl is-active gritd
   sleep 10
 
   say "stop"

@@ -8,12 +8,14 @@ import select
 import sys
 from collections.abc import Sequence
 from math import degrees
+from threading import Thread
 from typing import TextIO
 
 from drivers.queue import ReadingQueue
 from drivers.reader import Reader, ReaderStats
-from estimator.config import load
+from estimator.config import Configuration, load
 from estimator.daemon import INFO, WARNING, WATCH, Daemon, DaemonError, notify
+from estimator.daemon.loop import Change
 from estimator.daemon.notify import Notifier
 from estimator.daemon.publish import Publisher
 from estimator.record import TICK_NAMES, Flag, Status
@@ -39,6 +41,8 @@ class Watcher:
         self._dropped, self._overflowing, self._unconfirmed = 0, False, False
         self._calls = 0
         self._ready = self._reload_asked = False
+        self._loading: Thread | None = None  # of a configuration
+        self._loaded: str | tuple[Configuration, Change | None] = ""  # what it found
 
     def ask_reload(self) -> None:
         """At the next call; may be called from a signal handler."""
@@ -50,9 +54,12 @@ class Watcher:
         self._follow_queue(daemon)
         self._follow_writer(daemon)
         self._follow_health(daemon)
-        if self._reload_asked:
+        if self._reload_asked and self._loading is None:
             self._reload_asked = False
-            self._reload(daemon)
+            self._begin_reload(daemon)
+        if self._loading is not None and not self._loading.is_alive():
+            self._loading = None
+            self._end_reload(daemon)
         if self._due(TIDY):
             self._tidy(daemon)
         self._notify(daemon)
@@ -126,14 +133,30 @@ class Watcher:
 
     # --- what is done ---------------------------------------------------------------------------------------------
 
-    def _reload(self, daemon: Daemon) -> None:
-        """Read the configuration again; a bad one changes nothing."""
+    def _begin_reload(self, daemon: Daemon) -> None:
+        """Read the configuration again, from a thread: the watchdog is stroked meanwhile."""
         self._notifier.tell(notify.reloading())
+        self._loading = Thread(target=self._load, args=(daemon,), name="reload", daemon=True)
+        self._loading.start()
+
+    def _load(self, daemon: Daemon) -> None:
         try:
-            daemon.reload(load(self._config))
-            self._tell(daemon, INFO, f"{self._config}: reloaded")
+            configuration = load(self._config)
+            self._loaded = configuration, daemon.change_to(configuration)
         except (ConfigError, DaemonError) as error:
-            self._tell(daemon, WARNING, f"{error}; the old configuration is kept")
+            self._loaded = str(error)
+        except Exception as error:  # a fault of ours must not leave the manager waiting
+            self._loaded = f"{self._config}: {type(error).__name__}: {error}"
+
+    def _end_reload(self, daemon: Daemon) -> None:
+        """Take over what was read; a bad one changes nothing."""
+        if isinstance(self._loaded, str):
+            self._tell(daemon, WARNING, f"{self._loaded}; the old configuration is kept")
+        else:
+            configuration, change = self._loaded
+            if change is not None:
+                daemon.reload(configuration, change)
+            self._tell(daemon, INFO, f"{self._config}: {'reloaded' if change else 'unchanged'}")
         self._notifier.tell(notify.READY)
 
     def _tidy(self, daemon: Daemon) -> None:

@@ -147,17 +147,21 @@ class Daemon:
         now = self.clock.now()
         self.writer.put((), [(LOG_TOPIC.name, now, (now, level, "gritd", text, "", "", 0))])
 
-    def reload(self, configuration: Configuration) -> None:
-        """Go on with another configuration from the next tick, in a new part of the recording; with the same, nothing.
+    def change_to(self, configuration: Configuration) -> Change | None:
+        """What goes on with another configuration, made ready; None where it is the same. It may take a second.
 
-        Raises DaemonError, and nothing has changed, where that needs a restart.
+        Raises DaemonError where that needs a restart.
         """
         if configuration.text == self.configuration.text:
-            return
+            return None
         fixed = needs_restart(self.configuration.settings, configuration.settings)
         if fixed:
             raise DaemonError(f"{configuration.source}: {fixed}: changed, which needs a restart")
-        self.loop.ask(Change(configuration.text, Pipeline(settings_for(configuration.settings, self.run))))
+        return Change(configuration.text, Pipeline(settings_for(configuration.settings, self.run)))
+
+    def reload(self, configuration: Configuration, change: Change) -> None:
+        """Go on with it from the next tick, in a new part of the recording."""
+        self.loop.ask(change)
         self.configuration = configuration
         self._part_began = time.monotonic()
 

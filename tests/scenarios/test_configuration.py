@@ -119,10 +119,10 @@ def test_the_same_file_again_changes_nothing(tmp_path, figure):
     with service(tmp_path, driven(40.0, 1, skip=1.0)) as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5)
         daemon.signal(signal.SIGHUP)
-        daemon.heard("reloaded")
+        daemon.heard("unchanged")
         wires.config.write_text("# looked at\n" + wires.config.read_text())
         daemon.signal(signal.SIGHUP)
-        daemon.heard("reloaded", 2)
+        daemon.heard("unchanged", 2)
         time.sleep(0.5)
         daemon.stop()
     parts = len(recordings(daemon.path())) - 1

@@ -81,10 +81,7 @@ def _object(plain: Any, depth: int = 0) -> Any:
 def _build(kind: Any, values: list[Any]) -> Any:
     if not hasattr(kind, _FIELDS):
         return kind(*values)
-    names = _field_names(kind)
-    if len(values) > len(names):
-        raise ValueError(f"{kind.__name__} has {len(names)} fields")
-    return kind(**dict(zip(names, values, strict=False)))  # an older state may lack the last ones
+    return kind(**dict(zip(_field_names(kind), values, strict=True)))
 
 
 def _field_names(kind: Any) -> list[str]:

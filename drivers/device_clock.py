@@ -28,8 +28,8 @@ RESET_STEP = 500_000_000  # [ns] a device clock going back by this much, or forw
 class DeviceClock:
     """Stamps for the frames of one device clock that wraps at `modulus_us` µs.
 
-    A stamp is never later than the receive time, and never goes back while the device time goes on. What remains is the
-    smallest delay of the last 20 s, a constant that belongs into the channel's latency.
+    A stamp is never later than the receive time and grows with the device time. What remains is the smallest delay of
+    the last 20 s, a constant that belongs into the channel's latency.
     """
 
     _newest: int  # latest device time [ns], unwrapped
@@ -138,7 +138,7 @@ class DeviceClock:
         stamp = self._mapped(time, received)
         if self._last is None or time > self._last[0]:
             if self._last is not None and end is not None:
-                stamp = _between(self._last, end, time)
+                stamp = min(max(_between(self._last, end, time), self._last[1] + 1), received)
             self._last = (time, stamp)
         elif time == self._last[0]:
             stamp = self._last[1]
@@ -147,7 +147,7 @@ class DeviceClock:
 
 def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
     """A stamp between the last one and that of the chunk's newest sample, evenly: no sample may look like a jump."""
-    return last[1] + max(end[1] - last[1], 0) * (time - last[0]) // (end[0] - last[0])
+    return last[1] + (end[1] - last[1]) * (time - last[0]) // (end[0] - last[0])
 
 
 def hull_slope(points: Sequence[Point]) -> float:

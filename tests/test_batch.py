@@ -56,6 +56,8 @@ def rough(rng, seconds=1.2):
     jumps = {int(rng.integers(0, seconds * NS)): int(rng.integers(-(2**40), 2**40)) for _ in range(3)}
     freeze = int(rng.integers(0, seconds * NS))
     absent = rng.random(6) < 0.1  # axes that the sensor does not have
+    ices = int(rng.integers(0, 2 * seconds * NS))  # in one run of two the wrench does
+    held = tuple(np.where(absent, np.nan, 20.0).tolist())
     found = []
     for reading in steady:
         since = reading.stamp - START
@@ -66,6 +68,8 @@ def rough(rng, seconds=1.2):
         elif rng.random() < 0.01:
             bad = float(rng.choice([np.nan, np.inf, -1e9]))
             reading = reading._replace(value=(bad,) * 6 if reading.channel == "wrench" else bad)
+        elif reading.channel == "wrench" and since > ices:
+            reading = reading._replace(value=held)
         elif reading.channel == "wrench":
             axes = zip(reading.value, absent, strict=True)
             reading = reading._replace(value=tuple(float("nan") if none else value for value, none in axes))

@@ -113,6 +113,17 @@ def test_counters_time_and_baselines_go_on_through_a_reload(consumed):
     assert after.track.origin is not None
 
 
+def test_the_place_where_the_run_began_is_read_anew_with_the_carriage_calibration(consumed):
+    pipeline = Pipeline(SETTINGS)
+    moved = [(t, [r._replace(value=r.value + 5000) if "carriage" in r.channel else r for r in b]) for t, b in consumed]
+    state, _ = run(pipeline, pipeline.start(), moved[:100])
+    channel = SETTINGS.channels["carriage_encoder"]
+    larger = replace(channel.calibration, scale=Uncertain(channel.calibration.scale.value * 1.01, 0.0))
+    other = Pipeline(changed(channels={**SETTINGS.channels, "carriage_encoder": replace(channel, calibration=larger)}))
+    after = carried(other, state, pipeline.settings)
+    assert state.track.origin > 0.05 and after.track.origin == pytest.approx(1.01 * state.track.origin)
+
+
 @pytest.mark.parametrize(
     ("section", "value", "key"),
     [

@@ -233,8 +233,6 @@ APPENDED = [
         "found off, which YAML reads as false; expected one of zstd",
     ),
     ("logging: {directory: }", "logging.directory", "found nothing"),
-    ("logging: {disk_cap: 400 MB}", "logging.disk_cap", "twice logging.part_size or more"),
-    ("logging: {part_size: unlimited, disk_cap: 400 MB}", "logging.disk_cap", "twice logging.part_size or more"),
     ("effects: {bulldozing: [1]}", "effects.bulldozing", "a mapping of parameters"),
     ("effects: {bulldozing: {share: 1 parsec}}", "effects.bulldozing.share", "unknown unit"),
     ("effects: {stress_linearisation: {share: 7}}", "effects.stress_linearisation.share", "found 7; expected a number"),

@@ -359,7 +359,6 @@ def _settings(channels: dict[str, Any], run: RunInfo | None, **values: Any) -> t
     settings = Settings(channels=known, wrench=wrench, **values)
     _check_channels(settings)
     _check_soil(settings)
-    _check_logging(settings)
     return settings, run or RunInfo()
 
 
@@ -387,10 +386,3 @@ def _check_soil(settings: Settings) -> None:
         value = getattr(soil, name).value
         if not low <= value <= high:
             raise Impossible(f"soil.{name}", f"a value inside filter.{name}_bounds", f"{value:g} (SI)")
-
-
-def _check_logging(settings: Settings) -> None:
-    """The cap leaves room for the open part, which is never deleted, and for the one before it."""
-    logging = settings.logging
-    if logging.disk_cap < 2.0 * logging.part_size and logging.disk_cap < inf:
-        raise Impossible("logging.disk_cap", "twice logging.part_size or more, or one part alone may fill it")

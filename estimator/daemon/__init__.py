@@ -134,6 +134,7 @@ class Daemon:
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
         self.deleted: list[Path] = []  # parts that somebody deleted while they were written, not yet told
         self._part_began = time.monotonic()
+        self._ending_part: Path | None = None  # which the writer was asked to end
         self._ending, self._loop_stop = Ending(), Event()
         self._failure = ""
         self._wall_offset = 0.0
@@ -228,14 +229,15 @@ class Daemon:
         """Ask for a new part when the present one is large or old, or gone."""
         logging, age = self.configuration.settings.logging, time.monotonic() - self._part_began
         status = self.writer.status()
-        if age < MIN_PART or status.state != "writing":
+        part = status.files[-1]
+        if age < MIN_PART or status.state != "writing" or part == self._ending_part:
             return
-        size, longest = _size(status.files[-1]), min(logging.part_time, MAX_CHUNKS * logging.flush_interval)
+        size, longest = _size(part), min(logging.part_time, MAX_CHUNKS * logging.flush_interval)
         if size is None:
-            self.deleted.append(status.files[-1])
-        if size is None or size > logging.part_size or age > longest:
+            self.deleted.append(part)
+        if size is None or size > min(logging.part_size, logging.disk_cap / 2.0) or age > longest:
             self.loop.ask(Change(self.configuration.text))
-            self._part_began = time.monotonic()
+            self._part_began, self._ending_part = time.monotonic(), part
 
     def _close(self, patience: float) -> WriterStatus:
         if self._failure:

@@ -52,12 +52,18 @@ def carried(pipeline: Pipeline, state: State, before: Settings) -> State:
     fresh.sync.continued(state.sync)
     old = state.track
     recall = {name: old.recall.get(name, value) for name, value in fresh.track.recall.items()}
-    carriage = [settings.channels["carriage_encoder"].calibration for settings in (before, pipeline.settings)]
-    origin = old.origin if carriage[0] == carriage[1] else None
+    origin = None if old.origin is None else _read_anew(old.origin, before, pipeline.settings)
     track = fresh.track._replace(updates=old.updates, resets=old.resets, began=old.began, recall=recall, origin=origin)
     if pipeline.settings.soil == before.soil:
         track = _kept(track, state.track)
     return replace(fresh, track=track, pull=state.pull, first=state.first, late=state.late, jumps=state.jumps)
+
+
+def _read_anew(position: float, before: Settings, now: Settings) -> float:
+    """A place of the carriage [m] by another calibration of its encoder."""
+    old, new = (settings.channels["carriage_encoder"].calibration for settings in (before, now))
+    count = (position / before.pulley_radius - old.offset.value) / old.scale.value
+    return (count * new.scale.value + new.offset.value) * now.pulley_radius
 
 
 def _kept(track: TrackState, old: TrackState) -> TrackState:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 
 from estimator.recording.blocks import Walk
@@ -10,17 +11,18 @@ from estimator.recording.mcapfile import DRAFT, RecordingError
 
 
 def sweep(folder: Path) -> list[Path]:
-    """Delete what a killed daemon had just begun: drafts, without a message in them. Raises OSError.
+    """Delete what a killed daemon had just begun: drafts, without a message in them.
 
     A draft with messages had its name, and a power cut took it back: it gets it again. Those are returned.
     """
     found = []
     for draft in sorted(folder.glob(f".*.mcap{DRAFT}")):
         path = draft.with_name(draft.name[1:].removesuffix(DRAFT))
-        if not _messages(draft):
-            draft.unlink()
-        elif not path.exists():
-            found.append(draft.rename(path))
+        with suppress(OSError):  # one that cannot be read is left for whoever can
+            if not _messages(draft):
+                draft.unlink()
+            elif not path.exists():
+                found.append(draft.rename(path))
     return found
 
 

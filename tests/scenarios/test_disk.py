@@ -381,9 +381,7 @@ def test_the_open_part_is_never_deleted(tmp_path, figure):
     old = tmp_path / "old.mcap"
     old.write_bytes(bytes(990_000))
     os.utime(old, (0, 0))
-    with service(
-        tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "part_size": "500 kB", "disk_cap": "1 MB"}
-    ) as (_, daemon):
+    with service(tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "disk_cap": "1 MB"}) as (_, daemon):
         daemon.heard("old.mcap: deleted, over logging.disk_cap")
         time.sleep(0.5)
         daemon.stop()

@@ -89,6 +89,8 @@ def test_watchers_do_not_slow_the_loop(tmp_path, seed, figure):
         began = daemon.status()["loop"]["stamp"]
         for number in range(2 * MAX_CLIENTS):
             client = watching.enter_context(connected(daemon.socket))
+            with suppress(CommandError, OSError):  # half of them are turned away
+                next(reports(client))
             if number % 2:
                 Thread(target=read_on, args=(client,), daemon=True).start()
         time.sleep(3.0)
@@ -96,13 +98,13 @@ def test_watchers_do_not_slow_the_loop(tmp_path, seed, figure):
     loop = rows(daemon.path(), "/loop")
     for name, some in (("nobody watches", loop["stamp"] < began), ("32 ask for reports", loop["stamp"] > began)):
         late = np.quantile(loop["lateness"][some], 0.99) * 1e3
-        figure("watchers", WIRES, f"lateness, 99 %, while {name}", late, "ms")
+        figure("watchers", WIRES, f"lateness, 99 %, while {name}", late, "ms", 4.0, real=True)
     assert verified(daemon.path())
 
 
 def read_on(client):
-    with suppress(CommandError, OSError):
-        for _ in reports(client):
+    with suppress(OSError):
+        while client.recv(1 << 16):
             pass
 
 

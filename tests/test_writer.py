@@ -19,7 +19,8 @@ from estimator.readings import Reading
 from estimator.recording import RecordingError, RunInfo, parts
 from estimator.recording.mcapfile import McapFile
 from estimator.recording.salvage import read
-from estimator.recording.writer import WriterStatus, WriterThread, _Syncer
+from estimator.recording.syncer import Syncer
+from estimator.recording.writer import WriterStatus, WriterThread
 from tests.test_recording import MIXED, T0, mixed_values
 
 REPOSITORY = Path(__file__).parent.parent
@@ -204,7 +205,7 @@ def test_a_failed_sync_is_said(writer: WriterThread, monkeypatch: pytest.MonkeyP
     def failing(_: int) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    monkeypatch.setattr("estimator.recording.writer.sync", failing)
+    monkeypatch.setattr("estimator.recording.syncer.sync", failing)
     writer.put([reading(1)])
     wait_for(lambda: "cannot sync: Input/output error" in writer.status().error)
     monkeypatch.undo()
@@ -223,8 +224,8 @@ def test_what_is_asked_for_while_the_medium_is_busy_is_synced_before_the_end(
         go.wait()
         synced.append(os.fstat(file).st_ino)
 
-    monkeypatch.setattr("estimator.recording.writer.sync", slow)
-    syncer = _Syncer()
+    monkeypatch.setattr("estimator.recording.syncer.sync", slow)
+    syncer = Syncer()
     syncer.start()
     with (tmp_path / "a").open("wb") as first, (tmp_path / "b").open("wb") as second:
         syncer.request(first.fileno())

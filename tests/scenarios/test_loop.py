@@ -287,7 +287,7 @@ VICTIMS = {
     "reader": "import drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
     "loop": "import estimator.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
     "writer": "import estimator.recording.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
-    "writer-sync": "import estimator.recording.writer as m; m._Syncer._sync = dying(m._Syncer._sync)",
+    "writer-sync": "import estimator.recording.syncer as m; m.Syncer._sync = dying(m.Syncer._sync)",
     "publisher": "import estimator.daemon.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
 }
 

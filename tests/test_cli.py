@@ -186,3 +186,9 @@ def test_slip_resolution_is_what_a_simulated_window_shows(testbed: Settings) -> 
         counts = speed / per_count * times + random.normal(0, 0.5, (4000, count))
         speeds.append(np.polyfit(times, (counts * per_count).T, 1)[0])
     assert np.std(1 - speeds[1] / speeds[0]) == pytest.approx(check_config.slip_sigma(testbed), rel=0.05)
+
+
+def test_a_closed_standard_output_is_no_error():
+    command = f"exec {sys.executable} -m tools.cli check-config config/testbed.yaml >&-"
+    done = subprocess.run(["sh", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -59,7 +59,10 @@ def guarded(command: Callable[[], int | None]) -> int:
 
 
 def _speak_as_the_terminal_does() -> None:
-    """A terminal that knows no Greek gets a question mark: nothing fails for it, least of all the daemon."""
+    """A terminal that knows no Greek gets a question mark, and a closed one nothing: no command fails for it, least of
+    all the daemon."""
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 - or a recording takes its place
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")

@@ -193,9 +193,7 @@ class Watcher:
 def say(text: str, stream: TextIO | None = None) -> None:
     """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon goes on; where somebody
     does not read what he asked for, it goes on without the line."""
-    out: TextIO | None = stream or sys.stdout
-    if out is None:  # closed before we began
-        return
+    out = stream or sys.stdout
     try:
         if _taken(out):
             print(text, file=out, flush=True)

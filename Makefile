@@ -42,19 +42,19 @@ type: $(READY) ## mypy --strict
 	@$(BIN)/mypy --no-error-summary
 
 docs: $(READY) ## the generated parts of the documents
-	@$(BIN)/python -m tools.config_reference
+	@$(BIN)/python -m gritd.tools.dev.config_reference
 
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their part of docs/proof.md
-	@$(BIN)/python -m tools.proof.real
+	@$(BIN)/python -m gritd.tools.proof.real
 
 scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
-	@$(BIN)/python -m tools.reliability
+	@$(BIN)/python -m gritd.tools.dev.reliability
 
 fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody meant: the full counts
-	@$(BIN)/python -m tools.fuzz
+	@$(BIN)/python -m gritd.tools.dev.fuzz
 
 soak: $(READY) ## 100 simulated hours, then the daemon on wires for an hour under load
-	@$(BIN)/python -m tools.soak
+	@$(BIN)/python -m gritd.tools.dev.soak
 
 install: ## lay gritd out on this Debian system (DESTDIR=… for a package); see docs/service.md
 	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install install

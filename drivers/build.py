@@ -7,24 +7,27 @@ from collections.abc import Callable
 import can
 from cantools.database.can import Signal
 
-from drivers.can_link import CanLink
-from drivers.can_signals import database
-from drivers.decoder import Decoder
-from drivers.errors import DeviceSettingsError
-from drivers.framing import Framing
-from drivers.framing_ascii import AsciiFraming
-from drivers.framing_can import CanFraming
-from drivers.framing_cobs import CobsFraming
-from drivers.link import Clock, Link
-from drivers.queue import ReadingQueue
-from drivers.reader import Reader, Tap
-from drivers.sensor import Sensor, SensorSettings, SignalShape, sensor_kinds
-from drivers.serial_link import SerialLink
-from estimator.settings import Device, Settings
+from gritd.drivers.can_link import CanLink
+from gritd.drivers.can_signals import database
+from gritd.drivers.decoder import Decoder
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.framing import Framing
+from gritd.drivers.framing_ascii import AsciiFraming
+from gritd.drivers.framing_can import CanFraming
+from gritd.drivers.framing_cobs import CobsFraming
+from gritd.drivers.link import Clock, Link
+from gritd.drivers.queue import ReadingQueue
+from gritd.drivers.reader import Reader, Tap
+from gritd.drivers.sensor import Sensor, SensorSettings, SignalShape, sensor_kinds
+from gritd.drivers.serial_link import SerialLink
+from gritd.estimator.config.settings import Device, Settings
 
 
 def build_readers(
-    settings: Settings, clock: Clock, queue: ReadingQueue, tap: Callable[[str], Tap | None] = lambda device: None
+    settings: Settings,
+    clock: Clock,
+    queue: ReadingQueue,
+    tap: Callable[[str], Tap | None] = lambda device: None,
 ) -> list[Reader]:
     """One reader for each device that some channel uses, not yet started.
 
@@ -45,13 +48,19 @@ def used_devices(settings: Settings) -> list[Device]:
     for channel, of in _sensor_settings(settings).items():
         if of.device not in settings.devices:
             known = ", ".join(settings.devices) or "none"
-            raise DeviceSettingsError(f"channel {channel}", f"no device {of.device!r}, there are: {known}")
+            raise DeviceSettingsError(
+                f"channel {channel}", f"no device {of.device!r}, there are: {known}"
+            )
     return [device for name, device in settings.devices.items() if name in names]
 
 
 def build_decoder(settings: Settings, device: Device) -> Decoder:
     """Framing and sensors of one device; serves live readers and recorded wires alike."""
-    sensors = [_sensor(name, of) for name, of in _sensor_settings(settings).items() if of.device == device.name]
+    sensors = [
+        _sensor(name, of)
+        for name, of in _sensor_settings(settings).items()
+        if of.device == device.name
+    ]
     framing = _framing(device, sensors)
     if isinstance(framing, CanFraming):
         _check_signals(framing, sensors)
@@ -72,20 +81,26 @@ def build_link(device: Device, framing: Framing, clock: Clock) -> Link:
 
 def _sensor_settings(settings: Settings) -> dict[str, SensorSettings]:
     """Channel name -> settings, the wrench included."""
-    wrench: dict[str, SensorSettings] = {} if settings.wrench is None else {"wrench": settings.wrench}
+    wrench: dict[str, SensorSettings] = (
+        {} if settings.wrench is None else {"wrench": settings.wrench}
+    )
     return {**settings.channels, **wrench}
 
 
 def _sensor(channel: str, settings: SensorSettings) -> Sensor:
     kinds = sensor_kinds()
     if channel not in kinds:
-        raise DeviceSettingsError(f"channel {channel}", f"no such sensor, expected one of {', '.join(sorted(kinds))}")
+        raise DeviceSettingsError(
+            f"channel {channel}", f"no such sensor, expected one of {', '.join(sorted(kinds))}"
+        )
     return kinds[channel](settings)  # type: ignore[arg-type]
 
 
 def _framing(device: Device, sensors: list[Sensor]) -> Framing:
     if device.kind == "can":
-        return CanFraming(device.name, database(device), [key for sensor in sensors for key in sensor.keys])
+        return CanFraming(
+            device.name, database(device), [key for sensor in sensors for key in sensor.keys]
+        )
     return AsciiFraming() if device.framing == "ascii" else CobsFraming()
 
 

@@ -12,13 +12,15 @@ from typing import Any
 
 import can
 
-from drivers.errors import DeviceError
-from drivers.framing_can import ERROR, EXTENDED, REMOTE, pack
-from drivers.link import POLL, Chunk, Clock
-from estimator.settings import Device
+from gritd.drivers.errors import DeviceError
+from gritd.drivers.framing_can import ERROR, EXTENDED, REMOTE, pack
+from gritd.drivers.link import POLL, Chunk, Clock
+from gritd.estimator.config.settings import Device
 
 LONGEST_LINE = 4096  # [bytes] of slcan; a message takes 32
-RECEIVE_BUFFER = 1 << 20  # [bytes] asked of the kernel, so that a burst waits there instead of being lost
+RECEIVE_BUFFER = (
+    1 << 20
+)  # [bytes] asked of the kernel, so that a burst waits there instead of being lost
 
 # Options an interface needs to be safe or prompt; the configuration's `options` win.
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -33,7 +35,9 @@ class CanLink:
     filters: as python-can takes them, from CanFraming.filters().
     """
 
-    def __init__(self, device: Device, filters: Sequence[dict[str, int | bool]], clock: Clock) -> None:
+    def __init__(
+        self, device: Device, filters: Sequence[dict[str, int | bool]], clock: Clock
+    ) -> None:
         self.damaged = 0
         self._device = device
         self._filters = filters
@@ -42,10 +46,18 @@ class CanLink:
 
     def open(self) -> None:
         device = self._device
-        options = {"bitrate": device.bitrate, **DEFAULTS.get(device.interface, {}), **device.options}
+        options = {
+            "bitrate": device.bitrate,
+            **DEFAULTS.get(device.interface, {}),
+            **device.options,
+        }
         try:
             bus = can.Bus(
-                device.channel, device.interface, ignore_config=True, can_filters=list(self._filters), **options
+                device.channel,
+                device.interface,
+                ignore_config=True,
+                can_filters=list(self._filters),
+                **options,
             )
         except Exception as error:  # every backend has exceptions of its own
             where = f"{device.interface} {device.channel}"
@@ -64,7 +76,9 @@ class CanLink:
             return Chunk(self._clock(), packed(message))
         except Exception as error:  # every backend has exceptions of its own
             if not _is_damage(self._device.interface, error):
-                raise DeviceError(self._device.name, f"cannot read {self._device.channel}: {_reason(error)}") from None
+                raise DeviceError(
+                    self._device.name, f"cannot read {self._device.channel}: {_reason(error)}"
+                ) from None
             self._discard_damage(error)
             return None
 
@@ -79,7 +93,9 @@ class CanLink:
         """Count a message that could not be read, and go on."""
         self.damaged += 1
         if isinstance(error.__cause__, UnicodeDecodeError) and self._bus is not None:
-            with suppress(Exception):  # slcan keeps an undecodable line for ever, unless it is told to drop it
+            with suppress(
+                Exception
+            ):  # slcan keeps an undecodable line for ever, unless it is told to drop it
                 self._bus._buffer.clear()  # type: ignore[attr-defined]
 
     def close(self) -> None:
@@ -94,7 +110,9 @@ class CanLink:
 
 def packed(message: can.Message) -> bytes:
     """The message as a chunk of CanFraming. Raises struct.error, TypeError or ValueError if it is none."""
-    flags = EXTENDED if message.is_extended_id else 0  # a hostile message has anything in the place of a flag
+    flags = (
+        EXTENDED if message.is_extended_id else 0
+    )  # a hostile message has anything in the place of a flag
     flags |= REMOTE if message.is_remote_frame else 0
     flags |= ERROR if message.is_error_frame else 0
     data = bytes(message.data)
@@ -111,7 +129,9 @@ def _is_damage(interface: str, error: Exception) -> bool:
         return isinstance(error.__cause__ or error, ValueError | IndexError)
     if interface == "udp_multicast":
         unpacking = isinstance(error, can.CanError) and error.__cause__ is not None
-        return isinstance(error, TypeError) or (unpacking and not isinstance(error.__cause__, OSError))
+        return isinstance(error, TypeError) or (
+            unpacking and not isinstance(error.__cause__, OSError)
+        )
     return False
 
 

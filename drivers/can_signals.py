@@ -10,8 +10,8 @@ from cantools.database import Database
 from cantools.database.can import Message, Signal
 from cantools.database.conversion import BaseConversion
 
-from drivers.errors import DeviceSettingsError
-from estimator.settings import Device
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.estimator.config.settings import Device
 
 MAX_DBC_BYTES = 4 << 20
 MAX_INLINE = 256  # signals of one device
@@ -25,7 +25,11 @@ _RULES: dict[str, _Rule] = {
     "id": (None, lambda v: _is_int(v) and 0 <= v < 1 << 29, "a frame id below 2^29"),
     "start": (None, lambda v: _is_int(v) and 0 <= v < 512, "a start bit of 0 to 511"),
     "length": (None, lambda v: _is_int(v) and 1 <= v <= 64, "a length of 1 to 64 bits"),
-    "byte_order": ("little_endian", lambda v: v in ("little_endian", "big_endian"), "little_endian or big_endian"),
+    "byte_order": (
+        "little_endian",
+        lambda v: v in ("little_endian", "big_endian"),
+        "little_endian or big_endian",
+    ),
     "signed": (False, lambda v: isinstance(v, bool), "true or false"),
     "is_float": (False, lambda v: isinstance(v, bool), "true or false"),
     "extended": (False, lambda v: isinstance(v, bool), "true or false"),
@@ -38,12 +42,16 @@ INLINE_KEYS = tuple(_RULES)
 def database(device: Device) -> Database:
     """The message database of a CAN device. Raises DeviceSettingsError where file or definitions are wrong."""
     if device.dbc and device.signals:
-        raise DeviceSettingsError(f"device {device.name}", "both dbc and signals are given, expected one of them")
+        raise DeviceSettingsError(
+            f"device {device.name}", "both dbc and signals are given, expected one of them"
+        )
     if device.signals:
         return _inline(device)
     if device.dbc:
         return _from_file(device)
-    raise DeviceSettingsError(f"device {device.name}", "neither dbc nor signals is given, expected one of them")
+    raise DeviceSettingsError(
+        f"device {device.name}", "neither dbc nor signals is given, expected one of them"
+    )
 
 
 def _from_file(device: Device) -> Database:
@@ -52,9 +60,13 @@ def _from_file(device: Device) -> Database:
             text = file.read(MAX_DBC_BYTES + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise DeviceSettingsError(f"device {device.name}", f"cannot read {device.dbc}: {reason}") from None
+        raise DeviceSettingsError(
+            f"device {device.name}", f"cannot read {device.dbc}: {reason}"
+        ) from None
     if len(text) > MAX_DBC_BYTES:
-        raise DeviceSettingsError(f"device {device.name}", f"{device.dbc} is larger than {MAX_DBC_BYTES} bytes")
+        raise DeviceSettingsError(
+            f"device {device.name}", f"{device.dbc} is larger than {MAX_DBC_BYTES} bytes"
+        )
     try:
         return cantools.database.load_string(text, database_format="dbc")  # type: ignore[return-value]
     except Exception as error:  # the parser's own errors share no class but this one
@@ -81,28 +93,38 @@ def _checked(where: str, definition: Definition) -> dict[str, Any]:
     """The definition, complete, each value of the right kind."""
     for key in definition:
         if key not in _RULES:
-            raise DeviceSettingsError(where, f"unknown key {key!r}, expected some of {', '.join(_RULES)}")
+            raise DeviceSettingsError(
+                where, f"unknown key {key!r}, expected some of {', '.join(_RULES)}"
+            )
     values = {}
     for key, (default, valid, expected) in _RULES.items():
         values[key] = definition.get(key, default)
         if not valid(values[key]):
-            raise DeviceSettingsError(where, f"{key} is {definition.get(key)!r}, expected {expected}")
+            raise DeviceSettingsError(
+                where, f"{key} is {definition.get(key)!r}, expected {expected}"
+            )
     if values["is_float"] and values["length"] not in (32, 64):
-        raise DeviceSettingsError(where, f"length is {values['length']}, expected 32 or 64 bits for a float")
+        raise DeviceSettingsError(
+            where, f"length is {values['length']}, expected 32 or 64 bits for a float"
+        )
     return values
 
 
 def _message(device: Device, name: str, signals: dict[str, dict[str, Any]]) -> Message:
     first = next(iter(signals.values()))
     if any((s["id"], s["extended"]) != (first["id"], first["extended"]) for s in signals.values()):
-        raise DeviceSettingsError(f"device {device.name}, message {name}", "its signals differ in id or extended")
+        raise DeviceSettingsError(
+            f"device {device.name}, message {name}", "its signals differ in id or extended"
+        )
     built = [_signal(signal, values) for signal, values in signals.items()]
     length = max(map(_bytes_reached, built))
     if length > MAX_MESSAGE:
         reason = f"its signals reach to byte {length}, expected at most {MAX_MESSAGE}"
         raise DeviceSettingsError(f"device {device.name}, message {name}", reason)
     try:
-        return Message(first["id"], name, length, built, is_extended_frame=first["extended"], strict=True)
+        return Message(
+            first["id"], name, length, built, is_extended_frame=first["extended"], strict=True
+        )
     except cantools.Error as error:
         raise DeviceSettingsError(f"device {device.name}, message {name}", error) from None
 
@@ -116,7 +138,9 @@ def _bytes_reached(signal: Signal) -> int:
 
 
 def _signal(name: str, values: dict[str, Any]) -> Signal:
-    conversion = BaseConversion.factory(scale=values["scale"], offset=values["offset"], is_float=values["is_float"])
+    conversion = BaseConversion.factory(
+        scale=values["scale"], offset=values["offset"], is_float=values["is_float"]
+    )
     return Signal(
         name,
         values["start"],
@@ -132,4 +156,6 @@ def _is_int(value: object) -> bool:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < float("inf")
+    return (
+        isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < float("inf")
+    )

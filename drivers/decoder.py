@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from drivers.device_clock import DeviceClock
-from drivers.framing import Frame, Framing
-from drivers.sensor import Sensor
-from estimator.readings import Reading
+from gritd.drivers.device_clock import DeviceClock
+from gritd.drivers.framing import Frame, Framing
+from gritd.drivers.sensor import Sensor
+from gritd.estimator.messages.readings import Reading
 
 
 class Decoder:
@@ -19,7 +19,9 @@ class Decoder:
         self.sensors = tuple(sensors)
         self.duplicates = 0  # frames that came twice in a row, dropped
         self.unknown = 0  # good frames whose key no channel wants
-        self._listeners = {key: [s for s in sensors if key in s.keys] for s in sensors for key in s.keys}
+        self._listeners = {
+            key: [s for s in sensors if key in s.keys] for s in sensors for key in s.keys
+        }
         self._clocks: dict[str, DeviceClock] = {}
         self._last: dict[str, tuple[int, int | None]] = {}
 
@@ -59,7 +61,9 @@ class Decoder:
     def _stamps(self, frames: Sequence[Frame], received: int) -> list[int]:
         """When each frame's sample was taken: by the device's clock where it sends one, else the receive time."""
         stamps = [received] * len(frames)
-        timed = [(self.framing.clock(f.key), i) for i, f in enumerate(frames) if f.device_us is not None]
+        timed = [
+            (self.framing.clock(f.key), i) for i, f in enumerate(frames) if f.device_us is not None
+        ]
         for (name, modulus), group in groupby(sorted(timed), key=lambda item: item[0]):
             indices = [i for _, i in group]
             clock = self._clocks.setdefault(name, DeviceClock(modulus))

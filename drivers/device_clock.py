@@ -15,7 +15,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-Point = tuple[float, float]  # (device time [ns since the first frame], receive − device [ns, less the first one])
+Point = tuple[
+    float, float
+]  # (device time [ns since the first frame], receive − device [ns, less the first one])
 
 BLOCK = 0.5e9  # [ns]
 BLOCKS = 40  # a window of 20 s

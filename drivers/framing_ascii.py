@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from binascii import crc_hqx
 
-from drivers.framing import KEY, MAX_VALUES, Counts, FieldValue, Frame, SequenceGap
+from gritd.drivers.framing import KEY, MAX_VALUES, Counts, FieldValue, Frame, SequenceGap
 
 SEQUENCE_MODULUS = 1 << 16
 CLOCK_MODULUS = 1 << 32  # [µs]
@@ -24,7 +24,10 @@ _FLOAT = re.compile(r"[+-]?(?:[0-9.eE+-]{1,32}|nan|inf)")
 def encode(frame: Frame) -> bytes:
     """The line of a frame. Floats are written so that reading them gives the same float."""
     device_us = "" if frame.device_us is None else str(frame.device_us)
-    values = (repr(float(value)) if isinstance(value, float) else str(int(value)) for value in frame.values)
+    values = (
+        repr(float(value)) if isinstance(value, float) else str(int(value))
+        for value in frame.values
+    )
     body = ",".join([frame.key, str(frame.sequence or 0), device_us, *values]).encode("ascii")
     return b"$%b*%04X\r\n" % (body, crc_hqx(body, 0xFFFF))
 
@@ -86,7 +89,12 @@ def _parse(line: bytes) -> Frame | None:
     if not KEY.fullmatch(key) or not 3 <= len(fields) <= 2 + MAX_VALUES:
         return None
     try:
-        return Frame(key, _below(SEQUENCE_MODULUS, fields[0]), _device_us(fields[1]), tuple(map(_value, fields[2:])))
+        return Frame(
+            key,
+            _below(SEQUENCE_MODULUS, fields[0]),
+            _device_us(fields[1]),
+            tuple(map(_value, fields[2:])),
+        )
     except ValueError:
         return None
 

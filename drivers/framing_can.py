@@ -18,8 +18,8 @@ import cantools
 from cantools.database import Database
 from cantools.database.can import Message, Signal
 
-from drivers.errors import DeviceSettingsError
-from drivers.framing import Counts, FieldValue, Frame, SequenceGap
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.framing import Counts, FieldValue, Frame, SequenceGap
 
 EXTENDED = 1 << 31
 REMOTE = 1 << 30
@@ -71,7 +71,11 @@ class CanFraming:
     def filters(self) -> list[dict[str, int | bool]]:
         """Acceptance filters for exactly the wanted ids, as python-can takes them."""
         return [
-            {"can_id": w.message.frame_id, "can_mask": (1 << 29) - 1, "extended": bool(w.message.is_extended_frame)}
+            {
+                "can_id": w.message.frame_id,
+                "can_mask": (1 << 29) - 1,
+                "extended": bool(w.message.is_extended_frame),
+            }
             for w in self._wanted.values()
         ]
 
@@ -131,13 +135,19 @@ class CanFraming:
         return [
             Frame(key, sequence, device_us, tuple(values[name] for name in names))
             for key, names in wanted.picks.items()
-            if all(name in values for name in names)  # a multiplexed message carries some of its signals
+            if all(
+                name in values for name in names
+            )  # a multiplexed message carries some of its signals
         ]
 
     def _want(self, key: str) -> None:
         name, _, signal = key.partition(".")
         wanted = self._by_message.get(name) or self._listen(name)
-        data = tuple(s.name for s in wanted.message.signals if s is not wanted.counter and s is not wanted.device_time)
+        data = tuple(
+            s.name
+            for s in wanted.message.signals
+            if s is not wanted.counter and s is not wanted.device_time
+        )
         names = (signal,) if signal else data
         if not names or not set(names) <= set(data):
             self._unknown(f"signal {key}", f"{name} has {', '.join(data) or 'no data signals'}")
@@ -147,14 +157,18 @@ class CanFraming:
         """Start listening to the message of this name."""
         message = next((m for m in self._database.messages if m.name == name), None)
         if message is None:
-            self._unknown(f"message {name}", f"there are {', '.join(m.name for m in self._database.messages)}")
+            self._unknown(
+                f"message {name}", f"there are {', '.join(m.name for m in self._database.messages)}"
+            )
         counter = next((s for s in message.signals if s.name.lower() in COUNTERS), None)
         device_time = next((s for s in message.signals if s.name.lower() == DEVICE_TIME), None)
         for signal in filter(None, (counter, device_time)):
             if signal.is_float or signal.multiplexer_ids:
                 kind = "a float" if signal.is_float else "multiplexed"
                 what = f"signal {name}.{signal.name} is {kind}"
-                raise DeviceSettingsError(f"device {self._device}", f"{what}; expected an integer in every message")
+                raise DeviceSettingsError(
+                    f"device {self._device}", f"{what}; expected an integer in every message"
+                )
         gap = SequenceGap(1 << counter.length if counter else 1)
         wanted = _Wanted(message, {}, counter, device_time, gap)
         self._wanted[message.frame_id | (EXTENDED if message.is_extended_frame else 0)] = wanted

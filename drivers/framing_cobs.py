@@ -17,7 +17,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 
-from drivers.framing import KEY, MAX_VALUES, Counts, Frame, SequenceGap
+from gritd.drivers.framing import KEY, MAX_VALUES, Counts, Frame, SequenceGap
 
 SEQUENCE_MODULUS = 1 << 16
 CLOCK_MODULUS = 1 << 32  # [µs]
@@ -128,7 +128,11 @@ class CobsFraming:
 def _parse(stuffed: bytes) -> Frame | None:
     """The frame of one stuffed piece, or None if its checksum or its content is wrong."""
     body = _unstuff(stuffed)
-    if body is None or len(body) < _HEAD.size + 2 or crc_hqx(body[:-2], 0xFFFF) != int.from_bytes(body[-2:], "little"):
+    if (
+        body is None
+        or len(body) < _HEAD.size + 2
+        or crc_hqx(body[:-2], 0xFFFF) != int.from_bytes(body[-2:], "little")
+    ):
         return None
     sequence, kind, key_length = _HEAD.unpack_from(body)
     key_end = _HEAD.size + (key_length & ~_TIMED)
@@ -138,4 +142,6 @@ def _parse(stuffed: bytes) -> Frame | None:
     if kind not in _SIZES or rest or not 1 <= count <= MAX_VALUES or not KEY.fullmatch(key):
         return None
     device_us = int.from_bytes(body[key_end:values_at], "little") if key_length & _TIMED else None
-    return Frame(key, sequence, device_us, struct.unpack_from(f"<{count}{chr(kind)}", body, values_at))
+    return Frame(
+        key, sequence, device_us, struct.unpack_from(f"<{count}{chr(kind)}", body, values_at)
+    )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from threading import Lock
 from typing import NamedTuple
 
-from estimator.readings import Reading
+from gritd.estimator.messages.readings import Reading
 
 
 class QueueCounts(NamedTuple):

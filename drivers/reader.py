@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event, Thread
 
-from drivers.decoder import Decoder
-from drivers.errors import DeviceError, one_line
-from drivers.link import Chunk, Link
-from drivers.queue import ReadingQueue
-from estimator.patience import waited
+from gritd.drivers.decoder import Decoder
+from gritd.drivers.errors import DeviceError, one_line
+from gritd.drivers.link import Chunk, Link
+from gritd.drivers.queue import ReadingQueue
+from gritd.estimator.recording.patience import waited
 
 BACKOFF_FIRST = 0.1  # [s]
 BACKOFF_LAST = 5.0  # [s]
@@ -46,7 +46,9 @@ class Reader:
     tap, if given, is called with (received [ns], bytes) of every chunk before it is decoded: a wire log.
     """
 
-    def __init__(self, device: str, link: Link, decoder: Decoder, queue: ReadingQueue, tap: Tap | None = None) -> None:
+    def __init__(
+        self, device: str, link: Link, decoder: Decoder, queue: ReadingQueue, tap: Tap | None = None
+    ) -> None:
         self.device = device
         self.decoder = decoder
         self._link = link
@@ -58,7 +60,9 @@ class Reader:
         self._last_error = ""
         self._last_received = 0
         self._bytes = self._readings = self._opened = 0
-        self.beats = 0  # moves while the thread is not held up in the hardware: the watchdog's pulse
+        self.beats = (
+            0  # moves while the thread is not held up in the hardware: the watchdog's pulse
+        )
 
     @property
     def alive(self) -> bool:
@@ -106,7 +110,9 @@ class Reader:
         try:
             self._read_until_stopped()
             self._state = "ENDED"
-        except Exception as error:  # a fault of ours: never silent, the daemon sees DEAD and its reason
+        except (
+            Exception
+        ) as error:  # a fault of ours: never silent, the daemon sees DEAD and its reason
             self._last_error = f"{self.device}: {type(error).__name__}: {one_line(error)}"
             self._state = "DEAD"
         finally:

@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol, TypeVar
 
-from drivers.decoder import Decoder
-from drivers.link import POLL, Chunk
-from drivers.queue import ReadingQueue
-from estimator.readings import Reading
+from gritd.drivers.decoder import Decoder
+from gritd.drivers.link import POLL, Chunk
+from gritd.drivers.queue import ReadingQueue
+from gritd.estimator.messages.readings import Reading
 
 NS = 1_000_000_000
 

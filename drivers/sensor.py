@@ -14,10 +14,10 @@ from functools import cache
 from math import isfinite
 from typing import ClassVar, NamedTuple
 
-from drivers.errors import DeviceSettingsError
-from drivers.framing import FieldValue, Frame
-from estimator.readings import Value
-from estimator.settings import Channel, Wrench
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.framing import FieldValue, Frame
+from gritd.estimator.config.settings import Channel, Wrench
+from gritd.estimator.messages.readings import Value
 
 SensorSettings = Channel | Wrench
 
@@ -33,7 +33,7 @@ class SignalShape(NamedTuple):
 class Sensor(ABC):
     """One channel's values out of the frames of one device."""
 
-    channel: ClassVar[str]  # a key of estimator.readings.CHANNELS
+    channel: ClassVar[str]  # a key of gritd.estimator.messages.readings.CHANNELS
 
     def __init__(self, signal: str) -> None:
         self.keys: tuple[str, ...] = (signal,)  # the frames it wants
@@ -89,9 +89,13 @@ class Encoder(Sensor):
     def check_signals(self, signals: Sequence[SignalShape]) -> None:
         name, bits, integer = signals[0]
         if len(signals) != 1 or not integer:
-            raise DeviceSettingsError(f"channel {self.channel}", f"signal {name} is not one unscaled integer")
+            raise DeviceSettingsError(
+                f"channel {self.channel}", f"signal {name} is not one unscaled integer"
+            )
         if bits != self.bits:
-            raise DeviceSettingsError(f"channel {self.channel}", f"bits is {self.bits}, but signal {name} has {bits}")
+            raise DeviceSettingsError(
+                f"channel {self.channel}", f"bits is {self.bits}, but signal {name} has {bits}"
+            )
 
 
 class Analog(Sensor):
@@ -105,7 +109,9 @@ class Analog(Sensor):
     def check_signals(self, signals: Sequence[SignalShape]) -> None:
         if len(signals) != 1:
             names = ", ".join(signal.name for signal in signals)
-            raise DeviceSettingsError(f"channel {self.channel}", f"its signals are {names}, expected one signal")
+            raise DeviceSettingsError(
+                f"channel {self.channel}", f"its signals are {names}, expected one signal"
+            )
 
     def value(self, frame: Frame) -> float | None:
         value = frame.values[0]
@@ -129,8 +135,10 @@ def within(value: FieldValue, low: float, high: float) -> bool:
 @cache
 def sensor_kinds() -> dict[str, type[Sensor]]:
     """Channel name -> its class, found by walking drivers/sensors."""
-    package = importlib.import_module("drivers.sensors")
-    for module in pkgutil.iter_modules(package.__path__, "drivers.sensors."):
+    package = importlib.import_module("gritd.drivers.sensors")
+    for module in pkgutil.iter_modules(package.__path__, "gritd.drivers.sensors."):
         importlib.import_module(module.name)
     kinds = [kind for base in (Sensor, Encoder, Analog) for kind in base.__subclasses__()]
-    return {kind.channel: kind for kind in kinds if kind.__module__.startswith("drivers.sensors.")}
+    return {
+        kind.channel: kind for kind in kinds if kind.__module__.startswith("gritd.drivers.sensors.")
+    }

@@ -9,10 +9,15 @@ from contextlib import suppress
 
 import serial
 
-from drivers.errors import DeviceError
-from drivers.link import POLL, Chunk, Clock
+from gritd.drivers.errors import DeviceError
+from gritd.drivers.link import POLL, Chunk, Clock
 
-_FAILURES = (OSError, ValueError, TypeError, termios.error)  # what pyserial lets through; SerialException is an OSError
+_FAILURES = (
+    OSError,
+    ValueError,
+    TypeError,
+    termios.error,
+)  # what pyserial lets through; SerialException is an OSError
 
 
 class SerialLink:

@@ -9,11 +9,11 @@ import can
 from cantools.database import Database
 from cantools.database.can import Message, Signal
 
-from drivers import framing_ascii, framing_cobs
-from drivers.can_signals import database
-from drivers.framing import FieldValue, Frame
-from drivers.framing_can import COUNTERS, DEVICE_TIME
-from estimator.settings import Device
+from gritd.drivers import framing_ascii, framing_cobs
+from gritd.drivers.can_signals import database
+from gritd.drivers.framing import FieldValue, Frame
+from gritd.drivers.framing_can import COUNTERS, DEVICE_TIME
+from gritd.estimator.config.settings import Device
 
 
 class SerialWire:
@@ -38,7 +38,9 @@ class CanWire:
         self._database: Database = database(device)
         self._sequence: Counter[str] = Counter()
 
-    def encode(self, key: str, values: Sequence[FieldValue], device_us: int | None = None) -> can.Message:
+    def encode(
+        self, key: str, values: Sequence[FieldValue], device_us: int | None = None
+    ) -> can.Message:
         """The message of a key, `Message` or `Message.Signal`; signals that are not given are 0.
 
         A value outside the signal's stated range is sent all the same: a broken sensor does so. Raises an error of
@@ -48,7 +50,9 @@ class CanWire:
         message = self._database.get_message_by_name(name)
         data = [s.name for s in message.signals if s.name.lower() not in (*COUNTERS, DEVICE_TIME)]
         given = dict(zip([signal] if signal else data, values, strict=True))
-        fields = {s.name: given.get(s.name, 0) for s in message.signals} | self._counters(message, device_us or 0)
+        fields = {s.name: given.get(s.name, 0) for s in message.signals} | self._counters(
+            message, device_us or 0
+        )
         return can.Message(
             arbitration_id=message.frame_id,
             is_extended_id=message.is_extended_frame,

@@ -10,8 +10,8 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-from drivers.errors import DeviceSettingsError
-from drivers.link import Chunk
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.link import Chunk
 
 MAGIC = b"gritd wire 1\n"
 MAX_CHUNK = 1 << 20  # [bytes] a longer record is damage
@@ -40,7 +40,9 @@ def read_wire(path: str | Path) -> Iterator[Chunk]:
         raise DeviceSettingsError(str(path), error.strerror) from None
     with file:
         if file.read(len(MAGIC)) != MAGIC:
-            raise DeviceSettingsError(str(path), "not a wire log, expected the line 'gritd wire 1' first")
+            raise DeviceSettingsError(
+                str(path), "not a wire log, expected the line 'gritd wire 1' first"
+            )
         while len(head := file.read(_HEAD.size)) == _HEAD.size:
             received, length = _HEAD.unpack(head)
             data = file.read(length) if length <= MAX_CHUNK else b""

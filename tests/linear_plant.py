@@ -6,12 +6,14 @@ from math import cos
 
 import numpy as np
 
-from estimator.readings import ENCODERS, Reading
-from estimator.terramechanics import linear
-from tests.testbed import NS
+from gritd.estimator.messages.readings import ENCODERS, Reading
+from gritd.estimator.terramechanics import linear
+from tests.rig import NS
 
 START = 1_700_000_000 * NS
-THREE_LOADS = tuple((4.0, load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6))
+THREE_LOADS = tuple(
+    (4.0, load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6)
+)
 ONE_LOAD = tuple((4.0, 70.0, slip) for slip in (0.1, 0.2, 0.3, 0.45, 0.6)) * 3
 OMEGA = 0.3  # [rad/s]
 
@@ -36,14 +38,18 @@ def readings(settings, truth, schedule, *, seed, rate=50):
     wheel, clock, turned, travelled = settings.wheel, 0.0, 0.0, 0.0
     tick, batch = START + NS // 10, []
     pot, shunt = (settings.channels[name].calibration for name in ("sinkage_pot", "motor_shunt"))
-    wheel_count, pulley_count = (settings.channels[name].calibration.scale.value for name in ENCODERS)
+    wheel_count, pulley_count = (
+        settings.channels[name].calibration.scale.value for name in ENCODERS
+    )
     for duration, load, slip in schedule:
         theta_1, forces = entry_angle(settings, truth, load, slip)
         volts = (wheel.radius * (1.0 - cos(theta_1)) - pot.offset.value) / pot.scale.value
         current = forces.torque / settings.drive.torque_constant.value
         amplifier = (current - shunt.offset.value) / shunt.scale.value
         for _ in range(round(duration * rate)):
-            step = rng.uniform(0.8, 1.2) / rate  # no testbed samples exactly evenly; the stamps are right
+            step = (
+                rng.uniform(0.8, 1.2) / rate
+            )  # no testbed samples exactly evenly; the stamps are right
             clock += step
             turned += OMEGA * step
             travelled += OMEGA * wheel.radius * (1.0 - slip) * step

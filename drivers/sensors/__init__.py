@@ -1,1 +1,1 @@
-"""The sensor kinds, one file each; drivers.sensor.sensor_kinds() finds them here."""
+"""The sensor kinds, one file each; gritd.drivers.sensor.sensor_kinds() finds them here."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.sensor import Analog
+from gritd.drivers.sensor import Analog
 
 
 class SinkagePot(Analog):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.sensor import Encoder
+from gritd.drivers.sensor import Encoder
 
 
 class WheelEncoder(Encoder):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.errors import DeviceSettingsError
-from drivers.framing import Frame
-from drivers.sensor import Sensor, SignalShape, within
-from estimator.readings import WRENCH_FIELDS
-from estimator.settings import Wrench as WrenchSettings
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.framing import Frame
+from gritd.drivers.sensor import Sensor, SignalShape, within
+from gritd.estimator.config.settings import Wrench as WrenchSettings
+from gritd.estimator.messages.readings import WRENCH_FIELDS
 
 FORCES = 3  # fx fy fz come before tx ty tz
 
@@ -43,7 +43,9 @@ class Wrench(Sensor):
 
     def _checked(self, values: list[int | float]) -> tuple[float, ...] | None:
         limits = self._limits
-        if len(values) != len(limits) or not all(within(v, -m, m) for v, m in zip(values, limits, strict=True)):
+        if len(values) != len(limits) or not all(
+            within(v, -m, m) for v, m in zip(values, limits, strict=True)
+        ):
             self.refuse()
             return None
         return tuple(map(float, values))

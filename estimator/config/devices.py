@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from estimator.config.schema import (
+from gritd.estimator.config.schema import (
     ABSENT,
     Choice,
     FilePath,
@@ -21,7 +21,7 @@ from estimator.config.schema import (
     Text,
     Variant,
 )
-from estimator.settings import Device
+from gritd.estimator.config.settings import Device
 
 NAME = Text("a name", r".*\S.*")
 
@@ -29,7 +29,11 @@ SERIAL = {
     "kind": Key(Choice(("serial",)), "a serial port"),
     "port": Key(NAME, "path of the port, such as /dev/ttyACM0"),
     "baud": Key(Integer(300, 12_000_000), "bits per second", "115200"),
-    "framing": Key(Choice(("cobs", "ascii")), "COBS with CRC-16 and sequence number, or lines with a checksum", "cobs"),
+    "framing": Key(
+        Choice(("cobs", "ascii")),
+        "COBS with CRC-16 and sequence number, or lines with a checksum",
+        "cobs",
+    ),
 }
 
 
@@ -56,7 +60,11 @@ def _can(folder: Path | None) -> dict[str, Key]:
         "interface": Key(NAME, "name of a python-can interface", "socketcan"),
         "channel": Key(NAME, "channel of that interface", "can0"),
         "bitrate": Key(Integer(10_000, 1_000_000), "bits per second", "500000"),
-        "dbc": Key(FilePath(folder), "CAN database; a relative path counts from the folder of this file", "''"),
+        "dbc": Key(
+            FilePath(folder),
+            "CAN database; a relative path counts from the folder of this file",
+            "''",
+        ),
         "options": Key(Options(), "further arguments of the python-can interface", "{}"),
         "signals": Key(
             Named(Section(SIGNAL, _signal), lambda _, value: value),
@@ -67,10 +75,14 @@ def _can(folder: Path | None) -> dict[str, Key]:
 
 
 def device(folder: Path | None) -> Variant:
-    return Variant("kind", {"serial": Section(SERIAL, partial(Device, "")), "can": Section(_can(folder), _bus)})
+    return Variant(
+        "kind", {"serial": Section(SERIAL, partial(Device, "")), "can": Section(_can(folder), _bus)}
+    )
 
 
 def _bus(dbc: str, signals: dict[str, Any], **values: Any) -> Device:
     if bool(dbc) == bool(signals):
-        raise Impossible("signals" if dbc else "dbc", "either a CAN database or signals defined here")
+        raise Impossible(
+            "signals" if dbc else "dbc", "either a CAN database or signals defined here"
+        )
     return Device("", dbc=dbc, signals=signals, **values)

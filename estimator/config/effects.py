@@ -1,9 +1,13 @@
-"""What the configuration reads of an effect: its parameters, with their units and bounds."""
+"""What the configuration says of effects: how their parameters are read, and the effects as configured."""
 
 from __future__ import annotations
 
-from estimator.config.schema import Quantity
-from estimator.effects import EFFECTS
+from collections.abc import Iterable
+
+from gritd.estimator.config.schema import Quantity
+from gritd.estimator.config.settings import ConfiguredEffect
+from gritd.estimator.effects import EFFECTS, make
+from gritd.estimator.effects.base import Effect
 
 
 def quantities(name: str) -> dict[str, Quantity] | None:
@@ -11,3 +15,10 @@ def quantities(name: str) -> dict[str, Quantity] | None:
     if name not in EFFECTS:
         return None
     return {p.name: Quantity(p.unit, low=p.low, high=p.high) for p in EFFECTS[name].parameters()}
+
+
+def configured(effects: Iterable[ConfiguredEffect]) -> tuple[Effect, ...]:
+    """Effects of a configuration at their configured values."""
+    return tuple(
+        make(e.name, {key: value.value for key, value in e.parameters.items()}) for e in effects
+    )

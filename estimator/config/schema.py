@@ -15,9 +15,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from estimator import units
-from estimator.settings import Uncertain
-from estimator.yamltree import Mapping, Node, Place, Scalar, Sequence, compose, describe, shown
+from gritd.estimator.config import units
+from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.config.yamltree import (
+    Mapping,
+    Node,
+    Place,
+    Scalar,
+    Sequence,
+    compose,
+    describe,
+    shown,
+)
 
 NEEDED = "\0needed"
 ABSENT = "\0absent"  # may be left out, and then there is none
@@ -72,8 +81,14 @@ class Quantity:
 
     def _bounds(self) -> str:
         suffix = f" {self.unit}" if self.unit else ""
-        bounds = ((" above", self.above), (" from", self.low), (" to" if self.low > -math.inf else " up to", self.high))
-        return "".join(f"{word} {bound:g}{suffix}" for word, bound in bounds if math.isfinite(bound))
+        bounds = (
+            (" above", self.above),
+            (" from", self.low),
+            (" to" if self.low > -math.inf else " up to", self.high),
+        )
+        return "".join(
+            f"{word} {bound:g}{suffix}" for word, bound in bounds if math.isfinite(bound)
+        )
 
     def read(self, node: Node) -> tuple[float, Node]:
         text = _scalar(node, self.expected)
@@ -97,9 +112,16 @@ class Quantity:
 
     def _refuse_text(self, node: Node, text: str) -> None:
         """A number that YAML takes for text: 1e3 for want of point and sign, or one in quotes."""
-        if units.NUMBER.fullmatch(text) and isinstance(node, Scalar) and node.tag == "str" and not self.unit:
+        if (
+            units.NUMBER.fullmatch(text)
+            and isinstance(node, Scalar)
+            and node.tag == "str"
+            and not self.unit
+        ):
             how = "1.0e+3" if "e" in text.lower() else "it without quotes"
-            raise node.place.error(f"{shown(text)}, which YAML reads as text", f"{self.expected}: write {how}")
+            raise node.place.error(
+                f"{shown(text)}, which YAML reads as text", f"{self.expected}: write {how}"
+            )
 
 
 @dataclass(frozen=True)
@@ -154,7 +176,11 @@ class Integer:
 
     def read(self, node: Node) -> tuple[int, Node]:
         text = _scalar(node, self.expected)
-        if not WHOLE.fullmatch(text) or _tag(node) != "int" or not self.low <= int(text, 0) <= self.high:
+        if (
+            not WHOLE.fullmatch(text)
+            or _tag(node) != "int"
+            or not self.low <= int(text, 0) <= self.high
+        ):
             raise node.place.error(describe(node), self.expected)
         return int(text, 0), node
 
@@ -183,7 +209,11 @@ class Text:
 
     def read(self, node: Node) -> tuple[str, Node]:
         text = _scalar(node, self.expected)
-        if _tag(node) not in ("str", "timestamp") or not re.fullmatch(self.pattern, text) or not text.isprintable():
+        if (
+            _tag(node) not in ("str", "timestamp")
+            or not re.fullmatch(self.pattern, text)
+            or not text.isprintable()
+        ):
             quotes = "" if _tag(node) in ("str", "null") else " in quotes"
             raise node.place.error(describe(node), self.expected + quotes)
         return text, node
@@ -224,7 +254,9 @@ class Options:
     expected: str = "a mapping of options"
 
     def read(self, node: Node) -> tuple[dict[str, Any], Node]:
-        return {name: self._value(item) for name, item in entries(node, self.expected).items()}, node
+        return {
+            name: self._value(item) for name, item in entries(node, self.expected).items()
+        }, node
 
     def _value(self, node: Node) -> Any:
         if isinstance(node, Mapping):
@@ -242,7 +274,9 @@ class Options:
             return int(node.text, 0)
         if node.tag == "float" and units.NUMBER.fullmatch(node.text):
             return float(node.text)
-        raise node.place.error(describe(node), "a number, true, false, or text (in quotes if YAML reads it otherwise)")
+        raise node.place.error(
+            describe(node), "a number, true, false, or text (in quotes if YAML reads it otherwise)"
+        )
 
 
 @dataclass(frozen=True)
@@ -283,7 +317,9 @@ class Named:
         filled: dict[str, Node] = {}
         for name, item in entries(node, self.expected).items():
             if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}", name):
-                raise item.place.error(f"the name {shown(name)!r}", "letters, digits, '_', '-' or '.', a letter first")
+                raise item.place.error(
+                    f"the name {shown(name)!r}", "letters, digits, '_', '-' or '.', a letter first"
+                )
             value, filled[name] = self.kind.read(item)
             values[name] = self.build(name, value)
         return values, Mapping(node.place, filled)
@@ -336,7 +372,9 @@ def _moved(node: Node, place: Place) -> Node:
         return Scalar(place, node.text, node.tag)
     if isinstance(node, Sequence):
         return Sequence(place, tuple(_moved(item, place) for item in node.items))
-    return Mapping(place, {name: _moved(item, place.key(name)) for name, item in node.items.items()})
+    return Mapping(
+        place, {name: _moved(item, place.key(name)) for name, item in node.items.items()}
+    )
 
 
 def _scalar(node: Node, expected: str) -> str:

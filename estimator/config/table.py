@@ -13,8 +13,8 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from estimator.config.devices import NAME, device
-from estimator.config.schema import (
+from gritd.estimator.config.devices import NAME, device
+from gritd.estimator.config.schema import (
     ABSENT,
     NEEDED,
     UNLIMITED,
@@ -31,10 +31,7 @@ from estimator.config.schema import (
     UncertainQuantity,
     entries,
 )
-from estimator.effects import EFFECTS
-from estimator.readings import CHANNELS, ENCODERS, REQUIRED
-from estimator.recording import RunInfo
-from estimator.settings import (
+from gritd.estimator.config.settings import (
     Calibration,
     Channel,
     ConfiguredEffect,
@@ -48,9 +45,12 @@ from estimator.settings import (
     Uncertain,
     Wrench,
 )
-from estimator.terramechanics.soil import PressureSinkage, Wheel
-from estimator.yamltree import Mapping as Tree
-from estimator.yamltree import Node, Scalar, describe
+from gritd.estimator.config.yamltree import Mapping as Tree
+from gritd.estimator.config.yamltree import Node, Scalar, describe
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS, REQUIRED
+from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""
@@ -71,23 +71,37 @@ WHEEL = {
 
 SOIL = {
     "cohesion": Key(_uncertain("Pa", low=0, high=1e6), "cohesion c, before the run"),
-    "tan_phi": Key(_uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"),
+    "tan_phi": Key(
+        _uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"
+    ),
     "shear_modulus": Key(_uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
     "exponent": Key(_uncertain("", above=0, high=5), "sinkage exponent n"),
     "k_c": Key(Quantity("Pa/m^(n-1)"), "with `k_phi`, Bekker: σ = (k_c/b + k_φ) zⁿ", ABSENT),
     "k_phi": Key(Quantity("Pa/m^n"), "with `k_c`", ABSENT),
-    "k1": Key(Quantity("Pa"), "with `k2`, instead of `k_c` and `k_phi`, Reece, Eq. (1): σ = (k₁ + k₂ b)(z/b)ⁿ", ABSENT),
+    "k1": Key(
+        Quantity("Pa"),
+        "with `k2`, instead of `k_c` and `k_phi`, Reece, Eq. (1): σ = (k₁ + k₂ b)(z/b)ⁿ",
+        ABSENT,
+    ),
     "k2": Key(Quantity("Pa/m"), "with `k1`", ABSENT),
-    "modulus_sigma": Key(Quantity("", low=0, high=1), "relative standard deviation of K in σ = K zⁿ", "0.0"),
+    "modulus_sigma": Key(
+        Quantity("", low=0, high=1), "relative standard deviation of K in σ = K zⁿ", "0.0"
+    ),
 }
 
 DRIVE = {
-    "torque_constant": Key(_uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"),
-    "torque_source": Key(Choice(("motor_shunt", "wrench")), "the channel that gives the torque", "motor_shunt"),
+    "torque_constant": Key(
+        _uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"
+    ),
+    "torque_source": Key(
+        Choice(("motor_shunt", "wrench")), "the channel that gives the torque", "motor_shunt"
+    ),
 }
 
 LOAD = {
-    "nominal": Key(_uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"),
+    "nominal": Key(
+        _uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"
+    ),
     "minimum": Key(Quantity("N", low=0), "under this load the wheel is in the air", "5 N"),
 }
 
@@ -100,7 +114,9 @@ def _soil(exponent: Uncertain, **values: Any) -> SoilPrior:
     begun = [form for form, pair in moduli.items() if pair != [None, None]]
     expected = "the moduli in one form, k_c and k_phi or k1 and k2"
     if len(begun) != 1:
-        raise Impossible("k1" if begun and moduli["reece"][0] is not None else "k2" if begun else "k_c", expected)
+        raise Impossible(
+            "k1" if begun and moduli["reece"][0] is not None else "k2" if begun else "k_c", expected
+        )
     form = begun[0]
     for name, value in zip(FORMS[form], moduli[form], strict=True):
         if value is None:
@@ -160,15 +176,21 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
             "see `scale`; its sigma is that of the zero: the physical value read at rest",
             f"0 {offset}",
         ),
-        "date": Key(Text("a date such as 2026-11-20", r"|\d{4}-\d\d-\d\d"), "day of the calibration", "''"),
+        "date": Key(
+            Text("a date such as 2026-11-20", r"|\d{4}-\d\d-\d\d"), "day of the calibration", "''"
+        ),
         "serial": Key(Text(), "serial number of the sensor", "''"),
     }
 
 
 def _timing() -> dict[str, Key]:
     return {
-        "latency": Key(Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"),
-        "stale_after": Key(Quantity("s", above=0, high=10), "silence after which the channel is stale", "40 ms"),
+        "latency": Key(
+            Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"
+        ),
+        "stale_after": Key(
+            Quantity("s", above=0, high=10), "silence after which the channel is stale", "40 ms"
+        ),
     }
 
 
@@ -183,22 +205,34 @@ def _channel(name: str) -> Section:
     """Keys of one channel, in its units."""
     raw, physical, step = UNITS[name]
     slope = f"{physical}/{raw}"
-    keys = _source() | (_calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED))
+    keys = _source() | (
+        _calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED)
+    )
     keys["noise"] = Key(Quantity(step, above=LEAST_NOISE), "standard deviation of one reading")
     if name in ENCODERS:
         max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
-        keys["range"] = Key(Unlimited((-inf, inf), "no count is impossible, max_rate tells a jump"), "none", UNLIMITED)
+        keys["range"] = Key(
+            Unlimited((-inf, inf), "no count is impossible, max_rate tells a jump"),
+            "none",
+            UNLIMITED,
+        )
         keys["bits"] = Key(Integer(8, 64), "width of the counter on the wire", "32")
-        keys["max_rate"] = Key(max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED)
+        keys["max_rate"] = Key(
+            max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED
+        )
     else:
         keys["range"] = Key(Interval(Quantity(raw)), "valid readings; one outside is quarantined")
-        keys["max_rate"] = Key(Unlimited(inf, "only an encoder's counts can jump"), "none", UNLIMITED)
+        keys["max_rate"] = Key(
+            Unlimited(inf, "only an encoder's counts can jump"), "none", UNLIMITED
+        )
     return Section(keys | _timing(), partial(_build_channel, name))
 
 
 def _build_channel(name: str, **values: Any) -> Channel:
     low, high = values.pop("range")
-    calibration = _build_calibration(**{key: values.pop(key) for key in ("scale", "offset", "date", "serial")})
+    calibration = _build_calibration(
+        **{key: values.pop(key) for key in ("scale", "offset", "date", "serial")}
+    )
     return Channel(name=name, calibration=calibration, low=low, high=high, **values)
 
 
@@ -211,11 +245,19 @@ def _build_calibration(scale: Uncertain, **values: Any) -> Calibration:
 WRENCH = {
     "device": Key(NAME, "name of the device it comes from"),
     "signal": Key(NAME, "key in the serial frame, or the messages of the CAN database"),
-    "drawbar_pull": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fx", "{}"),
-    "load": Key(Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fz", "{}"),
-    "torque": Key(Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"),
+    "drawbar_pull": Key(
+        Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fx", "{}"
+    ),
+    "load": Key(
+        Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fz", "{}"
+    ),
+    "torque": Key(
+        Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"
+    ),
     "force_noise": Key(Quantity("N", above=LEAST_NOISE), "standard deviation of one force reading"),
-    "torque_noise": Key(Quantity("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"),
+    "torque_noise": Key(
+        Quantity("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"
+    ),
     "max_force": Key(Quantity("N", above=0), "a larger force is quarantined", "10 kN"),
     "max_torque": Key(Quantity("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
 }
@@ -247,28 +289,48 @@ CHANNEL_DOCS = {
 
 RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
-    "update": Key(Quantity("Hz", above=0, high=1000), "updates of the filter; its window is 1/update", "10 Hz"),
-    "horizon": Key(Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"),
+    "update": Key(
+        Quantity("Hz", above=0, high=1000), "updates of the filter; its window is 1/update", "10 Hz"
+    ),
+    "horizon": Key(
+        Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"
+    ),
 }
 
 FILTER = {
-    "engine": Key(Choice(("filterpy", "plain")), "same numbers from both; plain is the faster", "filterpy"),
+    "engine": Key(
+        Choice(("filterpy", "plain")), "same numbers from both; plain is the faster", "filterpy"
+    ),
     "cohesion_walk": Key(Quantity("Pa/sqrt(s)", low=0), "random walk of c", "2 Pa/sqrt(s)"),
     "tan_phi_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of tan φ", "2e-4 1/sqrt(s)"),
     "ln_k_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of ln k", "1e-4 1/sqrt(s)"),
-    "gate": Key(Quantity("", above=0), "innovations of more standard deviations are rejected", "5.0"),
+    "gate": Key(
+        Quantity("", above=0), "innovations of more standard deviations are rejected", "5.0"
+    ),
     "cohesion_bounds": Key(Interval(Quantity("Pa", low=0)), "c stays inside", "[0 kPa, 50 kPa]"),
     "tan_phi_bounds": Key(Interval(Quantity("", above=0)), "tan φ stays inside", "[0.05, 1.5]"),
-    "shear_modulus_bounds": Key(Interval(Quantity("m", above=0)), "k stays inside", "[1 mm, 200 mm]"),
-    "estimate_k": Key(Choice(("auto", "always", "never")), "k as a state; auto: where slip varies enough", "auto"),
-    "model_sigma": Key(Quantity("", low=0, high=1), "relative error of the closed forms not modelled elsewhere", "0.0"),
+    "shear_modulus_bounds": Key(
+        Interval(Quantity("m", above=0)), "k stays inside", "[1 mm, 200 mm]"
+    ),
+    "estimate_k": Key(
+        Choice(("auto", "always", "never")), "k as a state; auto: where slip varies enough", "auto"
+    ),
+    "model_sigma": Key(
+        Quantity("", low=0, high=1),
+        "relative error of the closed forms not modelled elsewhere",
+        "0.0",
+    ),
 }
 
 LOGGING = {
     "directory": Key(NAME, "folder of the recordings", "runs"),
-    "flush_interval": Key(Quantity("s", above=0, high=60), "every chunk is closed and synced this often", "200 ms"),
+    "flush_interval": Key(
+        Quantity("s", above=0, high=60), "every chunk is closed and synced this often", "200 ms"
+    ),
     "compression": Key(Choice(("zstd", "lz4", "none")), "compression of a chunk", "zstd"),
-    "part_size": Key(Quantity("B", low=100e3, unlimited=True), "beyond it a new recording part begins", "256 MB"),
+    "part_size": Key(
+        Quantity("B", low=100e3, unlimited=True), "beyond it a new recording part begins", "256 MB"
+    ),
     "part_time": Key(Quantity("s", low=1, unlimited=True), "and after this time", "1 h"),
     "disk_cap": Key(
         Quantity("B", low=1e6, unlimited=True),
@@ -293,7 +355,9 @@ def _run(name: str, load: float | None, start: float, notes: str, **values: int)
 def _rates(tick: float, update: float, horizon: float) -> Rates:
     ratio = tick / update
     if round(ratio) < 2 or abs(ratio - round(ratio)) > 1e-9 * ratio:
-        raise Impossible("tick", f"a whole multiple of rates.update ({update:g} Hz), at least twice it")
+        raise Impossible(
+            "tick", f"a whole multiple of rates.update ({update:g} Hz), at least twice it"
+        )
     return Rates(tick, update, horizon)
 
 
@@ -307,17 +371,24 @@ class Effects:
     def read(self, node: Node) -> tuple[tuple[ConfiguredEffect, ...], Node]:
         given = entries(node, self.expected)
         read = {name: self._parameters(name, item).read(item) for name, item in given.items()}
-        effects = tuple(ConfiguredEffect(name, parameters) for name, (parameters, _) in read.items())
+        effects = tuple(
+            ConfiguredEffect(name, parameters) for name, (parameters, _) in read.items()
+        )
         return effects, Tree(node.place, {name: complete for name, (_, complete) in read.items()})
 
     def _parameters(self, name: str, item: Node) -> Kind:
         if self.schema is None:
-            return Named(UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters")
+            return Named(
+                UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters"
+            )
         if (known := self.schema(name)) is None:
             raise item.place.error("an unknown effect", "the name of an effect")
         if not entries(item, "a mapping of parameters"):
             raise item.place.error("no parameter", f"at least one of {', '.join(known)}")
-        keys = {p: Key(UncertainQuantity(kind), "parameter", self._default(name, p)) for p, kind in known.items()}
+        keys = {
+            p: Key(UncertainQuantity(kind), "parameter", self._default(name, p))
+            for p, kind in known.items()
+        }
         return Section(keys, dict, "a mapping of parameters")
 
     @staticmethod
@@ -334,11 +405,15 @@ class Effects:
 
 def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:
     """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if there is one."""
-    devices = Named(device(folder), lambda name, value: replace(value, name=name), "a mapping of devices")
+    devices = Named(
+        device(folder), lambda name, value: replace(value, name=name), "a mapping of devices"
+    )
     keys = {
         "testbed": Key(NAME, "name of the testbed"),
         "wheel": Key(Section(WHEEL, Wheel), "the rigid wheel"),
-        "pulley_radius": Key(Quantity("m", above=0, high=5), "radius of the carriage encoder's pulley"),
+        "pulley_radius": Key(
+            Quantity("m", above=0, high=5), "radius of the carriage encoder's pulley"
+        ),
         "soil": Key(Section(SOIL, _soil), "what is known of the soil before the run"),
         "drive": Key(Section(DRIVE, Drive), "motor and gear, seen from the wheel axle"),
         "load": Key(Section(LOAD, _load), "the vertical load"),
@@ -348,12 +423,16 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "filter": Key(Section(FILTER, FilterSettings), "the extended Kalman filter", "{}"),
         "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),
         "effects": Key(Effects(effect_schema), "physics beyond the paper's, by effect name", "{}"),
-        "run": Key(Section(RUN, _run), "about this run; the command line may say it instead", ABSENT),
+        "run": Key(
+            Section(RUN, _run), "about this run; the command line may say it instead", ABSENT
+        ),
     }
     return Section(keys, _settings)
 
 
-def _settings(channels: dict[str, Any], run: RunInfo | None, **values: Any) -> tuple[Settings, RunInfo]:
+def _settings(
+    channels: dict[str, Any], run: RunInfo | None, **values: Any
+) -> tuple[Settings, RunInfo]:
     wrench = channels.pop("wrench")
     known = {name: channel for name, channel in channels.items() if channel is not None}
     settings = Settings(channels=known, wrench=wrench, **values)
@@ -372,7 +451,9 @@ def _check_channels(settings: Settings) -> None:
             names = ", ".join(settings.devices) or "none there"
             raise Impossible(f"channels.{name}.device", f"the name of a device ({names})")
         if channel.latency >= settings.rates.horizon:
-            raise Impossible(f"channels.{name}.latency", "less than rates.horizon, or no reading arrives in time")
+            raise Impossible(
+                f"channels.{name}.latency", "less than rates.horizon, or no reading arrives in time"
+            )
 
 
 def _check_soil(settings: Settings) -> None:
@@ -385,4 +466,6 @@ def _check_soil(settings: Settings) -> None:
         low, high = getattr(bounds, f"{name}_bounds")
         value = getattr(soil, name).value
         if not low <= value <= high:
-            raise Impossible(f"soil.{name}", f"a value inside filter.{name}_bounds", f"{value:g} (SI)")
+            raise Impossible(
+                f"soil.{name}", f"a value inside filter.{name}_bounds", f"{value:g} (SI)"
+            )

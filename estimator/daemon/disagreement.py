@@ -10,8 +10,8 @@ import time
 from math import exp, hypot, isfinite, sqrt
 from typing import NamedTuple
 
-from estimator.filter.measurement import COMPONENTS
-from estimator.record import TICK_NAMES, Flag
+from gritd.estimator.filter.measurement import COMPONENTS
+from gritd.estimator.messages.record import TICK_NAMES, Flag
 
 NS = 1e-9
 MEMORY = 2.0  # [s] over which a channel's normalised error is averaged

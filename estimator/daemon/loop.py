@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from threading import Event
 from typing import NamedTuple, Protocol
 
-from estimator.checkpoint import encode
-from estimator.daemon.clock import Clock
-from estimator.daemon.reload import carried
-from estimator.pipeline import Pipeline, State, TickRecord
-from estimator.readings import Reading
-from estimator.sync import NS
+from gritd.estimator.daemon.clock import Clock
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.online.carry import carried
+from gritd.estimator.online.checkpoint import encode
+from gritd.estimator.online.pipeline import Pipeline, State, TickRecord
+from gritd.estimator.wheel.sync import NS
 
 RECENT = 2500  # ticks whose lateness is remembered
 _SHARES = {"late_50": 0.5, "late_99": 0.99, "late_999": 0.999, "late_max": 1.0}
@@ -64,7 +64,9 @@ class Source(Protocol):
 class Loop:
     """Ticks until told to stop. `latest` is the last tick and loop record, for whoever watches."""
 
-    def __init__(self, pipeline: Pipeline, source: Source, sink: Sink, clock: Clock, configuration: str = "") -> None:
+    def __init__(
+        self, pipeline: Pipeline, source: Source, sink: Sink, clock: Clock, configuration: str = ""
+    ) -> None:
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock
         self._configuration = configuration
         self._period = round(NS / pipeline.settings.rates.tick)
@@ -84,7 +86,10 @@ class Loop:
         recent = sorted(self._lateness.copy())
         if not recent:
             return {}
-        return {name: recent[min(int(share * len(recent)), len(recent) - 1)] for name, share in _SHARES.items()}
+        return {
+            name: recent[min(int(share * len(recent)), len(recent) - 1)]
+            for name, share in _SHARES.items()
+        }
 
     def run(self, stop: Event) -> None:
         """Tick at every deadline; one more tick after the stop takes what the readers left."""
@@ -101,7 +106,9 @@ class Loop:
             state = self._between(state, deadline)
             deadline = self._next(deadline)
 
-    def _hand_over(self, readings: list[Reading], tick: TickRecord, deadline: int, woken: int) -> None:
+    def _hand_over(
+        self, readings: list[Reading], tick: TickRecord, deadline: int, woken: int
+    ) -> None:
         waiting, dropped = self._sink.counts()
         loop = LoopRecord(
             stamp=deadline,

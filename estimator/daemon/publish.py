@@ -19,7 +19,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
-from estimator.patience import waited
+from gritd.estimator.recording.patience import waited
 
 INTERVAL = 0.1  # [s] between lines
 BREATH = 0.01  # [s] between attempts to take somebody in who cannot be, for want of descriptors
@@ -118,7 +118,9 @@ def _listener(path: Path) -> socket.socket:
         listener.listen(MAX_CLIENTS)
     except OSError as error:
         listener.close()
-        reason = "a file of this name is there" if error.errno == errno.EADDRINUSE else error.strerror
+        reason = (
+            "a file of this name is there" if error.errno == errno.EADDRINUSE else error.strerror
+        )
         raise PublishError(f"{path}: cannot make the status socket: {reason}") from None
     return listener
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart, turning
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart, turning
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -19,10 +19,14 @@ class AsymmetricFriction(Effect):
     1083-1138; the offset term of the EMPS benchmark, Janot, Gautier, Brunot (2019).
     """
 
-    difference: float = strength("half the difference between directions, A", "N·m", typical=0.4, low=-5.0, high=5.0)
+    difference: float = strength(
+        "half the difference between directions, A", "N·m", typical=0.4, low=-5.0, high=5.0
+    )
 
     stage = "drivetrain"
-    fingerprint = Fingerprint("torque", "constant", "motor torque shifted the same way whichever way the wheel turns")
+    fingerprint = Fingerprint(
+        "torque", "constant", "motor torque shifted the same way whichever way the wheel turns"
+    )
     confusable_with = told_apart(coulomb_friction="reversal", current_offset="standstill")
 
     def torque_loss(self, situation: Situation) -> Scalar:

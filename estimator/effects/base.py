@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from estimator.situation import ContactLaw, Motion, Reaction, Sensed, Situation
-from estimator.terramechanics.soil import Scalar, Soil, Wheel
+from gritd.estimator.stages.situation import ContactLaw, Motion, Reaction, Sensed, Situation
+from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
 
 Stage = Literal["soil", "contact", "wheel", "testbed", "drivetrain", "sensor", "any"]
 STAGES: tuple[Stage, ...] = ("soil", "contact", "wheel", "testbed", "drivetrain", "sensor", "any")
@@ -64,12 +64,23 @@ class Parameter:
         return self.centre
 
 
-def strength(meaning: str, unit: str, *, typical: float, low: float, high: float, off: float = 0.0) -> Any:
+def strength(
+    meaning: str, unit: str, *, typical: float, low: float, high: float, off: float = 0.0
+) -> Any:
     """A field whose off value switches the effect off; `typical` is the size to be expected where it is at work."""
     return _field(off, meaning, unit, "strength", typical, low, high)
 
 
-def shape(meaning: str, unit: str, *, mean: float, sigma: float, low: float, high: float, scan: bool = False) -> Any:
+def shape(
+    meaning: str,
+    unit: str,
+    *,
+    mean: float,
+    sigma: float,
+    low: float,
+    high: float,
+    scan: bool = False,
+) -> Any:
     """A field that shapes the effect and means nothing while it is off."""
     return _field(mean, meaning, unit, "shape", sigma, low, high, scan)
 
@@ -82,7 +93,9 @@ class Fingerprint(NamedTuple):
     """Where the effect shows most."""
 
     channel: str  # torque, drawbar_pull, sinkage, load
-    covariate: str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant,
+    covariate: (
+        str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant,
+    )
     #                 rate (of the channel itself), heat (∫I² since the run began)
     sentence: str
 
@@ -99,10 +112,16 @@ class Effect:
     name: ClassVar[str]  # the file's name
     stage: ClassVar[Stage]
     fingerprint: ClassVar[Fingerprint]
-    confusable_with: ClassVar[Mapping[str, str]] = told_apart()  # other effect -> key of EXPERIMENTS
+    confusable_with: ClassVar[Mapping[str, str]] = (
+        told_apart()
+    )  # other effect -> key of EXPERIMENTS
     at_start: ClassVar[float] = 0.0  # what `remember` starts from
-    filter_only: ClassVar[bool] = False  # acts on the on-line filter alone; the forward model needs nothing of it
-    needs_sinkage: ClassVar[bool] = False  # the load stage needs a predicted sinkage: the balance is solved twice
+    filter_only: ClassVar[bool] = (
+        False  # acts on the on-line filter alone; the forward model needs nothing of it
+    )
+    needs_sinkage: ClassVar[bool] = (
+        False  # the load stage needs a predicted sinkage: the balance is solved twice
+    )
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]
@@ -167,7 +186,9 @@ class Effect:
     @classmethod
     def formula(cls) -> str:
         """The formula and its source."""
-        return textwrap.dedent("    " + (cls.__doc__ or "").strip().partition("\n\n")[2].lstrip()).strip()
+        return textwrap.dedent(
+            "    " + (cls.__doc__ or "").strip().partition("\n\n")[2].lstrip()
+        ).strip()
 
 
 def _parameter(
@@ -185,7 +206,9 @@ def _parameter(
 
 
 RATE_REFERENCE = 0.02  # [m/s] speed at which the soil's parameters were found
-RATE_FLOOR = 0.001  # [m/s] slower than this speed no longer matters, so a standing wheel stays finite
+RATE_FLOOR = (
+    0.001  # [m/s] slower than this speed no longer matters, so a standing wheel stays finite
+)
 TURNING = 0.01  # [rad/s] width over which a friction torque changes sign
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Reaction, Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,16 @@ class BedSlope(Effect):
         "drawbar_pull", "load", "drawbar pull lower by a fixed share of the load, either way driven"
     )
     confusable_with = told_apart(
-        force_crosstalk="level", side_wall_rubbing="reversal", bulldozing="reversal", sinkage_datum="level"
+        force_crosstalk="level",
+        side_wall_rubbing="reversal",
+        bulldozing="reversal",
+        sinkage_datum="level",
     )
 
     def load(self, load: Scalar, situation: Situation) -> Scalar:
         return load * float(np.cos(self.angle))
 
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
-        return replace(reaction, drawbar_pull=reaction.drawbar_pull - situation.load * np.sin(self.angle))
+        return replace(
+            reaction, drawbar_pull=reaction.drawbar_pull - situation.load * np.sin(self.angle)
+        )

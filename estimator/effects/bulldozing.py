@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Reaction, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
 
 
 @dataclass(frozen=True)
@@ -20,19 +20,29 @@ class Bulldozing(Effect):
     24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as wide as the wheel.
     """
 
-    share: float = strength("share of a plane blade's resistance, s", "", typical=0.3, low=0.0, high=1.5)
-    unit_weight: float = shape("weight of the soil, γ", "N/m^3", mean=15e3, sigma=2e3, low=1e3, high=25e3)
+    share: float = strength(
+        "share of a plane blade's resistance, s", "", typical=0.3, low=0.0, high=1.5
+    )
+    unit_weight: float = shape(
+        "weight of the soil, γ", "N/m^3", mean=15e3, sigma=2e3, low=1e3, high=25e3
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint(
         "drawbar_pull", "sinkage", "drawbar pull falls with sinkage while torque and sinkage stay"
     )
-    confusable_with = told_apart(side_wall_rubbing="load_step", bed_slope="reversal", force_crosstalk="reversal")
+    confusable_with = told_apart(
+        side_wall_rubbing="load_step", bed_slope="reversal", force_crosstalk="reversal"
+    )
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         z, phi = np.maximum(situation.sinkage, 0.0), np.arctan(situation.tan_phi)
         x = 0.25 * np.pi - 0.5 * phi
         cot_x = 1.0 / np.tan(x)
-        wedge = situation.cohesion * z + 0.5 * self.unit_weight * z**2 * (cot_x + cot_x**2 * situation.tan_phi)
+        wedge = situation.cohesion * z + 0.5 * self.unit_weight * z**2 * (
+            cot_x + cot_x**2 * situation.tan_phi
+        )
         resistance = self.share * situation.width * (cot_x + np.tan(x + phi)) * wedge
-        return replace(reaction, drawbar_pull=reaction.drawbar_pull - situation.direction * resistance)
+        return replace(
+            reaction, drawbar_pull=reaction.drawbar_pull - situation.direction * resistance
+        )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart, turning
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart, turning
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,9 @@ class CoulombFriction(Effect):
 
     stage = "drivetrain"
     fingerprint = Fingerprint(
-        "torque", "constant", "motor torque higher by the same amount at every load, slip and speed; nothing at rest"
+        "torque",
+        "constant",
+        "motor torque higher by the same amount at every load, slip and speed; nothing at rest",
     )
     confusable_with = told_apart(
         current_offset="standstill",

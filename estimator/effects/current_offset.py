@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Sensed, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Sensed, Situation
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class CurrentOffset(Effect):
     offset: float = strength("reading at zero current, I₀", "A", typical=0.1, low=-2.0, high=2.0)
 
     stage = "sensor"
-    fingerprint = Fingerprint("torque", "constant", "current shifted by the same amount always, at standstill too")
+    fingerprint = Fingerprint(
+        "torque", "constant", "current shifted by the same amount always, at standstill too"
+    )
     confusable_with = told_apart(coulomb_friction="standstill", asymmetric_friction="standstill")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Soil
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Soil
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,21 @@ class DryingCohesion(Effect):
     """
 
     change: float = strength("final relative change of c, a", "", typical=0.4, low=-0.95, high=5.0)
-    duration: float = shape("time constant, τ", "s", mean=300.0, sigma=300.0, low=10.0, high=36e3, scan=True)
+    duration: float = shape(
+        "time constant, τ", "s", mean=300.0, sigma=300.0, low=10.0, high=36e3, scan=True
+    )
 
     stage = "soil"
     fingerprint = Fingerprint(
         "drawbar_pull", "time", "drawbar pull and torque drift with time, the same at every speed"
     )
-    confusable_with = told_apart(motor_heating="long_run", multipass="shifted_start", soil_patch="shifted_start")
+    confusable_with = told_apart(
+        motor_heating="long_run", multipass="shifted_start", soil_patch="shifted_start"
+    )
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
-        return replace(soil, cohesion=soil.cohesion * (1.0 - self.change * np.expm1(-situation.time / self.duration)))
+        return replace(
+            soil,
+            cohesion=soil.cohesion
+            * (1.0 - self.change * np.expm1(-situation.time / self.duration)),
+        )

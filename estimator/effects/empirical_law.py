@@ -6,9 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import RATE_FLOOR, RATE_REFERENCE, Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Reaction, Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import (
+    RATE_FLOOR,
+    RATE_REFERENCE,
+    Effect,
+    Fingerprint,
+    shape,
+    strength,
+    told_apart,
+)
+from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 def _torque(term: str) -> float:
@@ -52,14 +60,20 @@ class EmpiricalLaw(Effect):
     slip_to: float = shape("domain of i", "", mean=0.8, sigma=0.1, low=-1.0, high=1.0)
     sinkage_from: float = shape("domain of ζ", "", mean=0.0, sigma=0.1, low=0.0, high=1.0)
     sinkage_to: float = shape("domain of ζ", "", mean=0.9, sigma=0.1, low=0.0, high=1.0)
-    speed_from: float = shape("domain of the rim speed", "m/s", mean=0.0, sigma=0.01, low=0.0, high=10.0)
-    speed_to: float = shape("domain of the rim speed", "m/s", mean=0.1, sigma=0.05, low=0.0, high=10.0)
+    speed_from: float = shape(
+        "domain of the rim speed", "m/s", mean=0.0, sigma=0.01, low=0.0, high=10.0
+    )
+    speed_to: float = shape(
+        "domain of the rim speed", "m/s", mean=0.1, sigma=0.05, low=0.0, high=10.0
+    )
 
     stage = "any"
     fingerprint = Fingerprint(
         "torque", "speed", "whatever the fit found, in the channel and over the covariate it found"
     )
-    confusable_with = told_apart(coulomb_friction="speed_step", bulldozing="slip_step", sinkage_datum="tape")
+    confusable_with = told_apart(
+        coulomb_friction="speed_step", bulldozing="slip_step", sinkage_datum="tape"
+    )
 
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
         terms = self._terms(situation)
@@ -70,8 +84,20 @@ class EmpiricalLaw(Effect):
             self.torque_sinkage,
             self.torque_speed,
         )
-        pull = (self.pull_constant, self.pull_slip, self.pull_slip_squared, self.pull_sinkage, self.pull_speed)
-        depth = (self.depth_constant, self.depth_slip, self.depth_slip_squared, self.depth_sinkage, self.depth_speed)
+        pull = (
+            self.pull_constant,
+            self.pull_slip,
+            self.pull_slip_squared,
+            self.pull_sinkage,
+            self.pull_speed,
+        )
+        depth = (
+            self.depth_constant,
+            self.depth_slip,
+            self.depth_slip_squared,
+            self.depth_sinkage,
+            self.depth_speed,
+        )
         return replace(
             reaction,
             torque=reaction.torque + situation.direction * _sum(torque, terms),
@@ -83,8 +109,16 @@ class EmpiricalLaw(Effect):
         """1, i, i², ζ, ν."""
         slip = np.clip(situation.slip, self.slip_from, self.slip_to)
         depth = np.clip(situation.sinkage / situation.radius, self.sinkage_from, self.sinkage_to)
-        speed = np.clip(situation.radius * np.abs(situation.wheel_speed), self.speed_from, self.speed_to)
-        return 1.0, slip, slip * slip, depth, np.log((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR))
+        speed = np.clip(
+            situation.radius * np.abs(situation.wheel_speed), self.speed_from, self.speed_to
+        )
+        return (
+            1.0,
+            slip,
+            slip * slip,
+            depth,
+            np.log((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR)),
+        )
 
 
 def _sum(coefficients: tuple[float, ...], terms: tuple[Scalar, ...]) -> Scalar:

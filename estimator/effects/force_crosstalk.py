@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Sensed, Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Sensed, Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,12 @@ class ForceCrosstalk(Effect):
     from_load: float = strength("pull read per load, b", "", typical=0.02, low=-0.3, high=0.3)
 
     stage = "sensor"
-    fingerprint = Fingerprint("drawbar_pull", "load", "drawbar pull off in proportion to torque or load")
-    confusable_with = told_apart(bed_slope="level", side_wall_rubbing="reversal", bulldozing="reversal")
+    fingerprint = Fingerprint(
+        "drawbar_pull", "load", "drawbar pull off in proportion to torque or load"
+    )
+    confusable_with = told_apart(
+        bed_slope="level", side_wall_rubbing="reversal", bulldozing="reversal"
+    )
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
         return replace(sensed, drawbar_pull=sensed.drawbar_pull + self._leak(sensed))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Sensed, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Sensed, Situation
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,12 @@ class FrameCompliance(Effect):
     compliance: float = strength("yielding per load, C", "m/N", typical=1.5e-5, low=0.0, high=2e-4)
 
     stage = "testbed"
-    fingerprint = Fingerprint("sinkage", "load", "sinkage reads too large in proportion to load; nothing when lifted")
-    confusable_with = told_apart(sinkage_gain="dead_weight", sinkage_datum="load_step", rear_contact="dead_weight")
+    fingerprint = Fingerprint(
+        "sinkage", "load", "sinkage reads too large in proportion to load; nothing when lifted"
+    )
+    confusable_with = told_apart(
+        sinkage_gain="dead_weight", sinkage_datum="load_step", rear_contact="dead_weight"
+    )
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
         return replace(sensed, sinkage=sensed.sinkage + self.compliance * situation.carried)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,15 @@ class GearRipple(Effect):
 
     ripple_cos: float = strength("ripple in phase, a", "N·m", typical=0.2, low=-3.0, high=3.0)
     ripple_sin: float = strength("ripple in quadrature, b", "N·m", typical=0.2, low=-3.0, high=3.0)
-    order: float = shape("ripples a turn of the wheel, N", "", mean=40.0, sigma=30.0, low=2.0, high=200.0, scan=True)
+    order: float = shape(
+        "ripples a turn of the wheel, N", "", mean=40.0, sigma=30.0, low=2.0, high=200.0, scan=True
+    )
 
     stage = "drivetrain"
     fingerprint = Fingerprint(
-        "torque", "wheel_angle", "N ripples a turn in motor current only, also with the wheel lifted"
+        "torque",
+        "wheel_angle",
+        "N ripples a turn in motor current only, also with the wheel lifted",
     )
     confusable_with = told_apart(grousers="lifted_spin", wheel_eccentricity="lifted_spin")
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import ContactLaw, Reaction, Situation
-from estimator.terramechanics.soil import Scalar, Wheel
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import ContactLaw, Reaction, Situation
+from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
 HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
 
@@ -27,12 +27,24 @@ class Grousers(Effect):
     """
 
     height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)
-    grip: float = strength("gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=1.0)
-    ripple_cos: float = strength("relative ripple of torque in phase, a", "", typical=0.15, low=-0.5, high=0.5)
-    ripple_sin: float = strength("relative ripple of torque in quadrature, b", "", typical=0.15, low=-0.5, high=0.5)
-    digging: float = strength("height of the soil that the lugs carry away, d", "m", typical=2e-3, low=0.0, high=0.02)
-    count: float = shape("lugs on the rim, N", "", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True)
-    share: float = shape("share of the height that shears, λ", "", mean=0.6, sigma=0.2, low=0.0, high=1.0)
+    grip: float = strength(
+        "gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=1.0
+    )
+    ripple_cos: float = strength(
+        "relative ripple of torque in phase, a", "", typical=0.15, low=-0.5, high=0.5
+    )
+    ripple_sin: float = strength(
+        "relative ripple of torque in quadrature, b", "", typical=0.15, low=-0.5, high=0.5
+    )
+    digging: float = strength(
+        "height of the soil that the lugs carry away, d", "m", typical=2e-3, low=0.0, high=0.02
+    )
+    count: float = shape(
+        "lugs on the rim, N", "", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True
+    )
+    share: float = shape(
+        "share of the height that shears, λ", "", mean=0.6, sigma=0.2, low=0.0, high=1.0
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint(
@@ -60,7 +72,9 @@ class Grousers(Effect):
             reaction,
             torque=reaction.torque + ripple * situation.torque,
             drawbar_pull=reaction.drawbar_pull + ripple * situation.torque / situation.radius,
-            sinkage=reaction.sinkage - ripple * self.height + self.digging * _carried(situation.slip),
+            sinkage=reaction.sinkage
+            - ripple * self.height
+            + self.digging * _carried(situation.slip),
         )
 
 

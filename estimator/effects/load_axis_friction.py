@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.history import path_relaxed, smoothed
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.history import path_relaxed, smoothed
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 PRESLIDING = 1e-4  # [m] travel over which the friction turns round
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.history import relaxed
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.history import relaxed
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,17 @@ class MotorHeating(Effect):
     and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins thermal resistance and magnet coefficient.
     """
 
-    fall: float = strength("relative fall per squared current, β", "1/A^2", typical=0.15, low=0.0, high=5.0)
-    duration: float = shape("thermal time constant, τ", "s", mean=300.0, sigma=200.0, low=2.0, high=3600.0, scan=True)
+    fall: float = strength(
+        "relative fall per squared current, β", "1/A^2", typical=0.15, low=0.0, high=5.0
+    )
+    duration: float = shape(
+        "thermal time constant, τ", "s", mean=300.0, sigma=200.0, low=2.0, high=3600.0, scan=True
+    )
 
     stage = "drivetrain"
-    fingerprint = Fingerprint("torque", "heat", "current creeps up over a run while measured axle torque stays")
+    fingerprint = Fingerprint(
+        "torque", "heat", "current creeps up over a run while measured axle torque stays"
+    )
     confusable_with = told_apart(
         torque_constant_error="long_run", drying_cohesion="long_run", viscous_friction="long_run"
     )

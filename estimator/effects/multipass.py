@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Soil
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Soil
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,18 @@ class Multipass(Effect):
 
     stiffening: float = strength("final rise of K, a", "", typical=0.5, low=0.0, high=5.0)
     bonding: float = strength("final rise of c, a_c", "", typical=0.3, low=0.0, high=3.0)
-    shortening: float = strength("final fall of k as 1/(1 + a_k)", "", typical=0.2, low=0.0, high=2.0)
-    passes: float = shape("passes to 63 % of the growth, N₀", "", mean=2.0, sigma=1.0, low=0.5, high=10.0)
+    shortening: float = strength(
+        "final fall of k as 1/(1 + a_k)", "", typical=0.2, low=0.0, high=2.0
+    )
+    passes: float = shape(
+        "passes to 63 % of the growth, N₀", "", mean=2.0, sigma=1.0, low=0.5, high=10.0
+    )
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "run", "sinkage falls from pass to pass, fast at first")
-    confusable_with = told_apart(drying_cohesion="second_pass", soil_patch="second_pass", sinkage_datum="tape")
+    confusable_with = told_apart(
+        drying_cohesion="second_pass", soil_patch="second_pass", sinkage_datum="tape"
+    )
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         grown = 1.0 - np.exp((1.0 - situation.pass_number) / self.passes)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Motion
-from estimator.terramechanics.soil import Wheel
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Motion
+from gritd.estimator.terramechanics.soil import Wheel
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,9 @@ class PulleySlip(Effect):
 
     stage = "sensor"
     fingerprint = Fingerprint(
-        "drawbar_pull", "slip", "drawbar pull and torque too low, most where slip is low and its error counts most"
+        "drawbar_pull",
+        "slip",
+        "drawbar pull and torque too low, most where slip is low and its error counts most",
     )
     confusable_with = told_apart(wheel_radius_error="tape", torque_constant_error="slip_step")
 

@@ -6,8 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import RATE_FLOOR, RATE_REFERENCE, Effect, Fingerprint, strength, told_apart
-from estimator.situation import ContactLaw, Situation
+from gritd.estimator.effects.base import (
+    RATE_FLOOR,
+    RATE_REFERENCE,
+    Effect,
+    Fingerprint,
+    strength,
+    told_apart,
+)
+from gritd.estimator.stages.situation import ContactLaw, Situation
 
 
 @dataclass(frozen=True)
@@ -19,14 +26,20 @@ class RateDependentShear(Effect):
     Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten per cent a decade.
     """
 
-    per_decade: float = strength("gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.2, high=0.3)
+    per_decade: float = strength(
+        "gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.2, high=0.3
+    )
 
     stage = "contact"
     fingerprint = Fingerprint(
-        "drawbar_pull", "speed", "drawbar pull and torque rise with the logarithm of speed at fixed slip"
+        "drawbar_pull",
+        "speed",
+        "drawbar pull and torque rise with the logarithm of speed at fixed slip",
     )
     confusable_with = told_apart(
-        viscous_friction="speed_step", stribeck_friction="speed_step", rate_dependent_sinkage="speed_step"
+        viscous_friction="speed_step",
+        stribeck_friction="speed_step",
+        rate_dependent_sinkage="speed_step",
     )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:

@@ -6,9 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import RATE_FLOOR, RATE_REFERENCE, Effect, Fingerprint, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Soil
+from gritd.estimator.effects.base import (
+    RATE_FLOOR,
+    RATE_REFERENCE,
+    Effect,
+    Fingerprint,
+    strength,
+    told_apart,
+)
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Soil
 
 
 @dataclass(frozen=True)
@@ -29,5 +36,7 @@ class RateDependentSinkage(Effect):
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         speed = situation.radius * np.abs(situation.wheel_speed)
         return replace(
-            soil, modulus=soil.modulus * ((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR)) ** self.power
+            soil,
+            modulus=soil.modulus
+            * ((speed + RATE_FLOOR) / (RATE_REFERENCE + RATE_FLOOR)) ** self.power,
         )

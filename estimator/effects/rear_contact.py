@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import ContactLaw, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import ContactLaw, Situation
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,13 @@ class RearContact(Effect):
 
     stage = "contact"
     fingerprint = Fingerprint(
-        "sinkage", "load", "rides higher, the more the heavier; torque and drawbar pull rise; c seems larger than it is"
+        "sinkage",
+        "load",
+        "rides higher, the more the heavier; torque and drawbar pull rise; c seems larger than it is",
     )
-    confusable_with = told_apart(stress_peak_shift="penetration", multipass="penetration", shear_peak="slip_step")
+    confusable_with = told_apart(
+        stress_peak_shift="penetration", multipass="penetration", shear_peak="slip_step"
+    )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
         return replace(law, theta_2_ratio=law.theta_2_ratio + self.ratio)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import Reaction, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
 
 
 @dataclass(frozen=True)
@@ -21,16 +21,28 @@ class RunningIn(Effect):
     """
 
     pull: float = strength(
-        "drawbar pull beyond the steady one at the start, over the load, f", "", typical=0.06, low=0.0, high=1.0
+        "drawbar pull beyond the steady one at the start, over the load, f",
+        "",
+        typical=0.06,
+        low=0.0,
+        high=1.0,
     )
     depth: float = strength(
-        "slip-sinkage still wanting at the start, at slip 1, d", "m", typical=3e-3, low=0.0, high=0.05
+        "slip-sinkage still wanting at the start, at slip 1, d",
+        "m",
+        typical=3e-3,
+        low=0.0,
+        high=0.05,
     )
-    length: float = shape("travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.005, high=0.12)
+    length: float = shape(
+        "travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.005, high=0.12
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint(
-        "drawbar_pull", "position", "drawbar pull falls and the wheel sinks over the first decimetre of every run"
+        "drawbar_pull",
+        "position",
+        "drawbar pull falls and the wheel sinks over the first decimetre of every run",
     )
     confusable_with = told_apart(
         soil_patch="shifted_start", drying_cohesion="shifted_start", motor_heating="shifted_start"
@@ -40,6 +52,7 @@ class RunningIn(Effect):
         left = np.exp(-situation.travel / self.length)
         return replace(
             reaction,
-            drawbar_pull=reaction.drawbar_pull + self.pull * left * situation.carried * situation.direction,
+            drawbar_pull=reaction.drawbar_pull
+            + self.pull * left * situation.carried * situation.direction,
             sinkage=reaction.sinkage - self.depth * left * np.abs(situation.slip),
         )

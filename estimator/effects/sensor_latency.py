@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.history import delayed
-from estimator.situation import Sensed, Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.history import delayed
+from gritd.estimator.stages.situation import Sensed, Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,14 @@ class SensorLatency(Effect):
 
     sinkage: float = strength("delay of the potentiometer", "s", typical=0.1, low=-0.5, high=1.0)
     current: float = strength("delay of the current", "s", typical=0.1, low=-0.5, high=1.0)
-    force: float = strength("delay of the force/torque sensor", "s", typical=0.1, low=-0.5, high=1.0)
+    force: float = strength(
+        "delay of the force/torque sensor", "s", typical=0.1, low=-0.5, high=1.0
+    )
 
     stage = "sensor"
-    fingerprint = Fingerprint("load", "rate", "pulses in proportion to how fast the channel itself changes")
+    fingerprint = Fingerprint(
+        "load", "rate", "pulses in proportion to how fast the channel itself changes"
+    )
     confusable_with = told_apart(wheel_inertia="load_step", load_axis_friction="load_step")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
@@ -39,7 +43,9 @@ class SensorLatency(Effect):
         return replace(
             sensed,
             **{
-                channel.name: delayed(time, getattr(sensed, channel.name), sign * delays.get(channel.name, self.force))
+                channel.name: delayed(
+                    time, getattr(sensed, channel.name), sign * delays.get(channel.name, self.force)
+                )
                 for channel in fields(sensed)
             },
         )

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from estimator.situation import ContactLaw, Situation
-from estimator.terramechanics.soil import Array
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.situation import ContactLaw, Situation
+from gritd.estimator.terramechanics.soil import Array
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,12 @@ class ShearPeak(Effect):
     Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas (1983).
     """
 
-    overshoot: float = strength("P: 0 is no peak, 1.4 a residual of two thirds", "", typical=0.4, low=0.0, high=3.0)
-    breadth: float = shape("K_w/k: the peak stands at j = 0.69 K_w", "", mean=1.0, sigma=0.5, low=0.5, high=3.0)
+    overshoot: float = strength(
+        "P: 0 is no peak, 1.4 a residual of two thirds", "", typical=0.4, low=0.0, high=3.0
+    )
+    breadth: float = shape(
+        "K_w/k: the peak stands at j = 0.69 K_w", "", mean=1.0, sigma=0.5, low=0.5, high=3.0
+    )
 
     stage = "contact"
     fingerprint = Fingerprint(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Reaction, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,12 @@ class SideWallRubbing(Effect):
     share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=0.5)
 
     stage = "testbed"
-    fingerprint = Fingerprint("drawbar_pull", "load", "drawbar pull lost in proportion to load, always against travel")
-    confusable_with = told_apart(bed_slope="reversal", force_crosstalk="reversal", bulldozing="load_step")
+    fingerprint = Fingerprint(
+        "drawbar_pull", "load", "drawbar pull lost in proportion to load, always against travel"
+    )
+    confusable_with = told_apart(
+        bed_slope="reversal", force_crosstalk="reversal", bulldozing="load_step"
+    )
 
     def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
         lost = self.share * situation.carried * situation.direction

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Reaction, Situation
-from estimator.terramechanics.soil import Array
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
+from gritd.estimator.terramechanics.soil import Array
 
 AT_REST = 0.5  # lateral over normal stress in soil confined by the wheel [-]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -28,7 +28,9 @@ class SidewallFriction(Effect):
     the faces of the wheel as in Ishigami et al. (2007), J. Field Robotics 24, 233-250.
     """
 
-    share: float = strength("strength mobilised on the faces, s", "", typical=0.3, low=0.0, high=1.5)
+    share: float = strength(
+        "strength mobilised on the faces, s", "", typical=0.3, low=0.0, high=1.5
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint(
@@ -55,7 +57,9 @@ class SidewallFriction(Effect):
 def _face(theta_1: Array, slip: Array) -> tuple[Array, Array]:
     """Moment over r³ and forward force over r² of unit stress on the buried front half of one face, 5 × 5 nodes."""
     moment, force = np.zeros(np.shape(theta_1)), np.zeros(np.shape(theta_1))
-    rolling = 1.0 - np.maximum(slip, 0.0) - np.minimum(slip, 0.0) / np.maximum(1.0 + slip, 0.05)  # V/r
+    rolling = (
+        1.0 - np.maximum(slip, 0.0) - np.minimum(slip, 0.0) / np.maximum(1.0 + slip, 0.05)
+    )  # V/r
     top = np.cos(theta_1)
     for node, weight in zip(0.5 * (NODES + 1.0), 0.5 * WEIGHTS, strict=True):
         x = node * np.sin(theta_1)

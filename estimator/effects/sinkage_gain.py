@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Sensed, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Sensed, Situation
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,9 @@ class SinkageGain(Effect):
 
     stage = "sensor"
     fingerprint = Fingerprint("sinkage", "sinkage", "sinkage off in proportion to itself")
-    confusable_with = told_apart(frame_compliance="dead_weight", sinkage_datum="load_step", slip_sinkage="tape")
+    confusable_with = told_apart(
+        frame_compliance="dead_weight", sinkage_datum="load_step", slip_sinkage="tape"
+    )
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
         return replace(sensed, sinkage=sensed.sinkage * (1.0 + self.gain))

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Soil
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Soil
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class SlipSinkage(Effect):
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in i.
     """
 
-    growth: float = strength("rise of the exponent with slip, n₁", "", typical=0.2, low=-0.2, high=1.2)
+    growth: float = strength(
+        "rise of the exponent with slip, n₁", "", typical=0.2, low=-0.2, high=1.2
+    )
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "slip", "sinkage rises with slip at one load")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,15 @@ class StressLinearisation(Effect):
     themselves. Source: (8)-(10) against (20)-(22), Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42, 1-13.
     """
 
-    share: float = strength("share of the difference given back, s", "", typical=1.0, low=0.0, high=1.0)
+    share: float = strength(
+        "share of the difference given back, s", "", typical=1.0, low=0.0, high=1.0
+    )
 
     stage = "contact"
     fingerprint = Fingerprint(
-        "torque", "slip", "closed-form torque too small at low slip and deep sinkage; c seems smaller, tan φ larger"
+        "torque",
+        "slip",
+        "closed-form torque too small at low slip and deep sinkage; c seems smaller, tan φ larger",
     )
     confusable_with = told_apart(torque_constant_error="slip_step", stress_peak_shift="penetration")
     filter_only = True

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import ContactLaw, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import ContactLaw, Situation
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,11 @@ class StressPeakShift(Effect):
     fingerprint = Fingerprint(
         "sinkage", "sinkage", "sinkage and drawbar pull change, more at high slip; torque much less"
     )
-    confusable_with = told_apart(rear_contact="penetration", slip_sinkage="penetration", shear_peak="slip_step")
+    confusable_with = told_apart(
+        rear_contact="penetration", slip_sinkage="penetration", shear_peak="slip_step"
+    )
 
     def contact(self, law: ContactLaw, situation: Situation) -> ContactLaw:
-        return replace(law, theta_m_ratio=law.theta_m_ratio + self.share + self.slip_share * situation.slip)
+        return replace(
+            law, theta_m_ratio=law.theta_m_ratio + self.share + self.slip_share * situation.slip
+        )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Situation
-from estimator.terramechanics.soil import Scalar
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Scalar
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,9 @@ class ViscousFriction(Effect):
         "torque", "speed", "motor torque rises in proportion to speed, also with the wheel lifted"
     )
     confusable_with = told_apart(
-        coulomb_friction="speed_step", rate_dependent_shear="speed_step", stribeck_friction="speed_step"
+        coulomb_friction="speed_step",
+        rate_dependent_shear="speed_step",
+        stribeck_friction="speed_step",
     )
 
     def torque_loss(self, situation: Situation) -> Scalar:

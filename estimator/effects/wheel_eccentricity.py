@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Motion, Reaction, Situation
-from estimator.terramechanics.soil import Scalar, Wheel
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Motion, Reaction, Situation
+from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,22 @@ class WheelEccentricity(Effect):
     The last term is the work of lifting the load W. Source: rigid-body kinematics of an eccentric disc.
     """
 
-    offset_cos: float = strength("eccentricity in phase, a", "m", typical=1e-3, low=-0.01, high=0.01)
-    offset_sin: float = strength("eccentricity in quadrature, b", "m", typical=1e-3, low=-0.01, high=0.01)
+    offset_cos: float = strength(
+        "eccentricity in phase, a", "m", typical=1e-3, low=-0.01, high=0.01
+    )
+    offset_sin: float = strength(
+        "eccentricity in quadrature, b", "m", typical=1e-3, low=-0.01, high=0.01
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint("sinkage", "wheel_angle", "one cycle a turn in sinkage and torque")
     confusable_with = told_apart(gear_ripple="lifted_spin", grousers="tape")
 
     def motion(self, motion: Motion, wheel: Wheel) -> Motion:
-        return replace(motion, wheel_speed=motion.wheel_speed * (1.0 + self._lift(motion.wheel_angle) / wheel.radius))
+        return replace(
+            motion,
+            wheel_speed=motion.wheel_speed * (1.0 + self._lift(motion.wheel_angle) / wheel.radius),
+        )
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         angle = situation.wheel_angle

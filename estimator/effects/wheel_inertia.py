@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.situation import Reaction, Situation
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.stages.situation import Reaction, Situation
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,17 @@ class WheelInertia(Effect):
     Source: Newton's second law; J holds the rotor's inertia times the square of the gear ratio.
     """
 
-    inertia: float = strength("moment of inertia at the axle, J", "kg·m^2", typical=0.3, low=0.0, high=5.0)
+    inertia: float = strength(
+        "moment of inertia at the axle, J", "kg·m^2", typical=0.3, low=0.0, high=5.0
+    )
 
     stage = "wheel"
-    fingerprint = Fingerprint("torque", "acceleration", "torque pulses while the speed changes, none at steady speed")
+    fingerprint = Fingerprint(
+        "torque", "acceleration", "torque pulses while the speed changes, none at steady speed"
+    )
     confusable_with = told_apart(sensor_latency="speed_step", stribeck_friction="speed_step")
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
-        return replace(reaction, torque=reaction.torque + self.inertia * situation.wheel_acceleration)
+        return replace(
+            reaction, torque=reaction.torque + self.inertia * situation.wheel_acceleration
+        )

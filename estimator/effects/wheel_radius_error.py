@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from estimator.terramechanics.soil import Wheel
+from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.terramechanics.soil import Wheel
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,9 @@ class WheelRadiusError(Effect):
     Source: calibration model.
     """
 
-    error: float = strength("relative error of the configured radius, e", "", typical=0.03, low=-0.3, high=0.3)
+    error: float = strength(
+        "relative error of the configured radius, e", "", typical=0.03, low=-0.3, high=0.3
+    )
 
     stage = "sensor"
     fingerprint = Fingerprint(
@@ -25,7 +27,9 @@ class WheelRadiusError(Effect):
         "sinkage",
         "drawbar pull, torque and sinkage off, more where the wheel rides deep; slip off most where it is low",
     )
-    confusable_with = told_apart(pulley_slip="tape", grousers="tape", torque_constant_error="slip_step")
+    confusable_with = told_apart(
+        pulley_slip="tape", grousers="tape", torque_constant_error="slip_step"
+    )
 
     def geometry(self, wheel: Wheel) -> Wheel:
         return replace(wheel, radius=wheel.radius * (1.0 + self.error))

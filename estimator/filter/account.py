@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from estimator.filter import KPA, LN_K, TAN_PHI, C, Estimate
-from estimator.filter.measurement import COMPONENTS, Measurement, soil
-from estimator.filter.pull import Pull
-from estimator.filter.tracker import Account, Aid, Tracker, TrackState
-from estimator.record import NOT_A_NUMBER
-from estimator.sync import Measured, Snapshot
-from estimator.wheel_state import WheelState
+from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
+from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
+from gritd.estimator.filter.pull import Pull
+from gritd.estimator.filter.tracker import Account, Aid, Tracker, TrackState
+from gritd.estimator.messages.record import NOT_A_NUMBER
+from gritd.estimator.wheel.sync import Measured, Snapshot
+from gritd.estimator.wheel.wheel_state import WheelState
 
 Row = tuple[float, ...]
 
@@ -35,8 +35,15 @@ MEASURED = (
     "temperature",
     *_pairs("torque", "load", "drawbar_pull"),
 )
-ESTIMATED = (*_pairs("cohesion", "tan_phi", "shear_modulus"), "cov_c_tan_phi", "cov_c_ln_k", "cov_tan_phi_ln_k")
-PREDICTED = _pairs("torque_predicted", "load_predicted", "drawbar_pull_predicted", "rolling_resistance")
+ESTIMATED = (
+    *_pairs("cohesion", "tan_phi", "shear_modulus"),
+    "cov_c_tan_phi",
+    "cov_c_ln_k",
+    "cov_tan_phi_ln_k",
+)
+PREDICTED = _pairs(
+    "torque_predicted", "load_predicted", "drawbar_pull_predicted", "rolling_resistance"
+)
 LARGEST = (*_pairs("drawbar_pull_max"), "drawbar_pull_max_slip")
 HEALTH = ("separability", "consistency", "updates", "resets")
 AIDED = tuple(f"{component}_{name}" for component in COMPONENTS for name in Aid._fields)
@@ -98,7 +105,9 @@ def predicted(measurement: Measurement, estimate: Estimate, account: Account) ->
     if account.touching:
         prediction = measurement.predict(estimate, now)
         sigmas = measurement.sigmas(estimate, now, prediction)
-        torque, pull, resistance = [Measured(q.value, sigma) for q, sigma in zip(prediction, sigmas, strict=True)]
+        torque, pull, resistance = [
+            Measured(q.value, sigma) for q, sigma in zip(prediction, sigmas, strict=True)
+        ]
         load = measurement.model.load(*soil(estimate), _angle(now), now.theta_m, now.slip.value)
     return *torque, *load, *pull, *resistance
 
@@ -110,7 +119,9 @@ def health(tracker: Tracker, state: TrackState) -> Row:
 
 def aided(aids: tuple[Aid, ...]) -> Row:
     """In the order of AIDED: the account of each component, zeros where it was not offered."""
-    return tuple([value for aid in (*aids, *(NO_AID,) * (len(COMPONENTS) - len(aids))) for value in aid])
+    return tuple(
+        [value for aid in (*aids, *(NO_AID,) * (len(COMPONENTS) - len(aids))) for value in aid]
+    )
 
 
 def _angle(now: WheelState) -> Measured:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from math import exp, isnan, sqrt
 from operator import mul
 
-from estimator.effects import configured
-from estimator.filter import KPA, Estimate, Matrix, Update, Vector, dot, variance
-from estimator.filter.model import Prediction, Quantity, WheelModel
-from estimator.filter.nuisance import Sensitivity, nuisances
-from estimator.online import Added, Chain, Context, Here, variants
-from estimator.settings import Settings
-from estimator.sync import Snapshot
-from estimator.wheel_state import WheelState, wheel_state
+from gritd.estimator.config.effects import configured
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.estimate import KPA, Estimate, Matrix, Update, Vector, dot, variance
+from gritd.estimator.filter.model import Prediction, Quantity, WheelModel
+from gritd.estimator.filter.nuisance import Sensitivity, nuisances
+from gritd.estimator.wheel.chain import Added, Chain, Context, Here, variants
+from gritd.estimator.wheel.sync import Snapshot
+from gritd.estimator.wheel.wheel_state import WheelState, wheel_state
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
@@ -30,21 +30,32 @@ class Measurement:
         self.nuisances = nuisances(settings)
         self._variants = _variants(settings, self.chain)
         self._unmoved = ((0.0, 0.0),) * len(self._variants)
-        self.variances = (*(nuisance.sigma**2 for nuisance in self.nuisances), *(1.0,) * len(self._variants))
+        self.variances = (
+            *(nuisance.sigma**2 for nuisance in self.nuisances),
+            *(1.0,) * len(self._variants),
+        )
 
-    def state(self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns) -> WheelState:
+    def state(
+        self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns
+    ) -> WheelState:
         """The window in the wheel's own terms, effects accounted for; columns: those of the last update."""
         now = _sensed(self.settings, self.model, self.chain, snapshot, context, estimate)
         return now._replace(columns=columns or self._unmoved)
 
-    def with_columns(self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate) -> WheelState:
+    def with_columns(
+        self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate
+    ) -> WheelState:
         """The window with the change of its innovation for one σ of each uncertain effect parameter, and of n."""
         if not self._variants:
             return now
         here = _innovation(now, _predicted(self.model, estimate, now))
         columns = []
         for model, chain in self._variants:
-            moved = now if chain is self.chain else _sensed(self.settings, model, chain, snapshot, context, estimate)
+            moved = (
+                now
+                if chain is self.chain
+                else _sensed(self.settings, model, chain, snapshot, context, estimate)
+            )
             there = _innovation(moved, _predicted(model, estimate, moved))
             columns.append((here[0] - there[0], here[1] - there[1]))
         return now._replace(columns=tuple(columns))
@@ -81,7 +92,9 @@ class Measurement:
             (common, dot(pull, pull) + now.drawbar_pull.sigma**2),
         )
 
-    def sigmas(self, estimate: Estimate, now: WheelState, prediction: Prediction) -> tuple[float, float, float]:
+    def sigmas(
+        self, estimate: Estimate, now: WheelState, prediction: Prediction
+    ) -> tuple[float, float, float]:
         """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's z, i and W."""
         torque, pull = self._nuisance_gradients(_sensitivity(now, prediction), now.columns)
         return (
@@ -90,13 +103,18 @@ class Measurement:
             self._sigma(estimate, now, prediction.resistance, ()),  # no sensor reads it
         )
 
-    def _sigma(self, estimate: Estimate, now: WheelState, quantity: Quantity, nuisance: Vector) -> float:
+    def _sigma(
+        self, estimate: Estimate, now: WheelState, quantity: Quantity, nuisance: Vector
+    ) -> float:
         noise = (
             quantity.by_theta_1 * now.theta_1.d_sinkage * now.sinkage.sigma,
             quantity.by_slip * now.slip.sigma,
             quantity.by_load * now.load.sigma,
         )
-        return sqrt(variance(estimate, self.variances, _state_gradient(quantity), nuisance) + dot(noise, noise))
+        return sqrt(
+            variance(estimate, self.variances, _state_gradient(quantity), nuisance)
+            + dot(noise, noise)
+        )
 
 
 def soil(estimate: Estimate) -> tuple[float, float, float]:
@@ -116,7 +134,12 @@ def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
 
 
 def _sensed(
-    settings: Settings, model: WheelModel, chain: Chain, snapshot: Snapshot, context: Context, estimate: Estimate
+    settings: Settings,
+    model: WheelModel,
+    chain: Chain,
+    snapshot: Snapshot,
+    context: Context,
+    estimate: Estimate,
 ) -> WheelState:
     """The window with one chain of effects; what wheel and testbed effects add is linear about the estimate."""
     now = wheel_state(settings, snapshot, chain, context)
@@ -143,11 +166,15 @@ def _added(model: WheelModel, chain: Chain, now: WheelState, estimate: Estimate)
         scale = step / x[place] if name == "by_ln_k" else step
         c, tan_phi, k = (value + step if at == place else value for at, value in enumerate(x))
         there = added(
-            (c, tan_phi, k), torque.value + scale * getattr(torque, name), pull.value + scale * getattr(pull, name)
+            (c, tan_phi, k),
+            torque.value + scale * getattr(torque, name),
+            pull.value + scale * getattr(pull, name),
         )
         slopes.append(((there[0] - here[0]) / step, (there[1] - here[1]) / step))
     by_torque, by_pull = zip(*slopes, strict=True)
-    return Added._make((here[0] - dot(by_torque, x), *by_torque, here[1] - dot(by_pull, x), *by_pull))
+    return Added._make(
+        (here[0] - dot(by_torque, x), *by_torque, here[1] - dot(by_pull, x), *by_pull)
+    )
 
 
 def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
@@ -156,12 +183,15 @@ def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Predic
     prediction = model.predict(*ground, now.theta_1.value, now.slip.value, now.load.value)
     if now.here is not None:
         here = now.here
-        prediction = Prediction(*(_by_estimate(quantity, estimate, here) for quantity in prediction))
+        prediction = Prediction(
+            *(_by_estimate(quantity, estimate, here) for quantity in prediction)
+        )
     if now.added is None:
         return prediction
     x = soil(estimate)
     return prediction._replace(
-        torque=_plus(prediction.torque, now.added[:4], x), drawbar_pull=_plus(prediction.drawbar_pull, now.added[4:], x)
+        torque=_plus(prediction.torque, now.added[:4], x),
+        drawbar_pull=_plus(prediction.drawbar_pull, now.added[4:], x),
     )
 
 

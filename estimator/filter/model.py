@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import cos, hypot, log, sin
 from typing import NamedTuple
 
-from estimator.effects.stress_linearisation import StressLinearisation
-from estimator.filter.shift import IntegralShift
-from estimator.online import Chain
-from estimator.settings import Settings
-from estimator.sync import Measured
-from estimator.terramechanics import linear, scalar
-from estimator.terramechanics.soil import Soil
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects.stress_linearisation import StressLinearisation
+from gritd.estimator.filter.shift import IntegralShift
+from gritd.estimator.terramechanics import linear, scalar
+from gritd.estimator.terramechanics.soil import Soil
+from gritd.estimator.wheel.chain import Chain
+from gritd.estimator.wheel.sync import Measured
 
 
 class Quantity(NamedTuple):
@@ -42,9 +42,13 @@ class WheelModel:
         self._exponent_error = exponent_error
         self._shift = _shift(settings, chain)
 
-    def predict(self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float) -> Prediction:
+    def predict(
+        self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float
+    ) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
-        p = scalar.predict(self._wheel, c, tan_phi, k, theta_1, slip, load, self._at(k, theta_1, slip))
+        p = scalar.predict(
+            self._wheel, c, tan_phi, k, theta_1, slip, load, self._at(k, theta_1, slip)
+        )
         return Prediction(
             Quantity(p.torque, *p.torque_gradient),
             Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),
@@ -52,9 +56,13 @@ class WheelModel:
         )
 
     def _at(self, k: float, theta_1: float, slip: float) -> linear.Shift | None:
-        return None if self._shift is None else self._shift.at(k, theta_1, slip, self._exponent_error)
+        return (
+            None if self._shift is None else self._shift.at(k, theta_1, slip, self._exponent_error)
+        )
 
-    def load(self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float) -> Measured:
+    def load(
+        self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float
+    ) -> Measured:
         """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli and of θ₁."""
         radius, soil = self._wheel.radius, self._soil
         depth = radius * (cos(theta_m) - cos(theta_1.value))
@@ -64,14 +72,18 @@ class WheelModel:
         shift = self._at(k, theta_1.value, slip)
         load = scalar.load(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift)
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
-        relative = hypot(soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma)
+        relative = hypot(
+            soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma
+        )
         return Measured(load, abs(load) * relative)
 
 
 def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
     """The shift of the integrals, if the true stresses or a contact effect are configured."""
     share = sum(e.share for e in chain.effects if isinstance(e, StressLinearisation))
-    shaping = tuple(e for e in chain.effects if e.stage in ("contact", "soil", "wheel") and not e.filter_only)
+    shaping = tuple(
+        e for e in chain.effects if e.stage in ("contact", "soil", "wheel") and not e.filter_only
+    )
     if not share and not shaping:
         return None
     soil = settings.soil

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from math import hypot
 from typing import NamedTuple
 
-from estimator.settings import Settings, Uncertain
+from gritd.estimator.config.settings import Settings, Uncertain
 
 
 class Sensitivity(NamedTuple):
@@ -47,26 +47,47 @@ def _all(settings: Settings) -> Iterator[Nuisance]:
     channels, drive, wrench = settings.channels, settings.drive, settings.wrench
     pot, shunt = channels["sinkage_pot"].calibration, channels["motor_shunt"].calibration
     yield Nuisance("sinkage offset [m]", pot.offset.sigma, lambda s: _scaled(-1.0, s.by_sinkage))
-    yield Nuisance("sinkage scale [-]", _relative(pot.scale), lambda s: _scaled(-s.sinkage, s.by_sinkage))
-    rates = (_relative(channels[name].calibration.scale) for name in ("wheel_encoder", "carriage_encoder"))
+    yield Nuisance(
+        "sinkage scale [-]", _relative(pot.scale), lambda s: _scaled(-s.sinkage, s.by_sinkage)
+    )
+    rates = (
+        _relative(channels[name].calibration.scale)
+        for name in ("wheel_encoder", "carriage_encoder")
+    )
     yield Nuisance("speed ratio [-]", hypot(*rates), lambda s: _scaled(1.0 - s.slip, s.by_slip))
     if drive.torque_source == "motor_shunt":
         gain = hypot(_relative(drive.torque_constant), _relative(shunt.scale))
         yield Nuisance("torque scale [-]", gain, lambda s: (s.torque, 0.0))
-        yield Nuisance("torque offset [N·m]", shunt.offset.sigma * drive.torque_constant.value, lambda s: (1.0, 0.0))
+        yield Nuisance(
+            "torque offset [N·m]",
+            shunt.offset.sigma * drive.torque_constant.value,
+            lambda s: (1.0, 0.0),
+        )
     elif wrench is not None:
-        yield Nuisance("torque scale [-]", _relative(wrench.torque.scale), lambda s: (s.torque, 0.0))
+        yield Nuisance(
+            "torque scale [-]", _relative(wrench.torque.scale), lambda s: (s.torque, 0.0)
+        )
         yield Nuisance("torque offset [N·m]", wrench.torque.offset.sigma, lambda s: (1.0, 0.0))
     radius, model = settings.wheel.radius, settings.filter.model_sigma
     yield Nuisance("closed forms, torque [-]", model, lambda s: (s.torque, 0.0))
-    yield Nuisance("closed forms, pull [-]", model, lambda s: (0.0, s.torque / radius))  # of the thrust, about T/r
+    yield Nuisance(
+        "closed forms, pull [-]", model, lambda s: (0.0, s.torque / radius)
+    )  # of the thrust, about T/r
     if wrench is None:
         yield Nuisance("load [N]", settings.load.nominal.sigma, lambda s: _scaled(-1.0, s.by_load))
         return
     yield Nuisance("load offset [N]", wrench.load.offset.sigma, lambda s: _scaled(-1.0, s.by_load))
-    yield Nuisance("load scale [-]", _relative(wrench.load.scale), lambda s: _scaled(-s.load, s.by_load))
-    yield Nuisance("drawbar pull offset [N]", wrench.drawbar_pull.offset.sigma, lambda _: (0.0, 1.0))
-    yield Nuisance("drawbar pull scale [-]", _relative(wrench.drawbar_pull.scale), lambda s: (0.0, s.drawbar_pull))
+    yield Nuisance(
+        "load scale [-]", _relative(wrench.load.scale), lambda s: _scaled(-s.load, s.by_load)
+    )
+    yield Nuisance(
+        "drawbar pull offset [N]", wrench.drawbar_pull.offset.sigma, lambda _: (0.0, 1.0)
+    )
+    yield Nuisance(
+        "drawbar pull scale [-]",
+        _relative(wrench.drawbar_pull.scale),
+        lambda s: (0.0, s.drawbar_pull),
+    )
 
 
 def _relative(quantity: Uncertain) -> float:

@@ -9,7 +9,16 @@ Joseph's form reads, for any gain K,
 
 from __future__ import annotations
 
-from estimator.filter import LN_K, STATES, Estimate, Matrix, Update, Vector, crossed, dot
+from gritd.estimator.filter.estimate import (
+    LN_K,
+    STATES,
+    Estimate,
+    Matrix,
+    Update,
+    Vector,
+    crossed,
+    dot,
+)
 
 
 class PlainEngine:

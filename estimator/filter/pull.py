@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from estimator.filter import Estimate
-from estimator.filter.measurement import Measurement
-from estimator.filter.model import Prediction
-from estimator.record import NOT_A_NUMBER
-from estimator.wheel_state import WheelState
+from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.measurement import Measurement
+from gritd.estimator.filter.model import Prediction
+from gritd.estimator.messages.record import NOT_A_NUMBER
+from gritd.estimator.wheel.wheel_state import WheelState
 
 SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)
 
@@ -59,4 +59,6 @@ def best_slip(pulls: tuple[float, ...]) -> float:
     if best in (0, len(SLIPS) - 1):
         return SLIPS[best]
     before, peak, after = pulls[best - 1 : best + 2]
-    return SLIPS[best] + 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (before - 2.0 * peak + after)
+    return SLIPS[best] + 0.5 * (SLIPS[1] - SLIPS[0]) * (before - after) / (
+        before - 2.0 * peak + after
+    )

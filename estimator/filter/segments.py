@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from estimator.filter import Estimate
-from estimator.geometry import EntryAngle, entry_angle
-from estimator.online import Added, Here
-from estimator.sync import Measured
-from estimator.wheel_state import WheelState
+from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.wheel.chain import Added, Here
+from gritd.estimator.wheel.geometry import EntryAngle, entry_angle
+from gritd.estimator.wheel.sync import Measured
+from gritd.estimator.wheel.wheel_state import WheelState
 
 CAPACITY = 24  # stretches that are linearised anew
 LONGEST = 40  # windows merged into one stretch
@@ -66,7 +66,9 @@ class Stretch(NamedTuple):
             drawbar_pull=mean(old.drawbar_pull, now.drawbar_pull),
             added=old.added and now.added and Added(*_blend(old.added, now.added, weight)),
             here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
-            columns=tuple(_blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)),
+            columns=tuple(
+                _blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)
+            ),
         )
         return Stretch(state, self.windows + 1, self.components, self.elapsed + elapsed)
 

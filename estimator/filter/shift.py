@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from estimator.effects import in_order
-from estimator.effects.base import Effect
-from estimator.forward import paper_contact
-from estimator.situation import Situation
-from estimator.terramechanics import linear, original
-from estimator.terramechanics.linear import Integrals, Shift
-from estimator.terramechanics.soil import Array, Soil, Wheel
+from gritd.estimator.effects import in_order
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.forward import paper_contact
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics import linear, original
+from gritd.estimator.terramechanics.linear import Integrals, Shift
+from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
 
 THETA_1 = (0.05, 1.45)  # [rad] range of the table; outside it the edge is used
 SLIP = (-0.1, 1.0)
@@ -53,9 +53,13 @@ class IntegralShift:
     Soil effects count where they depend on slip alone (the exponent); what they do to c, tan φ and k is the caller's.
     """
 
-    def __init__(self, wheel: Wheel, soil: Soil, effects: tuple[Effect, ...] = (), share: float = 1.0) -> None:
+    def __init__(
+        self, wheel: Wheel, soil: Soil, effects: tuple[Effect, ...] = (), share: float = 1.0
+    ) -> None:
         self._ln_k = log(float(soil.shear_modulus))
-        theta_1, slip = np.meshgrid(_nodes(THETA_1, NODES[0]), _nodes(SLIP, NODES[1]), indexing="ij")
+        theta_1, slip = np.meshgrid(
+            _nodes(THETA_1, NODES[0]), _nodes(SLIP, NODES[1]), indexing="ij"
+        )
 
         def shift(ln_k: float, n: float) -> Array:
             varied = replace(soil, shear_modulus=float(np.exp(ln_k)), exponent=n)
@@ -82,14 +86,18 @@ class IntegralShift:
         u, du = _unit(theta_1, THETA_1)
         v, dv = _unit(slip, SLIP)
         rows, columns = _polynomials(u, DEGREE[0], du), _polynomials(v, DEGREE[1], dv)
-        along_slip = (rows @ self._coefficients).reshape(-1, DEGREE[1] + 1)  # (2 for θ₁ · quantities, powers of i)
+        along_slip = (rows @ self._coefficients).reshape(
+            -1, DEGREE[1] + 1
+        )  # (2 for θ₁ · quantities, powers of i)
         by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
         found = np.array((by_value[0], by_value[1], by_slip[0]))
         by_ln_k = found[:, BY_LN_K]
         return Point(found[:, PLAIN], by_ln_k, found[:, BY_N], Integrals(*by_ln_k[0].tolist()))
 
 
-def true_integrals(wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array) -> Integrals:
+def true_integrals(
+    wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array
+) -> Integrals:
     """A₁ … C₃ over θ₁ of the original stresses with the contact effects; θ₁, i and the results have one shape.
 
     Forces are linear in c and σₘ, so three evaluations with unit soils pick the integrals out.
@@ -129,7 +137,9 @@ def true_integrals(wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_
     )
 
 
-def _shift(wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], share: float, theta_1: Array, slip: Array) -> Array:
+def _shift(
+    wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], share: float, theta_1: Array, slip: Array
+) -> Array:
     """(8, nodes, nodes): the effects' part, and the share of what the triangles miss."""
     paper = np.array(true_integrals(wheel, soil, (), theta_1, slip))
     exponent = linear.shear_exponent(wheel, soil.shear_modulus, theta_1, slip, linear.ARRAYS)
@@ -167,7 +177,9 @@ def _fitted(values: Array) -> Array:
     """Chebyshev coefficients (quantities, DEGREE[0] + 1, DEGREE[1] + 1) of values at the nodes, by least squares."""
     rows = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[0]), DEGREE[0])
     columns = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[1]), DEGREE[1])
-    fitted: Array = np.einsum("ai,qij,bj->qab", np.linalg.pinv(rows), values, np.linalg.pinv(columns))
+    fitted: Array = np.einsum(
+        "ai,qij,bj->qab", np.linalg.pinv(rows), values, np.linalg.pinv(columns)
+    )
     return fitted
 
 

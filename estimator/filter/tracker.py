@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from math import exp, hypot, log, sqrt
 from typing import NamedTuple
 
-from estimator.filter import (
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.estimate import (
     KPA,
     STATES,
     TAN_PHI,
@@ -25,14 +26,13 @@ from estimator.filter import (
     project,
     variance,
 )
-from estimator.filter.measurement import Columns, Measurement, selected, soil
-from estimator.filter.plain import PlainEngine
-from estimator.filter.segments import CAPACITY, Memory, Stretch
-from estimator.online import Context
-from estimator.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
-from estimator.settings import Settings
-from estimator.sync import NS, Snapshot
-from estimator.wheel_state import REQUIRED_BITS, WheelState, classify
+from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
+from gritd.estimator.filter.plain import PlainEngine
+from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
+from gritd.estimator.messages.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
+from gritd.estimator.wheel.chain import Context
+from gritd.estimator.wheel.sync import NS, Snapshot
+from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
 
 SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …
 CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
@@ -44,12 +44,17 @@ CONSISTENCY_MEMORY = 2.0  # [s]
 # at 1: it exceeds 12 in 1 rig of 1,900 and 4 in 1 of 22 (chi-square, 1 degree of freedom).
 INCONSISTENT = 12.0
 MISMATCH = 4.0  # … and above which model and measurement are said to disagree
-OUTLIER = 25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
+OUTLIER = (
+    25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
+)
 PATIENCE = 5.0  # [s] after a reset before the next
 RELAPSE = 20.0  # [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time …
 WIDEST = 6  # … so often
 
-ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {"filterpy": FilterpyEngine, "plain": PlainEngine}
+ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {
+    "filterpy": FilterpyEngine,
+    "plain": PlainEngine,
+}
 
 
 Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
@@ -116,7 +121,9 @@ class Tracker:
         self.measurement = Measurement(settings)
         self.engine: Engine = ENGINES[engine or settings.filter.engine](self.measurement.variances)
         self._window = round(NS / settings.rates.update)
-        self._required = REQUIRED_BITS | (CHANNEL_BITS["wrench"] if settings.wrench is not None else 0)
+        self._required = REQUIRED_BITS | (
+            CHANNEL_BITS["wrench"] if settings.wrench is not None else 0
+        )
         self._bounds = _bounds(settings)
         soil = settings.soil
         self._prior_sigma = (
@@ -128,13 +135,17 @@ class Tracker:
     def start(self) -> TrackState:
         """The prior."""
         soil = self.settings.soil
-        estimate = self._unsure((soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value)))
+        estimate = self._unsure(
+            (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
+        )
         return TrackState(estimate, Memory(estimate), self.measurement.chain.fresh_memory())
 
     def _unsure(self, x: Vector, factor: float = 1.0) -> Estimate:
         """The state x with the prior's standard deviations, times a factor."""
         sigma = tuple([factor * s for s in self._prior_sigma])
-        P = tuple(tuple(sigma[i] ** 2 if i == j else 0.0 for j in range(STATES)) for i in range(STATES))
+        P = tuple(
+            tuple(sigma[i] ** 2 if i == j else 0.0 for j in range(STATES)) for i in range(STATES)
+        )
         return Estimate(x, P, ((0.0,) * len(self.measurement.variances),) * STATES)
 
     def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
@@ -149,9 +160,13 @@ class Tracker:
             if status == Status.TRACKING:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state._replace(columns=now.columns), now, elapsed)
-        return state, Account(snapshot, now, status, int(now.flags) | self._flags(state, aids), aids)
+        return state, Account(
+            snapshot, now, status, int(now.flags) | self._flags(state, aids), aids
+        )
 
-    def _closed(self, state: TrackState, snapshot: Snapshot, now: WheelState, elapsed: float) -> TrackState:
+    def _closed(
+        self, state: TrackState, snapshot: Snapshot, now: WheelState, elapsed: float
+    ) -> TrackState:
         """A window has ended: remember what the next one is compared with, and what the effects remember."""
         recall = state.recall
         if now.situation is not None:
@@ -162,18 +177,26 @@ class Tracker:
             before=now if snapshot.ready else None,
             recall=recall,
             started=state.started or snapshot.ready,
-            origin=snapshot.carriage_position if state.origin is None and snapshot.ready else state.origin,
+            origin=snapshot.carriage_position
+            if state.origin is None and snapshot.ready
+            else state.origin,
         )
 
-    def _update(self, state: TrackState, now: WheelState, elapsed: float) -> tuple[TrackState, tuple[Aid, ...]]:
+    def _update(
+        self, state: TrackState, now: WheelState, elapsed: float
+    ) -> tuple[TrackState, tuple[Aid, ...]]:
         """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
         state = state._replace(estimate=self._walk(state.estimate, elapsed))
         update = self.measurement.linearise(now, self.measurement.predict(state.estimate, now))
         aids = self._gate(state.estimate, now, update)
         taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
         if taken:
-            estimate = self.engine.update(state.estimate, selected(update, taken), not self.estimates_k(state))
-            state = state._replace(estimate=project(estimate, self._bounds), updates=state.updates + 1)
+            estimate = self.engine.update(
+                state.estimate, selected(update, taken), not self.estimates_k(state)
+            )
+            state = state._replace(
+                estimate=project(estimate, self._bounds), updates=state.updates + 1
+            )
             state = self._remember(state, now, taken, elapsed)
         else:
             state = state._replace(memory=state.memory.waited(elapsed))
@@ -201,10 +224,16 @@ class Tracker:
             aids.append(Aid(measured[index], r, innovation, s, ratio, ratio <= 1.0))
         return tuple(aids)
 
-    def _remember(self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float) -> TrackState:
+    def _remember(
+        self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
+    ) -> TrackState:
         """Add the window to the memory; when a new stretch begins and the state has moved, linearise all anew."""
-        memory, begun = state.memory.extended(now, taken, self.measurement.chain.wheel.radius, elapsed)
-        if not state.slip_varied and memory.slip_span() > max(SLIP_VARIES, CLEARLY * now.slip.sigma):
+        memory, begun = state.memory.extended(
+            now, taken, self.measurement.chain.wheel.radius, elapsed
+        )
+        if not state.slip_varied and memory.slip_span() > max(
+            SLIP_VARIES, CLEARLY * now.slip.sigma
+        ):
             state = state._replace(slip_varied=True)
         if not begun or len(memory.stretches) == 1:
             return state._replace(memory=memory)
@@ -217,7 +246,9 @@ class Tracker:
         estimate = memory.anchor
         for stretch in memory.stretches:
             estimate = self._absorb(estimate, stretch, state)
-        return state._replace(memory=memory, estimate=project(estimate, self._bounds), linearised=point)
+        return state._replace(
+            memory=memory, estimate=project(estimate, self._bounds), linearised=point
+        )
 
     def _moved(self, before: Point | None, now: Point) -> bool:
         """Whether the state is so far from where the memory was linearised that its Jacobians no longer serve."""
@@ -244,7 +275,9 @@ class Tracker:
         """Keep the running consistency figure; back to the prior's covariance, or a wider one, when it is out of all
         measure."""
         keep = exp(-elapsed / CONSISTENCY_MEMORY)
-        surprise = keep * state.surprise + sum([min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids])
+        surprise = keep * state.surprise + sum(
+            [min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids]
+        )
         state = state._replace(surprise=surprise, components=keep * state.components + len(aids))
         rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
         if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):

@@ -19,7 +19,15 @@ import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
-from estimator.recording.mcapfile import MAGIC, MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, RecordingError, Starts, gather
+from gritd.estimator.recording.mcapfile import (
+    MAGIC,
+    MESSAGE_DTYPE,
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    RecordingError,
+    Starts,
+    gather,
+)
 
 MAX_CHUNK = 32 << 20  # [bytes] largest chunk that is unpacked; writers use about 1 MiB
 MAX_RATIO = 1000  # a chunk that claims to unpack to more than this many times its size is a bomb
@@ -54,7 +62,10 @@ class Block:
     size: int  # how many they are unpacked
     crc: int  # of the unpacked bytes; 0: the writer gave none
     compression: str
-    index: tuple[int, int] = (0, 0)  # its message index in the file; under no checksum, so only a hint
+    index: tuple[int, int] = (
+        0,
+        0,
+    )  # its message index in the file; under no checksum, so only a hint
 
 
 @dataclass
@@ -128,7 +139,9 @@ class Walk:
         while position is not None and position < self._limit:
             position = self._step(position)
             if len(self.found.blocks) > MAX_BLOCKS:
-                self.found.damage.append(f"byte {position}: more than {MAX_BLOCKS} chunks; the rest is not read")
+                self.found.damage.append(
+                    f"byte {position}: more than {MAX_BLOCKS} chunks; the rest is not read"
+                )
                 break
         return self.found
 
@@ -153,7 +166,11 @@ class Walk:
             return
         opcode, length, start, _, crc = _FOOTER.unpack(tail[: _FOOTER.size])
         end = self._size - _CLOSING
-        if opcode != Opcode.FOOTER or length != 20 or not (start == 0 or _DATA_END_SIZE <= start <= end):
+        if (
+            opcode != Opcode.FOOTER
+            or length != 20
+            or not (start == 0 or _DATA_END_SIZE <= start <= end)
+        ):
             return
         self._take_summary(start or end, end, crc, tail)
 
@@ -209,7 +226,12 @@ class Walk:
     def _chunk_head(self, start: int, length: int) -> Block:
         fields = Texts(self._read(start, min(length, 64)))
         fields.take(16)  # first and last log_time
-        size, crc, compression, stored = fields.integer(8), fields.integer(4), fields.text(), fields.integer(8)
+        size, crc, compression, stored = (
+            fields.integer(8),
+            fields.integer(4),
+            fields.text(),
+            fields.integer(8),
+        )
         if fields.position + stored != length:
             raise Damaged("the lengths of a chunk contradict each other")
         return Block(start + fields.position, stored, size, crc, compression)
@@ -274,12 +296,17 @@ class Walk:
         if head[0] == Opcode.DATA_END:
             return self._limit - position <= _DATA_END_SIZE
         whole = len(head) == 15
-        agree = not whole or int.from_bytes(head[1:9], "little") == int.from_bytes(head[11:15], "little") + 6
+        agree = (
+            not whole
+            or int.from_bytes(head[1:9], "little") == int.from_bytes(head[11:15], "little") + 6
+        )
         return head[0] == Opcode.MESSAGE_INDEX and agree
 
     def _find_chunk(self, position: int) -> int | None:
         for start in range(position, min(self._limit, position + SEARCH), _STEP):
-            window = self._read(start, _STEP + 64)  # heads that begin in this step end inside the window
+            window = self._read(
+                start, _STEP + 64
+            )  # heads that begin in this step end inside the window
             for match in _NEXT_CHUNK.finditer(window):
                 if match.start() < _STEP and self._plausible(start + match.start()):
                     return start + match.start()
@@ -313,10 +340,14 @@ def _decompress(block: Block, data: bytes) -> bytes:
     """At most one byte more than the block claims, whatever the compressed data would give."""
     try:
         if block.compression == "zstd":
-            with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK * 2).stream_reader(data) as reader:
+            with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK * 2).stream_reader(
+                data
+            ) as reader:
                 return reader.read(block.size + 1)
         if block.compression == "lz4":
-            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=block.size + 1))
+            return bytes(
+                lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=block.size + 1)
+            )
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
         raise Damaged(f"cannot be unpacked: {error}") from None
     if block.compression:
@@ -324,7 +355,9 @@ def _decompress(block: Block, data: bytes) -> bytes:
     return data
 
 
-def split(file: BinaryIO, block: Block, content: bytes) -> tuple[Starts, list[tuple[int, int, int]]]:
+def split(
+    file: BinaryIO, block: Block, content: bytes
+) -> tuple[Starts, list[tuple[int, int, int]]]:
     """Where the message records begin in an unpacked block, shape (n,), and its definitions (opcode, start, end).
 
     The message index saves walking the records, but only if the messages it names are proven to lie end to end from the
@@ -375,7 +408,9 @@ def _indexed(file: BinaryIO, block: Block) -> Starts:
     found = []
     for _, start, stop in records(data):
         found.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
-    return np.sort(np.concatenate(found).astype(np.int64))  # one that is too large becomes negative, and stands first
+    return np.sort(
+        np.concatenate(found).astype(np.int64)
+    )  # one that is too large becomes negative, and stands first
 
 
 def records(data: bytes, stop: int | None = None) -> Iterator[tuple[int, int, int]]:

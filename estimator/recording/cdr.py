@@ -66,7 +66,9 @@ class Topic:
     @cached_property
     def schema(self) -> str:
         """The ros2msg text, comments included, and the definition of Time if it is used."""
-        lines = [f"{kind} {name}" + (f"  # {doc}" if doc else "") for name, kind, doc in self.fields]
+        lines = [
+            f"{kind} {name}" + (f"  # {doc}" if doc else "") for name, kind, doc in self.fields
+        ]
         text = "\n".join(lines) + "\n"
         return text + TIME_SCHEMA if any(kind == TIME for _, kind, _ in self.fields) else text
 
@@ -77,13 +79,19 @@ class Codec:
     def __init__(self, fields: Sequence[Field]) -> None:
         for name, kind, _ in fields:
             if kind not in CODES and kind not in (TIME, STRING):
-                raise ValueError(f"field {name!r}: type {kind!r} is not one of {TIME}, {STRING}, {', '.join(CODES)}")
+                raise ValueError(
+                    f"field {name!r}: type {kind!r} is not one of {TIME}, {STRING}, {', '.join(CODES)}"
+                )
         self.names = tuple(name for name, _, _ in fields)
         self.kinds = tuple(kind for _, kind, _ in fields)
         self.flat = STRING not in self.kinds
         self.times = tuple(i for i, kind in enumerate(self.kinds) if kind == TIME)
-        self._primitives = [(name, code) for name, kind, _ in fields for name, code in _primitives(name, kind)]
-        self.format, offsets, end = _layout([code for _, code in self._primitives]) if self.flat else ("", [], 0)
+        self._primitives = [
+            (name, code) for name, kind, _ in fields for name, code in _primitives(name, kind)
+        ]
+        self.format, offsets, end = (
+            _layout([code for _, code in self._primitives]) if self.flat else ("", [], 0)
+        )
         self.size = 4 + end  # [bytes] encapsulation header included; flat only
         self._struct = struct.Struct("<" + self.format)
         self._offsets = offsets
@@ -92,7 +100,9 @@ class Codec:
         """The primitives to pack: every time is split into seconds and nanoseconds."""
         n = len(self.times)
         if self.times == tuple(range(n)):  # stamps first: every topic of ours
-            return [part for time in values[:n] for part in divmod(time, BILLION)] + list(values[n:])
+            return [part for time in values[:n] for part in divmod(time, BILLION)] + list(
+                values[n:]
+            )
         split = [divmod(v, BILLION) if i in self.times else (v,) for i, v in enumerate(values)]
         return [primitive for part in split for primitive in part]
 
@@ -110,7 +120,11 @@ class Codec:
         if len(data) < 4 or data[:2] != b"\x00\x01":
             raise ValueError("not little-endian CDR")
         try:
-            plain = list(self._struct.unpack_from(data)[1:]) if self.flat else self._decode_each(data[4:])
+            plain = (
+                list(self._struct.unpack_from(data)[1:])
+                if self.flat
+                else self._decode_each(data[4:])
+            )
         except (struct.error, IndexError, UnicodeDecodeError) as error:
             raise ValueError(f"not a message of these fields: {error}") from None
         for i in self.times:  # left to right: each join shifts the rest into its final place
@@ -146,7 +160,9 @@ class Codec:
         """Copy records of `record_dtype`, shape (n,), into the rows of `table`, shape (n,), by name."""
         for name in table.dtype.names or ():
             if self.kinds[self.names.index(name)] == TIME:
-                table[name] = records[name + ".sec"].astype(np.int64) * BILLION + records[name + ".nanosec"]
+                table[name] = (
+                    records[name + ".sec"].astype(np.int64) * BILLION + records[name + ".nanosec"]
+                )
             else:
                 table[name] = records[name]
 

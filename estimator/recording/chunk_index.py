@@ -13,12 +13,16 @@ from collections.abc import Iterator, Sequence
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 
-_ROW = struct.Struct("<5QH")  # gap before, length, first log_time since the last one, span, unpacked size; channels
+_ROW = struct.Struct(
+    "<5QH"
+)  # gap before, length, first log_time since the last one, span, unpacked size; channels
 _CHANNEL = struct.Struct("<HQ")  # its number, length of its MessageIndex record
 TOGETHER = 100  # records
 PIECE = 1024  # [bytes] unpacked at once
 _MASK = (1 << 64) - 1  # differences wrap: a log_time may be anything
-_HEAD = 9 + 8 + 8 + 8 + 4 + 4 + 8  # [bytes] of a chunk record before its data, without the name of the compression
+_HEAD = (
+    9 + 8 + 8 + 8 + 4 + 4 + 8
+)  # [bytes] of a chunk record before its data, without the name of the compression
 
 
 class ChunkIndexes:
@@ -32,16 +36,28 @@ class ChunkIndexes:
         self._end = self._time = 0  # of the chunk before
 
     def add(
-        self, start: int, length: int, times: tuple[int, int], size: int, indexes: Sequence[tuple[int, int]]
+        self,
+        start: int,
+        length: int,
+        times: tuple[int, int],
+        size: int,
+        indexes: Sequence[tuple[int, int]],
     ) -> None:
         """A chunk record of `length` bytes at `start`, messages from times[0] to times[1] [ns], unpacked `size` bytes.
 
         indexes: (channel, length) of the MessageIndex records that follow it.
         """
         row = _ROW.pack(
-            start - self._end, length, times[0] - self._time & _MASK, times[1] - times[0] & _MASK, size, len(indexes)
+            start - self._end,
+            length,
+            times[0] - self._time & _MASK,
+            times[1] - times[0] & _MASK,
+            size,
+            len(indexes),
         )
-        self._packed += self._packer.compress(row + b"".join(_CHANNEL.pack(*index) for index in indexes))
+        self._packed += self._packer.compress(
+            row + b"".join(_CHANNEL.pack(*index) for index in indexes)
+        )
         self._end = start + length + sum(length for _, length in indexes)
         self._time = times[0]
         self.count += 1

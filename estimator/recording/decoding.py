@@ -10,11 +10,19 @@ from typing import Any
 import numpy as np
 from mcap.records import Channel, Schema
 
-from estimator.recording.cdr import Codec, Rows, Topic
-from estimator.recording.mcapfile import MESSAGE_DTYPE, MESSAGE_HEAD, RECORD_HEAD, Starts, gather
+from gritd.estimator.recording.cdr import Codec, Rows, Topic
+from gritd.estimator.recording.mcapfile import (
+    MESSAGE_DTYPE,
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    Starts,
+    gather,
+)
 
 _PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
-_CDR_LE = 0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
+_CDR_LE = (
+    0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,9 @@ class Chunk:
 
     def body(self, i: int) -> bytes:
         start = int(self.starts[i])
-        return self.content[start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])]
+        return self.content[
+            start + MESSAGE_HEAD.size : start + RECORD_HEAD.size + int(self.heads["length"][i])
+        ]
 
     def records(self) -> tuple[bytes, Starts]:
         """The message records, heads included, end to end, and where each begins."""
@@ -76,7 +86,9 @@ class Chunk:
         return {int(channels[own[0]]): own for own in np.split(order, cuts) if own.size}
 
 
-def select(content: bytes, starts: Starts, sources: Mapping[int, Source]) -> tuple[Chunk, list[str]]:
+def select(
+    content: bytes, starts: Starts, sources: Mapping[int, Source]
+) -> tuple[Chunk, list[str]]:
     """The messages that are of a known channel and as long as its fields, and one line for each kind of others."""
     whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
     good = np.zeros(starts.shape, bool)
@@ -85,7 +97,11 @@ def select(content: bytes, starts: Starts, sources: Mapping[int, Source]) -> tup
         source = sources.get(channel)
         good[own] = _sound(whole, own, source) if source else False
         if bad := int(np.count_nonzero(~good[own])):
-            what = f"do not fit the fields of {source.topic.name}" if source else f"are of channel {channel}, undefined"
+            what = (
+                f"do not fit the fields of {source.topic.name}"
+                if source
+                else f"are of channel {channel}, undefined"
+            )
             complaints.append(f"{bad} messages skipped: they {what}")
     return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
 
@@ -97,9 +113,13 @@ def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
         return True
     if not codec.flat:
         return [_decodes(codec, chunk.body(i)) for i in own.tolist()]
-    excess = chunk.heads["length"][own].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size)
+    excess = chunk.heads["length"][own].astype(np.int64) - (
+        MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size
+    )
     fits = (excess >= 0) & (excess <= _PADDING)
-    kinds = gather(chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")]))
+    kinds = gather(
+        chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")])
+    )
     fits[fits] = kinds["kind"] == _CDR_LE
     return fits
 

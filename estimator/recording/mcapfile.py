@@ -37,7 +37,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from estimator.recording.chunk_index import ChunkIndexes
+from gritd.estimator.recording.chunk_index import ChunkIndexes
 
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
@@ -72,7 +72,9 @@ def reported(path: Path, doing: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise RecordingError(f"{path}: cannot {doing}: {error.strerror or error}", error.errno) from error
+        raise RecordingError(
+            f"{path}: cannot {doing}: {error.strerror or error}", error.errno
+        ) from error
 
 
 def sync(fileno: int) -> None:
@@ -84,7 +86,9 @@ def sync(fileno: int) -> None:
             raise
 
 
-def gather(content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+def gather(
+    content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]
+) -> NDArray[np.void]:
     """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy, shape (n,).
 
     Every record must lie inside: starts + dtype.itemsize <= len(content).
@@ -112,7 +116,9 @@ class McapFile:
 
     def __init__(self, path: Path, compression: str = "zstd", library: str = LIBRARY) -> None:
         if compression not in ("zstd", "lz4", "none"):
-            raise RecordingError(f"{path}: compression {compression!r} is not one of zstd, lz4, none")
+            raise RecordingError(
+                f"{path}: compression {compression!r} is not one of zstd, lz4, none"
+            )
         self.path = path
         self._compression = "" if compression == "none" else compression
         self._compress = _compressor(compression)
@@ -187,7 +193,11 @@ class McapFile:
         lengths = [(channel, len(index)) for channel, index in indexes]
         self._chunk_indexes.add(start, len(chunk), span, len(content), lengths)
         self._counts.update(heads["channel"].tolist())
-        self._span = span if self._span is None else (min(self._span[0], span[0]), max(self._span[1], span[1]))
+        self._span = (
+            span
+            if self._span is None
+            else (min(self._span[0], span[0]), max(self._span[1], span[1]))
+        )
 
     def sync(self) -> None:
         """Ask the kernel to put everything written on the medium, and wait for it."""
@@ -295,9 +305,13 @@ def _compressor(kind: str) -> Callable[[bytes], bytes]:
     return lz4.frame.compress if kind == "lz4" else bytes
 
 
-def _message_index(channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]) -> tuple[int, bytes]:
+def _message_index(
+    channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]
+) -> tuple[int, bytes]:
     """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the channel."""
     own = heads["channel"] == channel
     entries = np.column_stack([heads["log_time"][own], offsets[own]]).astype("<u8").tobytes()
-    head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack("<HI", channel, len(entries))
+    head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
+        "<HI", channel, len(entries)
+    )
     return channel, head + entries

@@ -6,8 +6,8 @@ from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
-from estimator.recording.blocks import Walk
-from estimator.recording.mcapfile import DRAFT, RecordingError
+from gritd.estimator.recording.blocks import Walk
+from gritd.estimator.recording.mcapfile import DRAFT, RecordingError
 
 
 def sweep(folder: Path) -> list[Path]:
@@ -39,7 +39,9 @@ def trim(folder: Path, cap: float, open_files: Collection[Path]) -> list[Path]:
 
     Raises OSError where the folder cannot be read or a file cannot be deleted.
     """
-    found = [(entry.stat().st_mtime_ns, entry.stat().st_size, entry) for entry in folder.glob("*.mcap")]
+    found = [
+        (entry.stat().st_mtime_ns, entry.stat().st_size, entry) for entry in folder.glob("*.mcap")
+    ]
     kept = {path.absolute() for path in open_files}
     excess = sum(size for _, size, _ in found) - cap
     deleted = []

@@ -16,8 +16,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from estimator.recording import CHECKSUM, CONFIG, RAW_TOPICS, RECOVERED, RUN, RunInfo, seal_holds
-from estimator.recording.blocks import (
+from gritd.estimator.recording.blocks import (
     MAX_CHUNK,
     MAX_WASTE,
     Block,
@@ -29,11 +28,22 @@ from estimator.recording.blocks import (
     split,
     unpack,
 )
-from estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
-from estimator.recording.decoding import Chunk, Source, select
-from estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, reported
+from gritd.estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
+from gritd.estimator.recording.decoding import Chunk, Source, select
+from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, reported
+from gritd.estimator.recording.run import (
+    CHECKSUM,
+    CONFIG,
+    RAW_TOPICS,
+    RECOVERED,
+    RUN,
+    RunInfo,
+    seal_holds,
+)
 
-MAX_KEPT = 64 << 20  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
+MAX_KEPT = (
+    64 << 20
+)  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_LINES = 100
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good
 
@@ -52,7 +62,9 @@ class Recording:
     damage: list[str] = field(default_factory=list)  # what is not right, one line each
     closed: bool = False  # ends with an intact index
     lost: int = 0  # messages known to be missing, by the file's own count
-    counted: bool = False  # the file says how many messages it had, so that `lost` is all that is lost
+    counted: bool = (
+        False  # the file says how many messages it had, so that `lost` is all that is lost
+    )
     unverified: int = 0  # messages under no checksum; other writers may leave such
     attachments: int = 0
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
@@ -68,7 +80,9 @@ class Recording:
     @property
     def saved(self) -> bool:
         """Nothing that was written is lost, though the file may be unclosed or its index damaged."""
-        return not self.damage or (self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys())
+        return not self.damage or (
+            self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys()
+        )
 
     @property
     def recovered(self) -> dict[str, str]:
@@ -94,7 +108,9 @@ class Recording:
                 source = self.sources[channel]
                 if source.codec:
                     times = chunk.heads["log_time"][own].tolist()
-                    for i, time, values in zip(own.tolist(), times, source.values(chunk, own), strict=True):
+                    for i, time, values in zip(
+                        own.tolist(), times, source.values(chunk, own), strict=True
+                    ):
                         rows[i] = (source.topic.name, time, values)
             yield from (rows[i] for i in sorted(rows))
 
@@ -107,13 +123,17 @@ class Recording:
         """
         known = self.topics.get(topic) or next((t for t in RAW_TOPICS if t.name == topic), None)
         if known is None or not known.codec.flat:
-            raise RecordingError(f"{self.path}: {topic}: no topic with decoded fields of fixed size")
+            raise RecordingError(
+                f"{self.path}: {topic}: no topic with decoded fields of fixed size"
+            )
         tables = [np.empty(0, [("log_time", "<i8"), ("order", "<i8"), *known.codec.table_dtype])]
         before = 0
         for chunk in self.chunks():
             for channel, own in chunk.groups.items():
                 if self.sources[channel].topic.name == topic:
-                    tables.append(_table(self.sources[channel], chunk, own, before, tables[0].dtype))
+                    tables.append(
+                        _table(self.sources[channel], chunk, own, before, tables[0].dtype)
+                    )
             before += len(chunk.starts)
         joined = np.concatenate(tables)
         return joined[np.argsort(joined["order"], kind="stable")]
@@ -123,7 +143,9 @@ class Recording:
         return select(content, split(file, block, content)[0], self.sources)[0]
 
 
-def _table(source: Source, chunk: Chunk, own: Starts, before: int, dtype: np.dtype[np.void]) -> Rows:
+def _table(
+    source: Source, chunk: Chunk, own: Starts, before: int, dtype: np.dtype[np.void]
+) -> Rows:
     table = np.empty(own.shape, dtype)
     table["log_time"] = chunk.heads["log_time"][own]
     table["order"] = own + before
@@ -143,7 +165,9 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
             contents = Walk(file, path.stat().st_size).run()
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from None
-        recording = _with_metadata(Recording(path, damage=contents.damage, closed=contents.closed), contents)
+        recording = _with_metadata(
+            Recording(path, damage=contents.damage, closed=contents.closed), contents
+        )
         check = _Check(recording, {topic.name: topic for topic in topics})
         check.whole(file, contents)
     if len(recording.damage) > MAX_LINES:
@@ -154,12 +178,20 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
 def _with_metadata(recording: Recording, contents: Contents) -> Recording:
     recording.attachments = contents.attachments
     for name, entries in contents.metadata.items():
-        if seal_holds(name, entries, required=contents.library.startswith(LIBRARY) and name.startswith("gritd.")):
+        if seal_holds(
+            name,
+            entries,
+            required=contents.library.startswith(LIBRARY) and name.startswith("gritd."),
+        ):
             recording.metadata[name] = entries
         else:
             recording.damage.append(f"metadata {name}: its checksum does not hold; ignored")
     if contents.library == LIBRARY:
-        recording.damage += [f"metadata {name} is missing" for name in (CONFIG, RUN) if name not in recording.metadata]
+        recording.damage += [
+            f"metadata {name} is missing"
+            for name in (CONFIG, RUN)
+            if name not in recording.metadata
+        ]
     config = dict(recording.metadata.get(CONFIG, {}))
     recording.config_yaml = config.pop("yaml", None)
     recording.versions = {key: value for key, value in config.items() if key != CHECKSUM}
@@ -178,7 +210,9 @@ class _Check:
         self._known = known
         self._schemas: dict[int, Schema] = {}
         self._seen: set[tuple[int, bytes]] = set()  # definitions are repeated in every chunk
-        self._numbers: dict[int, list[int]] = {}  # channel -> first and last sequence number, messages
+        self._numbers: dict[
+            int, list[int]
+        ] = {}  # channel -> first and last sequence number, messages
         self._waste = 0
         self._room = MAX_KEPT
 
@@ -188,10 +222,14 @@ class _Check:
             try:
                 self._block(file, block)
             except Damaged as why:
-                self._recording.damage.append(f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}")
+                self._recording.damage.append(
+                    f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}"
+                )
                 self._waste += block.stored + min(block.size, MAX_CHUNK)
             if self._waste > MAX_WASTE:
-                self._recording.damage.append(f"byte {block.start}: too much damage; the rest is not read")
+                self._recording.damage.append(
+                    f"byte {block.start}: too much damage; the rest is not read"
+                )
                 break
         self._count_lost(expected, numbered=contents.library == LIBRARY)
 
@@ -235,9 +273,15 @@ class _Check:
         if expected:
             self._recording.counted = True
             counted = {channel: entry[2] for channel, entry in self._numbers.items()}
-            lost = sum(max(0, count - counted.get(channel, 0)) for channel, count in expected.items())
+            lost = sum(
+                max(0, count - counted.get(channel, 0)) for channel, count in expected.items()
+            )
         else:
-            lost = sum(last - first + 1 - count for first, last, count in self._numbers.values()) if numbered else 0
+            lost = (
+                sum(last - first + 1 - count for first, last, count in self._numbers.values())
+                if numbered
+                else 0
+            )
         self._recording.lost = max(0, lost)
         if lost > 0:
             self._recording.damage.insert(0, f"{lost} messages are missing")
@@ -249,7 +293,9 @@ class _Check:
             return
         fields = Texts(body)
         if opcode == Opcode.SCHEMA:
-            schema = Schema(id=fields.integer(2), name=fields.text(), encoding=fields.text(), data=fields.blob())
+            schema = Schema(
+                id=fields.integer(2), name=fields.text(), encoding=fields.text(), data=fields.blob()
+            )
             fields.finish()
             if self._schemas.setdefault(schema.id, schema) != schema:
                 raise Damaged(f"schema {schema.id} is defined twice, differently")
@@ -270,7 +316,9 @@ class _Check:
     def _source(self, channel: Channel) -> Source:
         schema = self._schemas.get(channel.schema_id)
         if schema is None and channel.schema_id:
-            raise Damaged(f"channel {channel.id} refers to schema {channel.schema_id}, which is missing")
+            raise Damaged(
+                f"channel {channel.id} refers to schema {channel.schema_id}, which is missing"
+            )
         fields = None
         if schema and schema.encoding == "ros2msg" and channel.message_encoding == "cdr":
             fields = parse_schema(schema.data.decode(errors="replace"))
@@ -279,7 +327,10 @@ class _Check:
         if known:
             _require(self._recording.path, known, codec)
         return Source(
-            schema, channel, known or Topic(channel.topic, schema.name if schema else "", fields or ()), codec
+            schema,
+            channel,
+            known or Topic(channel.topic, schema.name if schema else "", fields or ()),
+            codec,
         )
 
 
@@ -287,13 +338,17 @@ def _require(path: Path, known: Topic, codec: Codec | None) -> None:
     """Raises RecordingError, one line, unless the file's fields hold those of the topic."""
     expected = ", ".join(f"{kind} {name}" for name, kind, _ in known.fields)
     if codec is None or (known.codec.flat and not codec.flat):
-        raise RecordingError(f"{path}: {known.name}: not CDR with a flat ros2msg schema; expected {expected}")
+        raise RecordingError(
+            f"{path}: {known.name}: not CDR with a flat ros2msg schema; expected {expected}"
+        )
     for name, kind, _ in known.fields:
         found = dict(zip(codec.names, codec.kinds, strict=True)).get(name)
         if found is None:
             raise RecordingError(f"{path}: {known.name}: no field {name!r}; expected {expected}")
         if not _fits(found, kind):
-            raise RecordingError(f"{path}: {known.name}: field {name!r} is {found}; expected {kind}")
+            raise RecordingError(
+                f"{path}: {known.name}: field {name!r} is {found}; expected {kind}"
+            )
 
 
 def _fits(found: str, expected: str) -> bool:

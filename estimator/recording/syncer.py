@@ -7,8 +7,8 @@ import threading
 import time
 from pathlib import Path
 
-from estimator.patience import waited
-from estimator.recording.mcapfile import RecordingError, sync
+from gritd.estimator.recording.mcapfile import RecordingError, sync
+from gritd.estimator.recording.patience import waited
 
 
 class Syncer:

@@ -22,16 +22,18 @@ from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from estimator.patience import waited
-from estimator.readings import Reading
-from estimator.recording import RunInfo, RunWriter, part_path
-from estimator.recording.cdr import Topic, Values
-from estimator.recording.mcapfile import RecordingError
-from estimator.recording.syncer import Syncer
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.recording.cdr import Topic, Values
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.patience import waited
+from gritd.estimator.recording.run import RunInfo, RunWriter, part_path
+from gritd.estimator.recording.syncer import Syncer
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
-LARGEST = 1 << 17  # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
+LARGEST = (
+    1 << 17
+)  # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
 RETRY = 1.0  # [s] between attempts at a disk that failed
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -83,7 +85,9 @@ class WriterThread:
     ) -> None:
         self._queue = _Queue(capacity)
         self._sync = Syncer()
-        self._parts = _Parts(Path(path), tuple(topics), config_yaml, run, compression, self._sync.request)
+        self._parts = _Parts(
+            Path(path), tuple(topics), config_yaml, run, compression, self._sync.request
+        )
         self._interval = flush_interval
         self._retry = retry
         self._batch: list[Item] = []  # taken from the queue, not yet encoded
@@ -101,7 +105,9 @@ class WriterThread:
         self._sync.start()
         self._thread.start()
 
-    def put(self, readings: Iterable[Reading], messages: Iterable[tuple[str, int, Values]] = ()) -> None:
+    def put(
+        self, readings: Iterable[Reading], messages: Iterable[tuple[str, int, Values]] = ()
+    ) -> None:
         """Hand over the readings that one tick consumed, then its messages. Never waits for the disk, never raises."""
         self._queue.put([*readings, *messages])
 
@@ -111,7 +117,9 @@ class WriterThread:
 
     def status(self) -> WriterStatus:
         accepted, written, dropped, queued = self._queue.counters()
-        return WriterStatus(self._state, self._error, accepted, written, dropped, queued, tuple(self._parts.files))
+        return WriterStatus(
+            self._state, self._error, accepted, written, dropped, queued, tuple(self._parts.files)
+        )
 
     @property
     def alive(self) -> bool:
@@ -147,7 +155,10 @@ class WriterThread:
         due = time.monotonic()
         while not self._stopping.is_set():
             self.beats += 1
-            due = max(due + (self._interval if self._state == "writing" else self._retry), time.monotonic())
+            due = max(
+                due + (self._interval if self._state == "writing" else self._retry),
+                time.monotonic(),
+            )
             self._stopping.wait(due - time.monotonic())
             self._attempt(self._write_out)
         self._attempt(self._finish)
@@ -308,7 +319,9 @@ class _Parts:
     ) -> None:
         self._run, self._sync = run, sync
         self._config = config_yaml
-        self._make = partial(RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize)  # see _flush
+        self._make = partial(
+            RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize
+        )  # see _flush
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
         self.writer.expect(LARGEST)
         self.files = [path]

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.terramechanics.moments import Arrays, Kernels, Maths, Numbers, Value, kernels
-from estimator.terramechanics.original import LOCKED
-from estimator.terramechanics.soil import Array, Scalar, Wheel
+from gritd.estimator.terramechanics.moments import Arrays, Kernels, Maths, Numbers, Value, kernels
+from gritd.estimator.terramechanics.original import LOCKED
+from gritd.estimator.terramechanics.soil import Array, Scalar, Wheel
 
 NUMBERS: Maths = Numbers()
 ARRAYS: Maths = Arrays()
@@ -109,7 +109,11 @@ def predict(
     at = _At(wheel, x, tan_phi, s)
     by_theta_1 = at.along(c, *_theta_1_derivative(theta_1, exponent.f, bare, both, maths))
     by_f = at.along(c, *_f_derivative(theta_1, both, maths))
-    by_ratio = at.along(c, *_ratio_derivative(theta_1, exponent.f, both, maths)) if wheel.c2 else (0.0, 0.0, 0.0)
+    by_ratio = (
+        at.along(c, *_ratio_derivative(theta_1, exponent.f, both, maths))
+        if wheel.c2
+        else (0.0, 0.0, 0.0)
+    )
     columns: tuple[Sequence[Value], ...] = (
         at.response(-theta_1 * x.b2, theta_1 * x.a1, theta_1 * x.c1, 0.0),
         at.response(-s * x.b3, s * x.a2, s * x.c2, 0.0),
@@ -122,7 +126,9 @@ def predict(
         columns = tuple(map(_summed, columns, at.along_shift(c, theta_1, shift)))
     forces = _forces(wheel, x, c * theta_1, tan_phi, s)
     gradients = tuple(zip(*columns, strict=True))
-    return Prediction(forces.torque, forces.drawbar_pull, forces.resistance, maths.divide(s, theta_1), *gradients)
+    return Prediction(
+        forces.torque, forces.drawbar_pull, forces.resistance, maths.divide(s, theta_1), *gradients
+    )
 
 
 def predict_batch(
@@ -132,7 +138,9 @@ def predict_batch(
     c, tan_phi, k, theta_1, slip, load = np.broadcast_arrays(c, tan_phi, k, theta_1, slip, load)
     prediction = predict(wheel, c, tan_phi, k, theta_1, slip, load, ARRAYS)
     shape = np.shape(c)
-    gradients = (tuple(np.broadcast_to(entry, shape) for entry in gradient) for gradient in prediction[4:])
+    gradients = (
+        tuple(np.broadcast_to(entry, shape) for entry in gradient) for gradient in prediction[4:]
+    )
     return Prediction(*prediction[:4], *gradients)
 
 
@@ -149,7 +157,9 @@ def forces_under_load(
 ) -> Forces:
     """`predict` without gradients: a third of its cost, for a search over slip."""
     x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
-    return _forces(wheel, x, c * theta_1, tan_phi, _scaled_peak(wheel, x, c, tan_phi, theta_1, load))
+    return _forces(
+        wheel, x, c * theta_1, tan_phi, _scaled_peak(wheel, x, c, tan_phi, theta_1, load)
+    )
 
 
 def forces(
@@ -168,7 +178,9 @@ def forces(
     return _forces(wheel, x, c * theta_1, tan_phi, sigma_m * theta_1)
 
 
-def shear_exponent(wheel: Wheel, k: Value, theta_1: Value, slip: Value, maths: Maths = NUMBERS) -> Exponent:
+def shear_exponent(
+    wheel: Wheel, k: Value, theta_1: Value, slip: Value, maths: Maths = NUMBERS
+) -> Exponent:
     """f of (19): (r/2k)[(1 + i) − (1 − i) cos θ₁], the mean of −dj/dθ / k at θ = 0 and θ = θ₁.
 
     With the velocity ratio v/(rω) = 1 − lag in place of 1 − i it holds for braking too; it is written so that it
@@ -192,11 +204,16 @@ def integrals(theta_1: Value, ratio: Value, f: Value, maths: Maths = NUMBERS) ->
 
 def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scalar) -> Array:
     """Triangular σ [Pa], Eqs. (11) and (12)."""
-    front, rear = np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m), np.divide(theta, theta_m)
+    front, rear = (
+        np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m),
+        np.divide(theta, theta_m),
+    )
     return np.asarray(sigma_m * np.maximum(np.minimum(front, rear), 0.0))
 
 
-def triangular_shear_stress(theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar) -> Array:
+def triangular_shear_stress(
+    theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar
+) -> Array:
     """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom dead centre.
 
     The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g with σ triangular.
@@ -206,7 +223,9 @@ def triangular_shear_stress(theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau
     return np.where(np.greater(theta, theta_m), front, rear)
 
 
-def tau_m(wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, sigma_m: Value) -> Value:
+def tau_m(
+    wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, sigma_m: Value
+) -> Value:
     """Largest shear stress τₘ [Pa] with the linearised exponent, Eqs. (18) and (19); for numbers."""
     ratio, _ = _peak_ratio(wheel, slip, NUMBERS)
     f = shear_exponent(wheel, k, theta_1, slip).f
@@ -261,7 +280,9 @@ def _theta_1_derivative(
     signed = maths.sign(f) * spin
     bare = spin * (turning.bare.hat - turning.bare.hat_v)
     one = f * rotation * turning.decayed.v + signed * (turning.mobilised.one - turning.mobilised.v)
-    hat = f * rotation * turning.decayed.hat_v + signed * (turning.mobilised.hat - turning.mobilised.hat_v)
+    hat = f * rotation * turning.decayed.hat_v + signed * (
+        turning.mobilised.hat - turning.mobilised.hat_v
+    )
     dx = Integrals(
         f * straight.decayed.v, f * straight.decayed.hat_v,
         bare.real, one.imag, hat.imag,
@@ -270,7 +291,9 @@ def _theta_1_derivative(
     return Integrals(*(value + theta_1 * slope for value, slope in zip(x, dx, strict=True))), dx
 
 
-def _f_derivative(theta_1: Value, both: tuple[Kernels, Kernels], maths: Maths) -> tuple[Integrals, Integrals]:
+def _f_derivative(
+    theta_1: Value, both: tuple[Kernels, Kernels], maths: Maths
+) -> tuple[Integrals, Integrals]:
     """Derivatives of θ₁x and of x with respect to f; even in f."""
     straight, turning = both
     rotation = theta_1 * _rotation(theta_1, maths)
@@ -303,7 +326,9 @@ def _rotation(theta_1: Value, maths: Maths) -> Value:
     return maths.cos(theta_1) + 1j * maths.sin(theta_1)
 
 
-def _scaled_peak(wheel: Wheel, x: Integrals, c: Value, tan_phi: Value, theta_1: Value, load: Value) -> Value:
+def _scaled_peak(
+    wheel: Wheel, x: Integrals, c: Value, tan_phi: Value, theta_1: Value, load: Value
+) -> Value:
     """σₘθ₁ [Pa·rad] that carries the load W, Eq. (21); unlike σₘ it is finite at θ₁ = 0."""
     return (load / (wheel.radius * wheel.width) - c * theta_1 * x.b2) / (x.b1 + tan_phi * x.b3)
 
@@ -334,7 +359,9 @@ class _At(NamedTuple):
     tan_phi: Value
     s: Value
 
-    def response(self, support: Value, torque: Value, pull: Value, resistance: Value) -> tuple[Value, Value, Value]:
+    def response(
+        self, support: Value, torque: Value, pull: Value, resistance: Value
+    ) -> tuple[Value, Value, Value]:
         """Change of T, DP and resistance, in units of rb (T: r²b), from their own terms and through s.
 
         support: what (21) leaves for s·(B₁ + tan φ B₃) to carry, changed.
@@ -362,6 +389,11 @@ class _At(NamedTuple):
     def along_shift(self, c: Value, theta_1: Value, shift: Shift) -> tuple[Sequence[Value], ...]:
         """What a shift adds to the columns of the gradient, in the order of GRADIENT."""
         none = (0.0, 0.0, 0.0)
-        grown = Integrals(*[a + theta_1 * b for a, b in zip(shift.value, shift.theta_1, strict=True)])
-        by_ln_k, by_slip = (self.along(c, Integrals(*[theta_1 * d for d in dx]), dx) for dx in (shift.ln_k, shift.slip))
+        grown = Integrals(
+            *[a + theta_1 * b for a, b in zip(shift.value, shift.theta_1, strict=True)]
+        )
+        by_ln_k, by_slip = (
+            self.along(c, Integrals(*[theta_1 * d for d in dx]), dx)
+            for dx in (shift.ln_k, shift.slip)
+        )
         return none, none, by_ln_k, self.along(c, grown, shift.theta_1), by_slip, none

@@ -25,10 +25,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.terramechanics.soil import Array
+from gritd.estimator.terramechanics.soil import Array
 
 SMALL = 0.25  # |y + η| below which the recurrence runs backward
-BACKWARD = 11  # where it starts; what is left out there weighs SMALL¹¹/11! of it, below 1e-14, in μ₀
+BACKWARD = (
+    11  # where it starts; what is left out there weighs SMALL¹¹/11! of it, below 1e-14, in μ₀
+)
 
 # A real or complex number, or an array of them: the arithmetic below is the same for all.
 Value = Any
@@ -71,7 +73,10 @@ def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bo
     alpha = 1.0 - lam
     lost = -maths.expm1(-eta * alpha)  # 1 − e^(−ηv) at the peak
     if turning:
-        front, rear = maths.turning(theta_1 * alpha, eta * alpha), maths.turning(theta_1 * lam, eta * lam)
+        front, rear = (
+            maths.turning(theta_1 * alpha, eta * alpha),
+            maths.turning(theta_1 * lam, eta * lam),
+        )
         angle = theta_1 * alpha
         phase = maths.cos(angle) - 1j * maths.sin(angle)
     else:
@@ -83,7 +88,15 @@ def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bo
     kept = phase * (1.0 - lost)
     return Kernels(
         fold(lam, m0, m1, m2, phase * r0, phase * r1, phase * r2),
-        fold(lam, d0, d1, d2, phase * (e0 + lost * n0), phase * (e1 + lost * n1), phase * (e2 + lost * n2)),
+        fold(
+            lam,
+            d0,
+            d1,
+            d2,
+            phase * (e0 + lost * n0),
+            phase * (e1 + lost * n1),
+            phase * (e2 + lost * n2),
+        ),
         fold(lam, m0 - d0, m1 - d1, m2 - d2, kept * n0, kept * n1, kept * n2),
     )
 
@@ -160,7 +173,9 @@ class Numbers:
         step = -math.expm1(-eta) * end
         if angle < SMALL:
             mu, delta = backward(y, eta, end, step)
-            return (mu, delta) if math.hypot(angle, eta) < SMALL else (mu, forward(mu, y, eta, step))
+            return (
+                (mu, delta) if math.hypot(angle, eta) < SMALL else (mu, forward(mu, y, eta, step))
+            )
         half = 0.5 * angle
         m0 = cmath.exp(-1j * half) * (math.sin(half) / half)
         m1 = (m0 - end) / y
@@ -214,4 +229,8 @@ class Arrays:
 
 
 def _where(mask: NDArray[np.bool_], near: Triple, far: Triple) -> Triple:
-    return np.where(mask, near[0], far[0]), np.where(mask, near[1], far[1]), np.where(mask, near[2], far[2])
+    return (
+        np.where(mask, near[0], far[0]),
+        np.where(mask, near[1], far[1]),
+        np.where(mask, near[2], far[2]),
+    )

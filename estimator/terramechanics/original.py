@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
+from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
 Mobilisation = Callable[[Array], Array]  # share of the shear strength mobilised at j/k; odd in j/k
 
@@ -61,7 +61,9 @@ def velocity_ratio(slip: Scalar) -> Array:
 
     Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with the same slope.
     """
-    q = np.clip(1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0)  # 1 when driving, 1 + i when braking
+    q = np.clip(
+        1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0
+    )  # 1 when driving, 1 + i when braking
     return np.asarray(1.0 - slip / q)
 
 
@@ -107,9 +109,13 @@ def janosi(x: Array) -> Array:
     return np.copysign(np.expm1(-np.abs(x)), x)
 
 
-def shear_stress(soil: Soil, sigma: Array, displacement: Array, mobilisation: Mobilisation = janosi) -> Array:
+def shear_stress(
+    soil: Soil, sigma: Array, displacement: Array, mobilisation: Mobilisation = janosi
+) -> Array:
     """Shear stress τ [Pa], Eqs. (2) and (7): (c + σ tan φ)(1 − e^(−j/k))."""
-    stress: Array = (soil.cohesion + sigma * soil.tan_phi) * mobilisation(displacement / soil.shear_modulus)
+    stress: Array = (soil.cohesion + sigma * soil.tan_phi) * mobilisation(
+        displacement / soil.shear_modulus
+    )
     return stress
 
 
@@ -132,7 +138,9 @@ def contact(
     points = arc(theta_1, np.concatenate(np.broadcast_arrays(rear, front)))
     weight = np.concatenate(np.broadcast_arrays(ds * (peak - theta_2), ds * (theta_1 - peak)))
     sigma = front_stress(wheel, soil, Arc(*(field[order:] for field in points)))
-    sigma = np.concatenate((sigma, sigma))  # Eq. (4) gives the rear zone the same stress at the same s
+    sigma = np.concatenate(
+        (sigma, sigma)
+    )  # Eq. (4) gives the rear zone the same stress at the same s
     tau = shear_stress(soil, sigma, shear_displacement(wheel, slip, points), mobilisation)
     return Contact(points, weight, sigma, tau)
 
@@ -162,7 +170,14 @@ def forces(
 ) -> Forces:
     """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the paper."""
     stresses = contact(
-        wheel, soil, theta_1, slip, theta_m=theta_m, theta_2=theta_2, mobilisation=mobilisation, order=order
+        wheel,
+        soil,
+        theta_1,
+        slip,
+        theta_m=theta_m,
+        theta_2=theta_2,
+        mobilisation=mobilisation,
+        order=order,
     )
     return integrate(wheel, stresses)
 

@@ -15,9 +15,9 @@ from cmath import exp as turn
 from math import exp, sin
 from typing import Any
 
-from estimator.terramechanics import linear
-from estimator.terramechanics.linear import Prediction, Shift
-from estimator.terramechanics.soil import Wheel
+from gritd.estimator.terramechanics import linear
+from gritd.estimator.terramechanics.linear import Prediction, Shift
+from gritd.estimator.terramechanics.soil import Wheel
 
 SMALLEST = 0.1  # of |s|: below it a derivative of H has lost four digits
 NEAREST = 0.02  # likewise of λ and of 1 − λ
@@ -68,7 +68,9 @@ def predict(
         (arm * theta_1 * a1, area * theta_1 * one.real, 0.0, area * theta_1 * one.imag),
         (arm * s * a2, area * s * hat.real, 0.0, area * s * hat.imag),
         forces(*by_f),
-        forces(a1 + by_theta_1[0], by_theta_1[1], by_theta_1[2], one + by_theta_1[3], by_theta_1[4]),
+        forces(
+            a1 + by_theta_1[0], by_theta_1[1], by_theta_1[2], one + by_theta_1[3], by_theta_1[4]
+        ),
         forces(*_by_ratio(theta_1, f * theta_1, lam)) if wheel.c2 else NONE,
         forces(*_added(NOTHING, shift.ln_k, 1.0)) if shift is not None else NONE,
         forces(*_added(NOTHING, shift.slip, 1.0)) if shift is not None else NONE,
@@ -78,7 +80,8 @@ def predict(
     torque_s, drag_s = arm * tan_phi * a2 * ds, area * bare.imag * ds
     pull_s = area * tan_phi * hat.real * ds - drag_s
     by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam, by_ln_k, by_slip = [
-        (torque + torque_s * load, pull + pull_s * load, drag + drag_s * load) for torque, pull, drag, load in columns
+        (torque + torque_s * load, pull + pull_s * load, drag + drag_s * load)
+        for torque, pull, drag, load in columns
     ]
     # of ln f by θ₁ and by i
     f_theta_1, f_slip = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f, scale * (1.0 - rise) / f
@@ -120,7 +123,12 @@ def load(
 
 def _delicate(theta_1: float, f: float, slip: float, lam: float) -> bool:
     """Whether the transforms would lose digits here."""
-    return slip < 0.0 or theta_1 < SMALLEST or f * theta_1 < SMALLEST or not NEAREST < lam < 1.0 - NEAREST
+    return (
+        slip < 0.0
+        or theta_1 < SMALLEST
+        or f * theta_1 < SMALLEST
+        or not NEAREST < lam < 1.0 - NEAREST
+    )
 
 
 def _added(x: Integrals, change: linear.Integrals, factor: float) -> Integrals:
@@ -152,7 +160,9 @@ def _integrals(theta_1: float, eta: float, lam: float) -> tuple[Integrals, Integ
     )  # fmt: skip
 
 
-def _transforms(s: Number, end: Number, peak: Number, lam: float) -> tuple[Number, Number, Number, Number]:
+def _transforms(
+    s: Number, end: Number, peak: Number, lam: float
+) -> tuple[Number, Number, Number, Number]:
     """E, H, s dE/ds and s dH/ds; end = e^(−s), peak = e^(−αs)."""
     one = (1.0 - end) / s
     fall = (peak - end) / lam

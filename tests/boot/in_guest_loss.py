@@ -3,11 +3,13 @@
 import sys
 from pathlib import Path
 
-from estimator.daemon import TOPICS
-from estimator.recording.salvage import read
+from gritd.estimator.daemon.daemon import TOPICS
+from gritd.estimator.recording.salvage import read
 
 path, killed = Path(sys.argv[1]), int(sys.argv[2])
 recording = read(path, TOPICS)
 times = [message[1] for message in recording.messages()]
 lost = (killed - max(times)) * 1e-9
-print(f"{path.name}: closed: {recording.closed}, {len(times)} messages readable, the last {lost:.3f} s before the kill")
+print(
+    f"{path.name}: closed: {recording.closed}, {len(times)} messages readable, the last {lost:.3f} s before the kill"
+)

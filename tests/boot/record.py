@@ -10,10 +10,10 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from drivers.wire import CanWire, SerialWire
-from estimator.readings import ENCODERS
+from gritd.drivers.wire import CanWire, SerialWire
+from gritd.estimator.messages.readings import ENCODERS
+from gritd.tools.testbed.wires import messages
 from tests.scenarios.rig import TESTBED, driven
-from tools.wires import messages
 
 LAP, LAPS = 60.0, 15  # [s], and how often it is driven: encoders and sequence numbers go on
 THIN = 25  # of 250 readings a second ten are left
@@ -32,7 +32,10 @@ def recorded():
             due, value = reading.received + round(number * LAP * 1e9), reading.value
             if reading.channel in turned:
                 value = (value + number * turned[reading.channel]) % (1 << 32)
-            values, source = value if isinstance(value, tuple) else (value,), sources[reading.channel]
+            values, source = (
+                value if isinstance(value, tuple) else (value,),
+                sources[reading.channel],
+            )
             if source.device == "encoders":
                 yield due, 0, 0, serial.encode(source.signal, values, due // 1000)
             else:
@@ -51,6 +54,8 @@ def thinned(readings):
 
 
 if __name__ == "__main__":
-    packets = [HEAD.pack(due, kind, ident, len(data)) + data for due, kind, ident, data in recorded()]
+    packets = [
+        HEAD.pack(due, kind, ident, len(data)) + data for due, kind, ident, data in recorded()
+    ]
     Path(sys.argv[1]).write_bytes(b"".join(packets))
     print(f"{len(packets)} packets")

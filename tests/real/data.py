@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from estimator import config
-from estimator.recording import salvage
-from estimator.settings import Settings
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.recording import salvage
 
 REAL = Path(__file__).parents[3] / "shared" / "real"
 
@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 def needs(rig: str) -> pytest.MarkDecorator:
     """Skip where a rig's files are absent; docs/importing.md says where the public ones come from."""
     folder = REAL / rig
-    return pytest.mark.skipif(not folder.is_dir(), reason=f"no real recordings in {folder}; see docs/importing.md")
+    return pytest.mark.skipif(
+        not folder.is_dir(), reason=f"no real recordings in {folder}; see docs/importing.md"
+    )
 
 
 class Physical:
@@ -43,7 +45,9 @@ class Physical:
         """Calibrated values of a channel with one value, shape (n,)."""
         calibration = self.settings.channels[channel].calibration
         field = "count" if channel.endswith("encoder") else "volts"
-        return np.asarray(self._rows[channel][field] * calibration.scale.value + calibration.offset.value)
+        return np.asarray(
+            self._rows[channel][field] * calibration.scale.value + calibration.offset.value
+        )
 
     def force(self, axis: str) -> Array:
         """One axis of the wrench as read, shape (n,)."""

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gritd.tools.cli.command import CommandError
+from gritd.tools.commands.import_rig import main
 from tests.real.data import REAL, Physical, needs
-from tools.command import CommandError
-from tools.import_rig import main
 
 pytestmark = needs("cmu")
 
@@ -21,7 +21,11 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("cmu")
     folder = REAL / "cmu"
     logs = ["gr810_vx_10__12-7-20__10_20_0_1.txt.gz", "gr810_vx_10__11-10-20__10_10_0_5.txt.gz"]
-    tables = ["smooth_all_trials_steady_state.csv", "grouser_first_trial_steady_state.csv", "beta0_trials_index.csv"]
+    tables = [
+        "smooth_all_trials_steady_state.csv",
+        "grouser_first_trial_steady_state.csv",
+        "beta0_trials_index.csv",
+    ]
     paths = [str(folder / name) for name in [*logs, *tables, "penetration"]]
     assert main(["cmu", *paths, "-o", str(output)]) == 0
     return output
@@ -44,18 +48,28 @@ def steady(trial: Physical) -> dict[str, float]:
 
 def rows(name: str) -> list[dict[str, float]]:
     with (REAL / "cmu" / name).open() as stream:
-        table = [{key: float(text) for key, text in row.items() if text} for row in csv.DictReader(stream)]
+        table = [
+            {key: float(text) for key, text in row.items() if text}
+            for row in csv.DictReader(stream)
+        ]
     return [row for row in table if row["beta"] == 0]
 
 
 def test_every_straight_row_of_the_tables_is_one_steady_state(imported: Path) -> None:
-    names = {"smooth": "smooth_all_trials_steady_state.csv", "grouser": "grouser_first_trial_steady_state.csv"}
+    names = {
+        "smooth": "smooth_all_trials_steady_state.csv",
+        "grouser": "grouser_first_trial_steady_state.csv",
+    }
     for wheel, name in names.items():
-        given = sorted((r["avg_Vry"], -r["avg_Fy"], r["std_Fy"], -r["avg_Fz"], -r["avg_Z"]) for r in rows(name))
+        given = sorted(
+            (r["avg_Vry"], -r["avg_Fy"], r["std_Fy"], -r["avg_Fz"], -r["avg_Z"]) for r in rows(name)
+        )
         found = []
         for path in sorted((imported / f"{wheel}-table").glob("*.mcap")):
             s = steady(Physical(path))
-            found.append((s["rim"] * 1e3, s["pull"], s["pull_scatter"], s["load"], s["sinkage"] * 1e3))
+            found.append(
+                (s["rim"] * 1e3, s["pull"], s["pull_scatter"], s["load"], s["sinkage"] * 1e3)
+            )
         np.testing.assert_allclose(sorted(found), given, rtol=1e-6, atol=2e-4)
 
 
@@ -95,7 +109,9 @@ def test_a_log_ends_where_its_table_row_says(imported: Path) -> None:
     time, z = log.time("sinkage_pot"), log.value("sinkage_pot")
     assert z[0] == pytest.approx(-31.5e-3)
     assert z[time > time[-1] - 5].mean() == pytest.approx(22.54e-3, abs=0.1e-3)
-    assert log.settings.wheel.radius * log.speed("wheel_encoder", 70, 80) == pytest.approx(20e-3, rel=0.01)
+    assert log.settings.wheel.radius * log.speed("wheel_encoder", 70, 80) == pytest.approx(
+        20e-3, rel=0.01
+    )
     assert log.speed("carriage_encoder", 70, 80) == pytest.approx(10e-3, rel=0.01)
     assert log.recording.run.nominal_load == pytest.approx(24.55, abs=0.01)
     assert len(log.time("wrench")) == len(log.time("motor_shunt")) == 0
@@ -108,11 +124,25 @@ def test_a_log_that_matches_no_row_has_no_load(imported: Path) -> None:
 
 def test_penetration_tests_by_body(imported: Path) -> None:
     with (imported / "penetration.csv").open() as stream:
-        points = [(row["body"], float(row["depth_mm"]), float(row["force_N"])) for row in csv.DictReader(stream)]
+        points = [
+            (row["body"], float(row["depth_mm"]), float(row["force_N"]))
+            for row in csv.DictReader(stream)
+        ]
     plate = np.array([(depth, force) for body, depth, force in points if body == "plate 60 mm"])
     pressure = plate[:, 1] / (np.pi * 0.03**2)
     near = np.abs(plate[:, 0] - 10.0) < 0.5
-    assert pressure[near].mean() == pytest.approx(9.3e3, rel=0.1), "what config/rig_cmu.yaml says of this sand"
-    stop = np.array([(depth, force) for body, depth, force in points if body == "rigid stop" and force > 20.0])
-    assert np.polyfit(stop[:, 1], stop[:, 0], 1)[0] == pytest.approx(0.0125, abs=0.002), "the frame yields, mm/N"
-    assert {body for body, _, _ in points} >= {"plate 80 mm", "plate 100 mm", "smooth wheel", "grouser wheel"}
+    assert pressure[near].mean() == pytest.approx(9.3e3, rel=0.1), (
+        "what config/rig_cmu.yaml says of this sand"
+    )
+    stop = np.array(
+        [(depth, force) for body, depth, force in points if body == "rigid stop" and force > 20.0]
+    )
+    assert np.polyfit(stop[:, 1], stop[:, 0], 1)[0] == pytest.approx(0.0125, abs=0.002), (
+        "the frame yields, mm/N"
+    )
+    assert {body for body, _, _ in points} >= {
+        "plate 80 mm",
+        "plate 100 mm",
+        "smooth wheel",
+        "grouser wheel",
+    }

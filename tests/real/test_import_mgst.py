@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gritd.tools.commands.import_rig import main
 from tests.real.data import REAL, Physical, needs
-from tools.import_rig import main
 
 pytestmark = needs("mgst")
 
@@ -49,7 +49,9 @@ def test_slip_is_the_one_that_was_imposed(imported: Path) -> None:
         assert slip == pytest.approx(int(name[5:7]) / 100, abs=0.003)
 
 
-def test_motor_torque_exceeds_the_axle_torque_by_what_the_drivetrain_consumes(imported: Path) -> None:
+def test_motor_torque_exceeds_the_axle_torque_by_what_the_drivetrain_consumes(
+    imported: Path,
+) -> None:
     losses = []
     for trial in trials(imported).values():
         steady = trial.time("motor_shunt") > 3.0
@@ -76,10 +78,20 @@ def test_load_is_what_the_vertical_axis_leaves_of_the_weights(imported: Path) ->
         assert trial.recording.run.nominal_load == pytest.approx(trial.force("fz").mean(), abs=1.0)
 
 
-def test_a_recording_begins_with_the_start_of_the_wheel_and_ends_with_the_shorter_log(imported: Path) -> None:
+def test_a_recording_begins_with_the_start_of_the_wheel_and_ends_with_the_shorter_log(
+    imported: Path,
+) -> None:
     for trial in trials(imported).values():
-        assert trial.speed("wheel_encoder", 0.0, 0.1) < 0.1 * trial.speed("wheel_encoder", 5.0, 10.0)
-        for channel in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt", "wrench"):
+        assert trial.speed("wheel_encoder", 0.0, 0.1) < 0.1 * trial.speed(
+            "wheel_encoder", 5.0, 10.0
+        )
+        for channel in (
+            "wheel_encoder",
+            "carriage_encoder",
+            "sinkage_pot",
+            "motor_shunt",
+            "wrench",
+        ):
             time = trial.time(channel)
             assert time[0] < 0.02 or (channel == "wrench" and 0.4 < time[0] < 0.7)
             assert time[-1] == pytest.approx(15.1, abs=0.2)
@@ -97,10 +109,14 @@ def test_concealed_axes_are_gone_and_said_to_be_unknown(imported: Path, conceale
         np.testing.assert_array_equal(trial.force("fz"), whole.force("fz"))
 
 
-def test_raw_drawbar_pull_lacks_a_quarter_of_the_lateral_force(imported: Path, concealed: Path) -> None:
+def test_raw_drawbar_pull_lacks_a_quarter_of_the_lateral_force(
+    imported: Path, concealed: Path
+) -> None:
     for name, trial in trials(concealed).items():
         whole = Physical(imported / f"{name}.mcap")
-        np.testing.assert_allclose(trial.force("fx") + 0.25 * whole.force("fy"), whole.force("fx"), atol=1e-9)
+        np.testing.assert_allclose(
+            trial.force("fx") + 0.25 * whole.force("fy"), whole.force("fx"), atol=1e-9
+        )
 
 
 def test_a_concealed_sensor_is_not_in_the_recording(tmp_path: Path) -> None:
@@ -110,7 +126,9 @@ def test_a_concealed_sensor_is_not_in_the_recording(tmp_path: Path) -> None:
         assert len(trial.time("sinkage_pot")) > 1000
 
 
-def test_importing_again_gives_the_same_bytes_and_replaces_what_was_there(imported: Path, tmp_path: Path) -> None:
+def test_importing_again_gives_the_same_bytes_and_replaces_what_was_there(
+    imported: Path, tmp_path: Path
+) -> None:
     (tmp_path / "mgst-20-165209.mcap").write_bytes(b"an earlier import")
     run(tmp_path)
     for path in imported.iterdir():

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from estimator import config
-from estimator.recording.salvage import read
-from tests.diagnose.test_drive_rig import fitted
+from gritd.estimator.config import configuration as config
+from gritd.estimator.recording.salvage import read
+from gritd.tools.commands.import_rig import main
+from gritd.tools.diagnose.rig.drive import DriveRig
+from gritd.tools.diagnose.rig.signals import drive_series
+from gritd.tools.proof.real import cmu, ding, emps, mgst
+from gritd.tools.proof.real.bench import Bench
+from gritd.tools.proof.real.proof import Asked, Finding, Proof
 from tests.real.data import REAL, needs
-from tools.diagnose.drive_rig import DriveRig
-from tools.diagnose.load import drive_series
-from tools.import_rig import main
-from tools.proof.real import cmu, ding, emps, mgst
-from tools.proof.real.bench import Bench
-from tools.proof.real.proof import Asked, Finding, Proof
+from tests.tools.diagnose.rig.test_drive import fitted
 
 
 def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Asked]]:
@@ -30,8 +30,12 @@ def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Asked]]:
 def test_the_adapter_of_a_drive_recovers_the_published_parameters(tmp_path: Path) -> None:
     assert main(["emps", str(REAL / "emps" / "DATA_EMPS.mat"), "-o", str(tmp_path)]) == 0
     settings = config.load(tmp_path / "emps.yaml").settings
-    found = fitted(DriveRig([drive_series(read(tmp_path / "data-emps.mcap"), settings)], ["EMPS"], settings))
-    for name, (value, _) in zip(("inertia", "damping", "loss"), emps.PUBLISHED.values(), strict=True):
+    found = fitted(
+        DriveRig([drive_series(read(tmp_path / "data-emps.mcap"), settings)], ["EMPS"], settings)
+    )
+    for name, (value, _) in zip(
+        ("inertia", "damping", "loss"), emps.PUBLISHED.values(), strict=True
+    ):
         assert found[name] == pytest.approx(value, rel=0.03), name
 
 
@@ -39,7 +43,13 @@ def test_the_adapter_of_a_drive_recovers_the_published_parameters(tmp_path: Path
 @pytest.mark.slow
 def test_emps_names_the_friction_and_recovers_the_published_parameters(tmp_path: Path) -> None:
     _, asked = proved(emps.FRICTION, tmp_path)
-    for question in ("Which friction does it name first", "M", "Fv", "Fc", "Does it say that something remains"):
+    for question in (
+        "Which friction does it name first",
+        "M",
+        "Fv",
+        "Fc",
+        "Does it say that something remains",
+    ):
         assert asked[question].met, f"{question}: {asked[question].found}"
     assert asked["Is the force of the unseen log predicted better"].met
 

@@ -1,4 +1,4 @@
-"""Figures: a scenario states what it measured; `python -m tools.reliability` makes docs/reliability.md from them."""
+"""Figures: a scenario states what it measured; `python -m gritd.tools.dev.reliability` makes docs/reliability.md from them."""
 
 from __future__ import annotations
 
@@ -28,16 +28,28 @@ def figure(request):
 
     row: the fault, as the list names it. level: what ran, and what was simulated. limit: largest value allowed;
     real: a time in the real world, which a machine that stalls decides as well as we do. A test that fails for it says
-    nothing, so it is stated, and `python -m tools.reliability` holds it to its limit.
+    nothing, so it is stated, and `python -m gritd.tools.dev.reliability` holds it to its limit.
     """
 
     def state(row, level, name, value, unit="", limit=None, real=False):
-        print(f"{row}: {name} {value:.4g} {unit}".rstrip() + (f" (limit {limit:g})" if limit is not None else ""))
+        print(
+            f"{row}: {name} {value:.4g} {unit}".rstrip()
+            + (f" (limit {limit:g})" if limit is not None else "")
+        )
         if path := os.environ.get(FIGURES):
-            entry = {"row": row, "level": level, "name": name, "value": float(value), "unit": unit, "limit": limit}
+            entry = {
+                "row": row,
+                "level": level,
+                "name": name,
+                "value": float(value),
+                "unit": unit,
+                "limit": limit,
+            }
             more = {"real": real, "load": os.getloadavg()[0], "test": request.node.nodeid}
             with open(path, "a", encoding="utf-8") as out:
                 out.write(json.dumps({**entry, **more}, ensure_ascii=False) + "\n")
-        assert limit is None or real or value <= limit, f"{name} is {value:g} {unit}, above {limit:g}"
+        assert limit is None or real or value <= limit, (
+            f"{name} is {value:g} {unit}, above {limit:g}"
+        )
 
     return state

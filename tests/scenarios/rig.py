@@ -18,27 +18,28 @@ from threading import Event, Thread
 import numpy as np
 import yaml
 
-from config import packaged
-from drivers.wire import CanWire, SerialWire
-from estimator import config
-from estimator.daemon import TOPICS
-from estimator.recording import parts
-from estimator.recording.salvage import read
-from tests.drivers_rig import Plug
-from tools import replay, rig_config
-from tools.command import CommandError
-from tools.status import connected, reports
-from tools.testbed import experiment, in_transit, play
-from tools.wires import Rig, has_multicast, messages, slcan_line
+from gritd.config import packaged
+from gritd.drivers.wire import CanWire, SerialWire
+from gritd.estimator.config import configuration as config
+from gritd.estimator.daemon.daemon import TOPICS
+from gritd.estimator.recording.run import parts
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli.command import CommandError
+from gritd.tools.commands import replay
+from gritd.tools.commands.status import connected, reports
+from gritd.tools.testbed import rig_config
+from gritd.tools.testbed.testbed import experiment, in_transit, play
+from gritd.tools.testbed.wires import Rig, has_multicast, messages, slcan_line
+from tests.drivers.rig import Plug
 
 ROOT = Path(__file__).parents[2]
 TESTBED = config.load(packaged())
 BUS = "udp_multicast" if has_multicast() else "slcan"
 BECOMING = """
 import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast
-import tools.run, tools.serve
-from drivers.build import build_readers
-from estimator.config import load
+import gritd.tools.commands.run, gritd.tools.service.serve
+from gritd.drivers.build import build_readers
+from gritd.estimator.config.configuration import load
 build_readers(load({config!r}).settings, lambda: 0, None)
 os.setgroups([]); os.setgid({user}); os.setuid({user})
 """
@@ -51,11 +52,15 @@ def driven(seconds, seed, skip=0.0):
     """Readings of a simulated run, stamps and arrivals from zero [ns]; `skip` [s] of them left out at the start."""
     readings = in_transit(experiment(TESTBED, seconds, "linear", seed).run.readings, seed)
     start = int(skip * 1e9)
-    return [r._replace(stamp=r.stamp - start, received=r.received - start) for r in readings if r.received >= start]
+    return [
+        r._replace(stamp=r.stamp - start, received=r.received - start)
+        for r in readings
+        if r.received >= start
+    ]
 
 
 class PluggedDevice:
-    """A serial device behind a fixed path, that can be unplugged; a FarEnd of tools.wires."""
+    """A serial device behind a fixed path, that can be unplugged; a FarEnd of gritd.tools.testbed.wires."""
 
     def __init__(self, device, folder):
         self.plug = Plug(folder / device.name)
@@ -101,7 +106,9 @@ class Wires(Rig):
     def __init__(self, folder, bus=BUS, **changes):
         super().__init__(TESTBED.settings, bus)
         self._ends["encoders"].close()
-        self.encoders = self._ends["encoders"] = PluggedDevice(TESTBED.settings.devices["encoders"], folder)
+        self.encoders = self._ends["encoders"] = PluggedDevice(
+            TESTBED.settings.devices["encoders"], folder
+        )
         if bus == "slcan":
             self._ends["bus"].close()
             self._ends["bus"] = PluggedBus(TESTBED.settings.devices["bus"], folder)
@@ -189,12 +196,16 @@ class DaemonProcess:
         self.socket = str(Path(self._box.name) / "gritd.sock")
         self._manager = Manager(Path(self._box.name) / "notify")
         os.chmod(self._box.name, 0o777)
-        environment = {**os.environ, "NOTIFY_SOCKET": str(self._manager.path), "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            "NOTIFY_SOCKET": str(self._manager.path),
+            "PYTHONPATH": str(ROOT),
+        }
         if watchdog:
             environment["WATCHDOG_USEC"] = str(int(watchdog * 1e6))
         becoming = "" if user is None else BECOMING.format(user=user, config=str(config))
-        code = f"{becoming}\n{prelude}\nimport sys, tools.run, tools.serve, tools.cli\nprint('loaded', flush=True)\n"
-        code += "sys.exit(tools.cli.main(sys.argv[1:]))"
+        code = f"{becoming}\n{prelude}\nimport sys, gritd.tools.commands.run, gritd.tools.service.serve, gritd.tools.cli.main\nprint('loaded', flush=True)\n"
+        code += "sys.exit(gritd.tools.cli.main.main(sys.argv[1:]))"
         command = ["--config", str(config), "--socket", self.socket, "--status", "0"]
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, "run", *command, *arguments],
@@ -246,7 +257,11 @@ class DaemonProcess:
     def notified(self, message, limit=LIMIT):
         """Wait for the next message to the service manager that contains this; when it came."""
         found = []
-        self.until(lambda: found or found.extend(self._manager.after(message)) or found, f"no {message}", limit)
+        self.until(
+            lambda: found or found.extend(self._manager.after(message)) or found,
+            f"no {message}",
+            limit,
+        )
         return found[0]
 
     def strokes(self, seconds):
@@ -257,7 +272,9 @@ class DaemonProcess:
 
     def datagrams(self, port):
         """Of the daemon's socket on a UDP port: bytes that wait in it, datagrams that the kernel threw away."""
-        held = {os.path.basename(name) for name in map(link_of, Path(f"/proc/{self.pid}/fd").iterdir())}
+        held = {
+            os.path.basename(name) for name in map(link_of, Path(f"/proc/{self.pid}/fd").iterdir())
+        }
         for line in Path("/proc/net/udp").read_text().splitlines()[1:]:
             words = line.split()
             if int(words[1].partition(":")[2], 16) == port and f"socket:[{words[9]}]" in held:
@@ -295,7 +312,9 @@ class DaemonProcess:
 
     def descriptors(self):
         """How many are open for long: the fewest of some looks, for a file that is being synced counts twice."""
-        return min(len(os.listdir(f"/proc/{self.pid}/fd")) for _ in range(20) if not time.sleep(0.02))
+        return min(
+            len(os.listdir(f"/proc/{self.pid}/fd")) for _ in range(20) if not time.sleep(0.02)
+        )
 
     def threads(self):
         return len(os.listdir(f"/proc/{self.pid}/task"))
@@ -348,7 +367,9 @@ def rows(path, topic):
 
 def log_lines(path):
     """The texts of /log."""
-    return [m[2][3] for recording in recordings(path) for m in recording.messages() if m[0] == "/log"]
+    return [
+        m[2][3] for recording in recordings(path) for m in recording.messages() if m[0] == "/log"
+    ]
 
 
 def verified(path):
@@ -374,7 +395,10 @@ def silence():
 @contextmanager
 def service(folder, readings=None, prelude="", watchdog=0.0, **changes):
     """Wires and a ready daemon on them, playing the readings."""
-    with Wires(folder, **changes) as wires, DaemonProcess(wires.config, prelude=prelude, watchdog=watchdog) as daemon:
+    with (
+        Wires(folder, **changes) as wires,
+        DaemonProcess(wires.config, prelude=prelude, watchdog=watchdog) as daemon,
+    ):
         daemon.ready()
         if readings is not None:
             wires.play(readings)

@@ -11,15 +11,15 @@ from threading import Event
 import can
 import pytest
 
-from drivers.build import build_decoder
-from drivers.can_link import CanLink
-from drivers.errors import DeviceError
-from drivers.queue import ReadingQueue
-from drivers.reader import Reader
-from estimator.settings import Device
-from tests.drivers_rig import Ticking
+from gritd.drivers.build import build_decoder
+from gritd.drivers.can_link import CanLink
+from gritd.drivers.errors import DeviceError
+from gritd.drivers.queue import ReadingQueue
+from gritd.drivers.reader import Reader
+from gritd.estimator.config.settings import Device
+from gritd.tools.testbed.wires import has_multicast
+from tests.drivers.rig import Ticking
 from tests.scenarios.rig import TESTBED, WIRES, driven, rows, service, verified
-from tools.wires import has_multicast
 
 FAILING = "CAN error frame or failing bus"
 HOSTILE = "hostile CAN or UDP datagram"
@@ -42,7 +42,15 @@ def test_a_bus_that_goes_away_and_comes_back(tmp_path, seed, figure):
         wires.bus.plug.plug_in()
         back = time.monotonic()
         daemon.heard("device bus OPEN", 2)
-        figure(FAILING, WIRES, "back after the adapter was put back", time.monotonic() - back, "s", 5.5, real=True)
+        figure(
+            FAILING,
+            WIRES,
+            "back after the adapter was put back",
+            time.monotonic() - back,
+            "s",
+            5.5,
+            real=True,
+        )
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         daemon.stop()
     assert verified(daemon.path())
@@ -61,11 +69,20 @@ def test_error_frames_are_counted_and_survived(tmp_path, seed, figure):
     with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         for _ in range(frames):
-            wires.bus._bus.send(can.Message(is_error_frame=True, arbitration_id=wanted, is_extended_id=False))
+            wires.bus._bus.send(
+                can.Message(is_error_frame=True, arbitration_id=wanted, is_extended_id=False)
+            )
             time.sleep(0.005)
         arrived = frames - dropped(wires, daemon)
         report = daemon.wait_status(lambda report: report["devices"]["bus"]["errors"] >= arrived)
-        figure(FAILING, WIRES, "error frames not counted", arrived - report["devices"]["bus"]["errors"], "", 0)
+        figure(
+            FAILING,
+            WIRES,
+            "error frames not counted",
+            arrived - report["devices"]["bus"]["errors"],
+            "",
+            0,
+        )
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         daemon.stop()
     assert verified(daemon.path())
@@ -95,7 +112,14 @@ def test_hostile_datagrams(tmp_path, seed, figure):
         counted = report["devices"]["bus"]["bad"] + report["devices"]["bus"]["unknown"]
         figure(HOSTILE, WIRES, "datagrams sent", cases, "")
         figure(HOSTILE, WIRES, "threads lost", threads - daemon.threads(), "", 0)
-        figure(HOSTILE, WIRES, "times the bus had to be reopened", report["devices"]["bus"]["reopened"], "", 0)
+        figure(
+            HOSTILE,
+            WIRES,
+            "times the bus had to be reopened",
+            report["devices"]["bus"]["reopened"],
+            "",
+            0,
+        )
         assert counted > 0.9 * (cases - dropped(wires, daemon)), f"{counted} of {cases} counted"
         daemon.stop()
     assert verified(daemon.path())
@@ -114,7 +138,9 @@ def hostile(rng):
 def good_datagram():
     from can.interfaces.udp_multicast.utils import pack_message
 
-    return bytes(pack_message(can.Message(arbitration_id=0x101, data=bytes(8), is_extended_id=False)))
+    return bytes(
+        pack_message(can.Message(arbitration_id=0x101, data=bytes(8), is_extended_id=False))
+    )
 
 
 GOOD = good_datagram()
@@ -132,7 +158,13 @@ def test_bus_flood(tmp_path, seed, rate, seconds, figure):
         daemon.stop()
     gaps = missing_samples(rows(daemon.path(), "/raw/sinkage_pot")["stamp"])
     name = f"wanted frames lost at {rate / 1000:g} k unwanted frames/s"
-    figure(FLOOD, WIRES, f"unwanted frames really sent, of {rate / 1000:g} k/s", sent / seconds / 1000, "k/s")
+    figure(
+        FLOOD,
+        WIRES,
+        f"unwanted frames really sent, of {rate / 1000:g} k/s",
+        sent / seconds / 1000,
+        "k/s",
+    )
     figure(FLOOD, WIRES, name, lost, "", 0 if rate <= 5000 else None, real=True)
     figure(FLOOD, WIRES, f"{name} without the kernel's doing", max(lost - no_room, 0), "", 0)
     assert gaps <= max(lost, no_room), f"{gaps} samples missing, {lost} frames counted as lost"
@@ -180,7 +212,14 @@ def test_a_bus_whose_recv_raises_is_one_device_error(error, figure):
     with pytest.raises(DeviceError, match=r"^bus: cannot read can0"):
         link.read()
     link.close()
-    figure(FAILING, "CAN link, bus-off simulated by a bus that raises", "exceptions that reach the reader", 0, "", 0)
+    figure(
+        FAILING,
+        "CAN link, bus-off simulated by a bus that raises",
+        "exceptions that reach the reader",
+        0,
+        "",
+        0,
+    )
 
 
 class Quiet:

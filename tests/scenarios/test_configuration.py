@@ -12,9 +12,18 @@ import numpy as np
 import pytest
 import yaml
 
-from estimator.config import ConfigError, loads
-from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, recordings, rows, service, verified
-from tests.test_config import HOSTILE
+from gritd.estimator.config.configuration import ConfigError, loads
+from tests.estimator.config.test_config import HOSTILE
+from tests.scenarios.rig import (
+    TESTBED,
+    WIRES,
+    driven,
+    log_lines,
+    recordings,
+    rows,
+    service,
+    verified,
+)
 
 BAD_RELOAD = "SIGHUP with bad YAML"
 BOMB = "YAML bomb, unsafe tag, duplicate key, 1e3 as text, no as false, NaN"
@@ -31,7 +40,9 @@ def broken(text, rng):
         places = [n for n, line in enumerate(lines) if re.search(r": [\d.]+", line)]
         at = rng.choice(places)
         lines[at] = re.sub(
-            r": [\d.]+.*", f": {rng.choice(('.nan', '.inf', 'no', 'soft', '1 furlong', '1e3 kg'))}", lines[at]
+            r": [\d.]+.*",
+            f": {rng.choice(('.nan', '.inf', 'no', 'soft', '1 furlong', '1e3 kg'))}",
+            lines[at],
         )
     elif mistake == "indent":
         lines[at] = "\t" + lines[at]
@@ -60,13 +71,19 @@ def test_a_hundred_bad_files_change_nothing(tmp_path, seed, figure):
             refused += 1
             daemon.heard("the old configuration is kept", refused)
         daemon.stop()
-    lines = [line for line in log_lines(daemon.path()) if line.endswith("the old configuration is kept")]
+    lines = [
+        line for line in log_lines(daemon.path()) if line.endswith("the old configuration is kept")
+    ]
     unplaced = [
-        line for line in lines if not re.match(rf"{re.escape(str(wires.config))}:\d+: \S+.*: found .+; expected", line)
+        line
+        for line in lines
+        if not re.match(rf"{re.escape(str(wires.config))}:\d+: \S+.*: found .+; expected", line)
     ]
     figure(BAD_RELOAD, WIRES, "files refused", len(lines), "")
     figure(BAD_RELOAD, WIRES, "refusals without file, line and key", len(unplaced), "", 0)
-    figure(BAD_RELOAD, WIRES, "parts of the recording begun", len(recordings(daemon.path())) - 1, "", 0)
+    figure(
+        BAD_RELOAD, WIRES, "parts of the recording begun", len(recordings(daemon.path())) - 1, "", 0
+    )
     assert verified(daemon.path())
 
 
@@ -81,26 +98,42 @@ def readable(text, folder):
 def test_a_good_file_is_taken_over_between_two_ticks(tmp_path, seed, figure):
     """Another calibration and another prior: a new part with the new configuration, verified through the change."""
     with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
-        daemon.wait_status(lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5)
-        change(wires, lambda d: d["drive"].update(torque_constant={"value": "2.1 N*m/A", "sigma": "0.01 N*m/A"}))
+        daemon.wait_status(
+            lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5
+        )
+        change(
+            wires,
+            lambda d: d["drive"].update(
+                torque_constant={"value": "2.1 N*m/A", "sigma": "0.01 N*m/A"}
+            ),
+        )
         daemon.signal(signal.SIGHUP)
         daemon.heard("reloaded")
         daemon.notified("RELOADING=1")
         daemon.notified("READY=1")
-        daemon.wait_status(lambda report: report["log"]["files"] == 2 and report["status"] == "TRACKING")
+        daemon.wait_status(
+            lambda report: report["log"]["files"] == 2 and report["status"] == "TRACKING"
+        )
         change(wires, lambda d: d["soil"].update(cohesion={"value": "500 Pa", "sigma": "200 Pa"}))
         daemon.signal(signal.SIGHUP)
         daemon.heard("reloaded", 2)
-        daemon.wait_status(lambda report: report["log"]["files"] == 3 and report["status"] == "TRACKING")
+        daemon.wait_status(
+            lambda report: report["log"]["files"] == 3 and report["status"] == "TRACKING"
+        )
         change(wires, lambda d: d["rates"].update(tick="500 Hz"))
         daemon.signal(signal.SIGHUP)
         daemon.heard("rates: changed, which needs a restart; the old configuration is kept")
         daemon.stop()
     first, second, third = recordings(daemon.path())
-    constants = [loads(r.config_yaml, "x").settings.drive.torque_constant.value for r in (first, second, third)]
+    constants = [
+        loads(r.config_yaml, "x").settings.drive.torque_constant.value
+        for r in (first, second, third)
+    ]
     assert constants == [2.0, 2.1, 2.1]
     ticks = second.arrays("/tick")
-    assert abs(ticks["cohesion"][0] - first.arrays("/tick")["cohesion"][-1]) < 1e-9, "the estimate is kept"
+    assert abs(ticks["cohesion"][0] - first.arrays("/tick")["cohesion"][-1]) < 1e-9, (
+        "the estimate is kept"
+    )
     assert ticks["cohesion_sigma"][0] == pytest.approx(TESTBED.settings.soil.cohesion.sigma)
     assert third.arrays("/tick")["cohesion"][0] == pytest.approx(500.0)
     gap = np.max(np.diff(rows(daemon.path(), "/tick")["stamp"])) * 1e-9
@@ -117,7 +150,9 @@ def change(wires, how):
 def test_the_same_file_again_changes_nothing(tmp_path, figure):
     """A comment more, or nothing: no new part, and the estimate goes on to the bit."""
     with service(tmp_path, driven(40.0, 1, skip=1.0)) as (wires, daemon):
-        daemon.wait_status(lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5)
+        daemon.wait_status(
+            lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5
+        )
         daemon.signal(signal.SIGHUP)
         daemon.heard("unchanged")
         wires.config.write_text("# looked at\n" + wires.config.read_text())
@@ -126,7 +161,14 @@ def test_the_same_file_again_changes_nothing(tmp_path, figure):
         time.sleep(0.5)
         daemon.stop()
     parts = len(recordings(daemon.path())) - 1
-    figure("SIGHUP with good YAML", WIRES, "parts of the recording begun for the same file", parts, "", 0)
+    figure(
+        "SIGHUP with good YAML",
+        WIRES,
+        "parts of the recording begun for the same file",
+        parts,
+        "",
+        0,
+    )
     assert verified(daemon.path())
 
 
@@ -149,7 +191,15 @@ def test_hostile_and_misread_files(name, figure):
     tracemalloc.stop()
     assert "\n" not in str(error.value) and words in str(error.value)
     spent = min(processor_time(text) for _ in range(3))
-    figure(BOMB, "configuration reader", "processor time to the refusal", spent * 1e3, "ms", 100, real=True)
+    figure(
+        BOMB,
+        "configuration reader",
+        "processor time to the refusal",
+        spent * 1e3,
+        "ms",
+        100,
+        real=True,
+    )
     figure(BOMB, "configuration reader", "memory", peak / 1e6, "MB", 16)
 
 

@@ -9,9 +9,9 @@ import time
 import numpy as np
 import pytest
 
-from estimator.record import CHANNEL_BITS, Status
+from gritd.estimator.messages.record import CHANNEL_BITS, Status
+from tests.drivers.test_framing_serial import damage
 from tests.scenarios.rig import WIRES, driven, rows, service, verified
-from tests.test_framing_serial import damage
 
 ENCODERS = CHANNEL_BITS["wheel_encoder"] | CHANNEL_BITS["carriage_encoder"]
 UNPLUGGED = "device unplugged and back"
@@ -71,7 +71,9 @@ def test_unplugged_and_back(tmp_path, seed, figure):
 @pytest.mark.slow
 def test_a_hundred_cycles(tmp_path, figure):
     daemon, _, noticed, back, leaked = cycled(tmp_path, 1, 100)
-    figure(UNPLUGGED, WIRES, "noticed, worst of 100 cycles", max(noticed) * 1e3, "ms", 50, real=True)
+    figure(
+        UNPLUGGED, WIRES, "noticed, worst of 100 cycles", max(noticed) * 1e3, "ms", 50, real=True
+    )
     figure(UNPLUGGED, WIRES, "back, worst of 100 cycles", max(back), "s", 5.5, real=True)
     figure(UNPLUGGED, WIRES, "descriptors leaked over 100 cycles", leaked, "", 0)
     assert verified(daemon.path())
@@ -95,7 +97,14 @@ def test_garbage_bad_checksum_and_truncated_frames(tmp_path, seed, figure):
         daemon.stop()
     good, bad, garbage = counted(daemon, "frames", "bad", "garbage bytes")
     assert bad + garbage > 0
-    figure(GARBAGE, WIRES, "intact frames lost per fault", max(0, frames - faults - good) / faults, "", 1)
+    figure(
+        GARBAGE,
+        WIRES,
+        "intact frames lost per fault",
+        max(0, frames - faults - good) / faults,
+        "",
+        1,
+    )
     assert verified(daemon.path())
 
 

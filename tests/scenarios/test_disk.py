@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.recording import parts
-from estimator.recording.cdr import TIME, Topic
-from estimator.recording.mcapfile import RecordingError
-from estimator.recording.playback import CHECKPOINT
-from estimator.recording.salvage import read
+from gritd.estimator.offline.playback import CHECKPOINT
+from gritd.estimator.recording.cdr import TIME, Topic
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.run import parts
+from gritd.estimator.recording.salvage import read
 from tests.scenarios.rig import (
     ROOT,
     WIRES,
@@ -51,7 +51,10 @@ def small_disk(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+        ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(disk)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if mounted.returncode:
         pytest.skip(f"cannot mount a small tmpfs: {mounted.stderr.strip()}")
@@ -64,7 +67,10 @@ def test_disk_full(tmp_path, small_disk, seed, figure):
     rng = random.Random(seed)
     wiring = tmp_path / "wires"
     wiring.mkdir()
-    with service(wiring, driven(40.0, seed, skip=1.0), logging={"directory": str(small_disk)}) as (_, daemon):
+    with service(wiring, driven(40.0, seed, skip=1.0), logging={"directory": str(small_disk)}) as (
+        _,
+        daemon,
+    ):
         time.sleep(rng.uniform(0.5, 1.0))
         ballast = fill(small_disk)
         daemon.heard("log degraded")
@@ -78,14 +84,24 @@ def test_disk_full(tmp_path, small_disk, seed, figure):
         kept = copied(daemon, tmp_path)
     assert after["loop"]["ticks"] > before["ticks"]
     stamps, missed = rows(kept, "/tick")["stamp"], rows(kept, "/loop")["missed"]
-    gone = round((stamps[-1] - stamps[0]) / 4e6) + 1 - len(stamps) - (int(missed[-1]) - int(missed[0]))
-    figure(FULL, f"{WIRES}, on a tmpfs of 16 MB", "logging back after there is room", back, "s", 5.0, real=True)
+    gone = (
+        round((stamps[-1] - stamps[0]) / 4e6) + 1 - len(stamps) - (int(missed[-1]) - int(missed[0]))
+    )
+    figure(
+        FULL,
+        f"{WIRES}, on a tmpfs of 16 MB",
+        "logging back after there is room",
+        back,
+        "s",
+        5.0,
+        real=True,
+    )
     figure(FULL, f"{WIRES}, on a tmpfs of 16 MB", "ticks lost", gone, "", 0)
     assert verified(kept)
 
 
 SMALL_QUEUE = """
-import estimator.recording.writer as m
+import gritd.estimator.recording.writer as m
 m.WriterThread.__init__.__kwdefaults__["capacity"] = 3000
 """
 
@@ -134,9 +150,9 @@ def copied(daemon, folder):
 def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
     """Refused before anything heavy is loaded, which nobody could not: the code may lie where only root can read."""
     nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
-    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, tools.cli, tools.run"
+    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, gritd.tools.cli.main, gritd.tools.commands.run"
     becoming = f"os.setgroups([]); os.setgid({nobody}); os.setuid({nobody})"
-    code = f"{loaded}; {becoming}; sys.exit(tools.cli.main(sys.argv[1:]))"
+    code = f"{loaded}; {becoming}; sys.exit(gritd.tools.cli.main.main(sys.argv[1:]))"
     with Wires(folder_of_nobody, logging={"directory": str(logs)}) as wires:
         logs.mkdir(mode=0o555)
         began = time.monotonic()
@@ -172,8 +188,19 @@ def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
             daemon.stop()
             assert daemon.account()[2] == 0
     said = degraded - max(when for when in parts_asked(daemon.path()) if when < degraded)
-    level, back_again = f"{WIRES}, as nobody", "during a run: logging back after 0.5 s without rights"
-    figure(READ_ONLY, level, "during a run: said, after a part could not begin", said, "s", 1.0, real=True)
+    level, back_again = (
+        f"{WIRES}, as nobody",
+        "during a run: logging back after 0.5 s without rights",
+    )
+    figure(
+        READ_ONLY,
+        level,
+        "during a run: said, after a part could not begin",
+        said,
+        "s",
+        1.0,
+        real=True,
+    )
     figure(READ_ONLY, level, back_again, back, "s", 2.5, real=True)
     assert verified(daemon.path())
 
@@ -181,7 +208,12 @@ def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
 def parts_asked(path):
     """When the loop asked for a new part, by our monotonic clock [s]."""
     wall = time.time() - time.monotonic()
-    return [m[1] * 1e-9 - wall for recording in recordings(path) for m in recording.messages() if m[0] == CHECKPOINT]
+    return [
+        m[1] * 1e-9 - wall
+        for recording in recordings(path)
+        for m in recording.messages()
+        if m[0] == CHECKPOINT
+    ]
 
 
 # --- the process dies -------------------------------------------------------------------------------------------------
@@ -203,10 +235,10 @@ def test_killed_while_logging(tmp_path, seed, figure):
 
 WRITER = """
 import mmap, os, struct, sys, time
-from estimator.daemon import real_time
-from estimator.recording import RunInfo
-from estimator.recording.writer import WriterThread
-from estimator.readings import Reading
+from gritd.estimator.daemon.daemon import real_time
+from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.recording.writer import WriterThread
+from gritd.estimator.messages.readings import Reading
 from tests.scenarios.test_disk import MARK, PART
 
 folder, kind, number = sys.argv[1], sys.argv[2], int(sys.argv[3])
@@ -239,7 +271,9 @@ PART = Topic("/part", "gritd_msgs/msg/Part", (("stamp", TIME, "when"),))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "kills"), [("logging", KILLS), ("rotating", 150), ("closing", 150)])
+@pytest.mark.parametrize(
+    ("kind", "kills"), [("logging", KILLS), ("rotating", 150), ("closing", 150)]
+)
 def test_many_kills(tmp_path, kind, kills, figure):
     """The writer in a process of its own, killed at a random time: in the middle of a run, while a part begins every
     0.1 s, or within the few milliseconds in which it closes. What was lost counts from what had been handed over."""
@@ -253,7 +287,10 @@ def test_many_kills(tmp_path, kind, kills, figure):
         os.kill(child, signal.SIGKILL)
     assert parent.wait() == 0
     found = [survived(tmp_path / f"{name}.mcap", tmp_path / f"{name}.put") for name in range(kills)]
-    level, lost = f"writer thread in a process of its own, {kind}", [loss for loss in found if loss is not None]
+    level, lost = (
+        f"writer thread in a process of its own, {kind}",
+        [loss for loss in found if loss is not None],
+    )
     figure(KILLED, level, f"of {kills} runs not readable", found.count(None), "", 0)
     figure(KILLED, level, "data lost, worst", max(lost), "s", 0.25, real=True)
     figure(KILLED, level, "data lost, 99 %", float(np.quantile(lost, 0.99)), "s", 0.25, real=True)
@@ -268,7 +305,10 @@ def survived(path, shared):
         encoder = np.concatenate([read(part).arrays("/raw/wheel_encoder") for part in parts(path)])
     except RecordingError:
         return None
-    whole = np.array_equal(encoder["count"][::5], np.arange(len(encoder) // 5)) and len(encoder) % 5 == 0
+    whole = (
+        np.array_equal(encoder["count"][::5], np.arange(len(encoder) // 5))
+        and len(encoder) % 5 == 0
+    )
     if not whole or len(encoder) > 5 * (count + 1):
         return None
     return (last - (encoder["stamp"][-1] if len(encoder) else last - 4_000_000 * count)) * 1e-9
@@ -276,7 +316,9 @@ def survived(path, shared):
 
 def test_power_cut(tmp_path, seed, figure):
     """Cut at 300 random bytes; what is read is always the beginning of what was written."""
-    check_cuts(tmp_path, seed, figure, lambda size: sorted(random.Random(seed).sample(range(size), 300)))
+    check_cuts(
+        tmp_path, seed, figure, lambda size: sorted(random.Random(seed).sample(range(size), 300))
+    )
 
 
 @pytest.mark.slow
@@ -328,8 +370,16 @@ def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
         daemon.stop()
     (part,) = tmp_path.glob("run-*.mcap")
     recording = read(part)
-    assert recording.complete and any("was deleted while it was written" in line for line in log_lines(part))
-    figure("open part deleted", WIRES, "seconds in the part after it", len(recording.arrays("/tick")) / 250, "s")
+    assert recording.complete and any(
+        "was deleted while it was written" in line for line in log_lines(part)
+    )
+    figure(
+        "open part deleted",
+        WIRES,
+        "seconds in the part after it",
+        len(recording.arrays("/tick")) / 250,
+        "s",
+    )
     assert verified(part)
 
 
@@ -352,8 +402,18 @@ def test_sigterm_under_load(tmp_path, seed, figure):
     assert dropped == queued == 0 and accepted == written and queue.endswith("dropped 0 + queued 0")
     recording = read(daemon.path())
     assert recording.complete
-    figure(TERM, f"{WIRES}, two busy processes", "to exit 0 with everything written", took, "s", 2.0, real=True)
-    assert verified(daemon.path()) and not any("hanging" in line for line in log_lines(daemon.path()))
+    figure(
+        TERM,
+        f"{WIRES}, two busy processes",
+        "to exit 0 with everything written",
+        took,
+        "s",
+        2.0,
+        real=True,
+    )
+    assert verified(daemon.path()) and not any(
+        "hanging" in line for line in log_lines(daemon.path())
+    )
 
 
 SLOW_MEDIUM = """
@@ -381,7 +441,9 @@ def test_the_open_part_is_never_deleted(tmp_path, figure):
     old = tmp_path / "old.mcap"
     old.write_bytes(bytes(990_000))
     os.utime(old, (0, 0))
-    with service(tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "disk_cap": "1 MB"}) as (_, daemon):
+    with service(
+        tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "disk_cap": "1 MB"}
+    ) as (_, daemon):
         daemon.heard("old.mcap: deleted, over logging.disk_cap")
         time.sleep(0.5)
         daemon.stop()

@@ -13,23 +13,15 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 
-import estimator.daemon.clock
-from drivers.queue import ReadingQueue
-from estimator.daemon import TICK_TOPIC
-from estimator.daemon.clock import Clock
-from estimator.daemon.loop import Loop
-from estimator.pipeline import Pipeline
-from estimator.recording.salvage import read
-from tests.scenarios.rig import (
-    TESTBED,
-    WIRES,
-    driven,
-    log_lines,
-    rows,
-    service,
-    verified,
-)
-from tools.command import CommandError
+import gritd.estimator.daemon.clock
+from gritd.drivers.queue import ReadingQueue
+from gritd.estimator.daemon.clock import Clock
+from gritd.estimator.daemon.daemon import TICK_TOPIC
+from gritd.estimator.daemon.loop import Loop
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli.command import CommandError
+from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, rows, service, verified
 
 CLOCK = "loop over a simulated monotonic clock"
 STARVED = "CPU starvation"
@@ -85,7 +77,9 @@ class Due:
     def __init__(self, readings, clock):
         start = clock.now()
         self._clock, self._next = clock, 0
-        self._readings = [r._replace(stamp=r.stamp + start, received=r.received + start) for r in readings]
+        self._readings = [
+            r._replace(stamp=r.stamp + start, received=r.received + start) for r in readings
+        ]
 
     def drain(self):
         first, now = self._next, self._clock.now()
@@ -98,7 +92,7 @@ class Due:
 
 
 def ticks_under(steps, readings, monkeypatch):
-    monkeypatch.setattr(estimator.daemon.clock, "time", SimulatedTime(steps))
+    monkeypatch.setattr(gritd.estimator.daemon.clock, "time", SimulatedTime(steps))
     clock, stop = Clock(), Event()
     sink = Kept(stop, 1000)
     Loop(Pipeline(TESTBED.settings, "plain"), Due(readings, clock), sink, clock).run(stop)
@@ -115,12 +109,17 @@ def test_wall_clock_step(seed, monkeypatch, figure):
     different = sum(a != b for a, b in zip(straight.ticks, stepped.ticks, strict=True))
     assert max(map(abs, stepped.offsets)) > 0.9e2
     figure(
-        "wall-clock step", CLOCK, "ticks that differ by a bit, of 1000 with steps of ±1e2 … ±1e8 s", different, "", 0
+        "wall-clock step",
+        CLOCK,
+        "ticks that differ by a bit, of 1000 with steps of ±1e2 … ±1e8 s",
+        different,
+        "",
+        0,
     )
 
 
 STEPPING = """
-import time, estimator.daemon.clock
+import time, gritd.estimator.daemon.clock
 class Stepping:
     monotonic_ns, began = time.monotonic_ns, None
     @classmethod
@@ -130,7 +129,7 @@ class Stepping:
     @classmethod
     def time_ns(cls):
         return time.time_ns() + (10**17 if cls.began and time.monotonic() > cls.began + 2.0 else 0)
-estimator.daemon.clock.time = Stepping
+gritd.estimator.daemon.clock.time = Stepping
 """
 
 
@@ -183,7 +182,12 @@ def test_queue_overflow(seed, figure):
     assert counts.dropped > 0 and counts.processed == consumer.taken
     assert counts.received == len(readings) == counts.processed + counts.dropped + counts.queued
     figure(
-        "queue overflow", "reading queue and threads, the stall simulated", "moments of inexact account", wrong, "", 0
+        "queue overflow",
+        "reading queue and threads, the stall simulated",
+        "moments of inexact account",
+        wrong,
+        "",
+        0,
     )
 
 
@@ -195,31 +199,42 @@ def feed(queue, readings):
 
 STALLING = """
 import os, time
-from estimator.pipeline import Pipeline
+from gritd.estimator.online.pipeline import Pipeline
 step, calls = Pipeline.step, [0]
 def stalling(self, *arguments):
     calls[0] += 1
     while calls[0] == 1000 and not os.path.exists({flag!r}): time.sleep(0.05)
     return step(self, *arguments)
 Pipeline.step = stalling
-import drivers.queue
-drivers.queue.ReadingQueue.__init__.__defaults__ = (2000,)
+import gritd.drivers.queue
+gritd.drivers.queue.ReadingQueue.__init__.__defaults__ = (2000,)
 """
 
 
 def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     flag = tmp_path / "go on"
-    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=STALLING.format(flag=str(flag))) as (_, daemon):
+    with service(
+        tmp_path, driven(40.0, seed, skip=1.0), prelude=STALLING.format(flag=str(flag))
+    ) as (_, daemon):
         daemon.wait_status(lambda report: report["queue"]["dropped"] > 0)
         daemon.heard("hanging: loop")
         daemon.heard("queue: the loop fell behind")
         flag.touch()
-        report = daemon.wait_status(lambda report: report["loop"]["missed"] > 100 and report["status"] == "TRACKING")
+        report = daemon.wait_status(
+            lambda report: report["loop"]["missed"] > 100 and report["status"] == "TRACKING"
+        )
         counts = report["queue"]
         daemon.stop()
     assert any("hanging: loop" in line for line in log_lines(daemon.path()))
     excess = counts["received"] - counts["processed"] - counts["dropped"] - counts["queued"]
-    figure("queue overflow", f"{WIRES}, the loop made to stall", "readings not accounted for", abs(excess), "", 0)
+    figure(
+        "queue overflow",
+        f"{WIRES}, the loop made to stall",
+        "readings not accounted for",
+        abs(excess),
+        "",
+        0,
+    )
     assert verified(daemon.path())
 
 
@@ -245,7 +260,13 @@ def test_starved_by_four_busy_processes(tmp_path, seed, figure):
             process.wait()
     loop = rows(daemon.path(), "/loop")
     figure(STARVED, WIRES, "ticks missed and not reported", unreported(daemon.path()), "", 0)
-    figure(STARVED, f"{WIRES}, four busy processes", "lateness, 99 %", np.quantile(loop["lateness"], 0.99) * 1e3, "ms")
+    figure(
+        STARVED,
+        f"{WIRES}, four busy processes",
+        "lateness, 99 %",
+        np.quantile(loop["lateness"], 0.99) * 1e3,
+        "ms",
+    )
     figure(STARVED, f"{WIRES}, four busy processes", "ticks missed", int(loop["missed"][-1]), "")
     assert verified(daemon.path())
 
@@ -264,7 +285,14 @@ def test_stopped_for_a_while(tmp_path, seed, figure):
         daemon.stop()
     missed = int(rows(daemon.path(), "/loop")["missed"][-1])
     assert missed >= 0.8 * sum(pauses) * 250
-    figure(STARVED, f"{WIRES}, SIGSTOP 0.1 … 5 s", "ticks missed and not reported", unreported(daemon.path()), "", 0)
+    figure(
+        STARVED,
+        f"{WIRES}, SIGSTOP 0.1 … 5 s",
+        "ticks missed and not reported",
+        unreported(daemon.path()),
+        "",
+        0,
+    )
     assert verified(daemon.path())
 
 
@@ -284,18 +312,24 @@ def dying(method):
     return call
 """
 VICTIMS = {
-    "reader": "import drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
-    "loop": "import estimator.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
-    "writer": "import estimator.recording.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
-    "writer-sync": "import estimator.recording.syncer as m; m.Syncer._sync = dying(m.Syncer._sync)",
-    "publisher": "import estimator.daemon.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
+    "reader": "import gritd.drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
+    "loop": "import gritd.estimator.online.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
+    "writer": "import gritd.estimator.recording.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
+    "writer-sync": "import gritd.estimator.recording.syncer as m; m.Syncer._sync = dying(m.Syncer._sync)",
+    "publisher": "import gritd.estimator.daemon.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
 }
 
 
 @pytest.mark.parametrize("victim", VICTIMS)
 def test_a_thread_dies(tmp_path, victim, seed, figure):
-    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=DYING + VICTIMS[victim]) as (_, daemon):
-        daemon.until(lambda: daemon.lines("fault injected") or (victim == "publisher" and poke(daemon)), "no fault")
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=DYING + VICTIMS[victim]) as (
+        _,
+        daemon,
+    ):
+        daemon.until(
+            lambda: daemon.lines("fault injected") or (victim == "publisher" and poke(daemon)),
+            "no fault",
+        )
         code = daemon.exit_code()
         took = time.monotonic() - daemon.heard("fault injected")
     assert code == 1, daemon.text
@@ -303,7 +337,13 @@ def test_a_thread_dies(tmp_path, victim, seed, figure):
     assert victim.partition("-")[0] in line, line
     assert "Traceback" not in daemon.text
     figure(
-        DIES, f"{WIRES}, an exception raised inside", f"{victim}: from the fault to the exit", took, "s", 1.0, real=True
+        DIES,
+        f"{WIRES}, an exception raised inside",
+        f"{victim}: from the fault to the exit",
+        took,
+        "s",
+        1.0,
+        real=True,
     )
     read(daemon.path())
 
@@ -315,7 +355,7 @@ def poke(daemon):
 
 HANGING = """
 import time, threading
-import drivers.serial_link as m
+import gritd.drivers.serial_link as m
 first, read = [], m.SerialLink.read
 def hanging(self):
     first.append(time.monotonic())
@@ -327,11 +367,21 @@ m.SerialLink.read = hanging
 
 @pytest.mark.slow
 def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, seed, figure):
-    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=HANGING, watchdog=0.6) as (_, daemon):
+    with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=HANGING, watchdog=0.6) as (
+        _,
+        daemon,
+    ):
         assert daemon.strokes(2.0) > 0
         daemon.heard("hanging: reader encoders; the watchdog is not stroked")
         strokes = daemon.strokes(2.0)
-        figure(DIES, f"{WIRES}, a read that never returns", "watchdog strokes while a reader hangs", strokes, "", 0)
+        figure(
+            DIES,
+            f"{WIRES}, a read that never returns",
+            "watchdog strokes while a reader hangs",
+            strokes,
+            "",
+            0,
+        )
         assert not daemon.status()["healthy"]
 
 
@@ -360,6 +410,13 @@ def test_garbage_collector_pause(tmp_path, seed, figure):
     late = np.max(rows(daemon.path(), "/loop")["lateness"])
     level = f"{WIRES}, 1e6 objects collected inside"
     figure("garbage-collector pause", level, "samples lost on the wires", lost, "", 0, real=True)
-    figure("garbage-collector pause", level, "samples the queue dropped", report["queue"]["dropped"], "", 0)
+    figure(
+        "garbage-collector pause",
+        level,
+        "samples the queue dropped",
+        report["queue"]["dropped"],
+        "",
+        0,
+    )
     figure("garbage-collector pause", level, "largest lateness", late * 1e3, "ms")
     assert unreported(daemon.path()) == 0 and verified(daemon.path())

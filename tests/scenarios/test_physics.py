@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.geometry import entry_angle
-from estimator.pipeline import Pipeline
-from estimator.record import TICK_NAMES, Status
-from estimator.settings import Uncertain
-from estimator.terramechanics import linear
+from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.messages.record import TICK_NAMES, Status
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.terramechanics import linear
+from gritd.estimator.wheel.geometry import entry_angle
+from tests.estimator.filter.test_tracker import RIG, TRUTH, run
 from tests.linear_plant import THREE_LOADS, readings
-from tests.test_tracker import RIG, TRUTH, run
 
 QUICK = True  # all seeds in every run
 PLANT = "pipeline, plant simulated"
@@ -26,7 +26,9 @@ DRIVING = (3.0, 70.0, 0.3)
 def estimate_moved(ticks, status):
     """Ticks of this status, and how much the estimate moves over them, in σ."""
     held = [t for t in ticks if t["status"] == status]
-    moved = max(abs(t[x] - held[0][x]) / t[f"{x}_sigma"] for t in held for x in ("cohesion", "tan_phi"))
+    moved = max(
+        abs(t[x] - held[0][x]) / t[f"{x}_sigma"] for t in held for x in ("cohesion", "tan_phi")
+    )
     return held, moved
 
 
@@ -40,10 +42,17 @@ def test_wheel_in_the_air(seed, figure):
 def test_zero_slip(seed, figure):
     """A hundredth of a radian of slip either way: finite, and no certainty out of nothing."""
     rng = random.Random(seed)
-    _, ticks = run(RIG, TRUTH, [(4.0, 70.0, slip) for slip in (0.0, rng.uniform(0, 0.01), -rng.uniform(0, 0.01))], seed)
+    _, ticks = run(
+        RIG,
+        TRUTH,
+        [(4.0, 70.0, slip) for slip in (0.0, rng.uniform(0, 0.01), -rng.uniform(0, 0.01))],
+        seed,
+    )
     last, truth = ticks[-1], dict(zip(("cohesion", "tan_phi"), TRUTH, strict=False))
     assert all(
-        np.isfinite(t[name]) for t in ticks for name in ("cohesion", "cohesion_sigma", "tan_phi", "tan_phi_sigma")
+        np.isfinite(t[name])
+        for t in ticks
+        for name in ("cohesion", "cohesion_sigma", "tan_phi", "tan_phi_sigma")
     )
     error = max(abs(last[name] - value) / last[f"{name}_sigma"] for name, value in truth.items())
     kept = last["separability"]
@@ -67,7 +76,9 @@ def test_dragged(seed, slip, figure):
     """Beyond the closed forms, to a locked wheel: the encoder's steps of a braked run made smaller."""
     pipeline = Pipeline(RIG, "plain")
     state, ticks, slower = pipeline.start(), [], {}
-    for number, (t, batch) in enumerate(readings(RIG, TRUTH, [DRIVING, (3.0, 70.0, -0.3)], seed=seed)):
+    for number, (t, batch) in enumerate(
+        readings(RIG, TRUTH, [DRIVING, (3.0, 70.0, -0.3)], seed=seed)
+    ):
         if number >= 30:
             batch = [slowed(r, (1.0 + slip) * 1.3, slower) for r in batch]
         state, tick = pipeline.step(state, batch, t)
@@ -88,7 +99,14 @@ def test_reverse_driving(seed, figure):
     ticks = reversed_run(seed)
     after = [t for t in ticks if t["status"] == Status.REVERSE]
     assert len(after) > 20
-    figure(NEGATIVE, PLANT, "updates accepted in reverse", sum(t["torque_accepted"] for t in after), "", 0)
+    figure(
+        NEGATIVE,
+        PLANT,
+        "updates accepted in reverse",
+        sum(t["torque_accepted"] for t in after),
+        "",
+        0,
+    )
 
 
 def reversed_run(seed):
@@ -130,7 +148,10 @@ def stalled(seed, kind):
         if number >= 30:
             stopped = stopped or t
             batch = [
-                r._replace(value=frozen.setdefault(r.channel, r.value)) if r.channel in channels else r for r in batch
+                r._replace(value=frozen.setdefault(r.channel, r.value))
+                if r.channel in channels
+                else r
+                for r in batch
             ]
         state, tick = pipeline.step(state, batch, t)
         ticks.append(dict(zip(TICK_NAMES, tick, strict=True)))
@@ -146,7 +167,10 @@ def test_vanishing_entry_angle_and_exponent(figure):
     angles = [10.0**-power for power in range(1, 301)] + [0.0]
     jump = 0.0
     for slip in (0.3, 0.0, -0.999999, -1.0 + 1e-15):
-        forces = [linear.forces(RIG.wheel, *TRUTH, angle, slip, 1000.0 * min(angle, 1.0)) for angle in angles]
+        forces = [
+            linear.forces(RIG.wheel, *TRUTH, angle, slip, 1000.0 * min(angle, 1.0))
+            for angle in angles
+        ]
         values = np.array([(f.torque, f.drawbar_pull, f.load) for f in forces])
         assert np.all(np.isfinite(values))
         jump = max(jump, float(np.max(np.abs(values[-2] - values[-1]))))
@@ -168,7 +192,14 @@ def test_filter_divergence(seed, figure):
     first = next(t for t in ticks if t["resets"])
     began = next(t for t in ticks if t["torque_s"] > 0.0)
     error = abs(ticks[-1]["tan_phi"] - TRUTH[1]) / TRUTH[1]
-    figure(DIVERGENCE, PLANT, "noticed after the first update", (first["stamp"] - began["stamp"]) * 1e-9, "s", 2.0)
+    figure(
+        DIVERGENCE,
+        PLANT,
+        "noticed after the first update",
+        (first["stamp"] - began["stamp"]) * 1e-9,
+        "s",
+        2.0,
+    )
     figure(DIVERGENCE, PLANT, "error of tan φ a minute later", error * 100, "%", 2)
     figure(DIVERGENCE, PLANT, "resets until then", ticks[-1]["resets"], "")
 

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.build import build_decoder
-from drivers.can_link import packed
-from drivers.wire import CanWire, SerialWire
-from estimator.daemon import TICK_TOPIC
-from estimator.pipeline import Pipeline
-from estimator.readings import Reading
-from estimator.record import CHANNEL_BITS, TICK_NAMES, Status
-from estimator.sync import Sync
+from gritd.drivers.build import build_decoder
+from gritd.drivers.can_link import packed
+from gritd.drivers.wire import CanWire, SerialWire
+from gritd.estimator.daemon.daemon import TICK_TOPIC
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.record import CHANNEL_BITS, TICK_NAMES, Status
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.wheel.sync import Sync
 from tests.scenarios.rig import TESTBED, driven
 
 SETTINGS = TESTBED.settings
@@ -26,7 +26,14 @@ REST = 1_400_000_000  # [ns] before a simulated run drives off
 QUICK = True  # all seeds in every run
 PIPELINE = "pipeline, readings simulated"
 DRIVERS = "drivers' decoders and pipeline, bytes simulated"
-ESTIMATE = ("cohesion", "cohesion_sigma", "tan_phi", "tan_phi_sigma", "shear_modulus", "shear_modulus_sigma")
+ESTIMATE = (
+    "cohesion",
+    "cohesion_sigma",
+    "tan_phi",
+    "tan_phi_sigma",
+    "shear_modulus",
+    "shear_modulus_sigma",
+)
 
 
 def shifted(readings):
@@ -62,7 +69,14 @@ def test_encoder_rollover(seed, bits, direction, figure):
     far, near = ((1 << bits) // 2, (1 << bits) - 1500 if direction > 0 else 1500)
     speeds = [speed_through_wire(start, steps, direction, bits) for start in (far, near)]
     error = np.max(np.abs(np.array(speeds[0]) - np.array(speeds[1])))
-    figure("encoder rollover", DRIVERS, f"velocity error across 2^{bits}, either direction", error, "rad/s", 0)
+    figure(
+        "encoder rollover",
+        DRIVERS,
+        f"velocity error across 2^{bits}, either direction",
+        error,
+        "rad/s",
+        0,
+    )
 
 
 def speed_through_wire(start, steps, direction, bits):
@@ -94,11 +108,14 @@ def test_encoder_counter_jump(seed, figure):
     clean = shifted(driven(8.0, seed))
     at, offset = clean[len(clean) // 2].stamp, rng.choice([-1, 1]) * rng.randrange(5000, 2**31)
     jumped = [
-        r._replace(value=r.value + offset) if r.channel == "wheel_encoder" and r.stamp >= at else r for r in clean
+        r._replace(value=r.value + offset) if r.channel == "wheel_encoder" and r.stamp >= at else r
+        for r in clean
     ]
     before, after = ticks_of(clean), ticks_of(jumped)
     assert after["jumps"][-1] == 1
-    spike = np.nanmax(np.abs(after["wheel_speed"] - before["wheel_speed"])) / np.nanmax(np.abs(before["wheel_speed"]))
+    spike = np.nanmax(np.abs(after["wheel_speed"] - before["wheel_speed"])) / np.nanmax(
+        np.abs(before["wheel_speed"])
+    )
     moved = abs(after["cohesion"][-1] - before["cohesion"][-1]) / before["cohesion_sigma"][-1]
     figure("encoder counter jump", PIPELINE, "largest change of wheel speed", spike * 100, "%", 1)
     figure("encoder counter jump", PIPELINE, "change of c at the end", moved, "σ", 0.1)
@@ -110,21 +127,43 @@ def test_stuck_sensor(seed, channel, figure):
     readings = shifted(driven(8.0, seed))
     since = START + int(rng.uniform(3.0, 5.0) * 1e9)
     held = next(r.value for r in reversed(readings) if r.channel == channel and r.stamp < since)
-    frozen = [r._replace(value=held) if r.channel == channel and r.stamp >= since else r for r in readings]
+    frozen = [
+        r._replace(value=held) if r.channel == channel and r.stamp >= since else r for r in readings
+    ]
     ticks = ticks_of(frozen)
     stuck = (ticks["stuck"] & CHANNEL_BITS[channel]) > 0
     assert not np.any(stuck[ticks["stamp"] < since])
     noticed = (ticks["stamp"][stuck][0] - since) * 1e-9
     assert set(ticks["status"][stuck]) <= {Status.STUCK, Status.STANDSTILL}
-    figure("stuck sensor", PIPELINE, "noticed after it froze, tick's own delay of 0.05 s included", noticed, "s", 0.4)
+    figure(
+        "stuck sensor",
+        PIPELINE,
+        "noticed after it froze, tick's own delay of 0.05 s included",
+        noticed,
+        "s",
+        0.4,
+    )
 
 
 def test_no_false_alarm_of_a_stuck_sensor(seed, figure):
     """Half a minute at rest and half a minute of driving with its stops."""
     pause = [r for r in shifted(driven(8.0, seed)) if r.stamp < START + REST]
-    rest = [r._replace(stamp=r.stamp + n * REST, received=r.received + n * REST) for n in range(21) for r in pause]
-    alarms = np.sum(ticks_of(rest)["stuck"] > 0) + np.sum(ticks_of(shifted(driven(30.0, seed)))["stuck"] > 0)
-    figure("stuck sensor", PIPELINE, "ticks of false alarm, half a minute each at rest and driving", alarms, "", 0)
+    rest = [
+        r._replace(stamp=r.stamp + n * REST, received=r.received + n * REST)
+        for n in range(21)
+        for r in pause
+    ]
+    alarms = np.sum(ticks_of(rest)["stuck"] > 0) + np.sum(
+        ticks_of(shifted(driven(30.0, seed)))["stuck"] > 0
+    )
+    figure(
+        "stuck sensor",
+        PIPELINE,
+        "ticks of false alarm, half a minute each at rest and driving",
+        alarms,
+        "",
+        0,
+    )
 
 
 NO_NUMBERS = (math.nan, math.inf, -math.inf)
@@ -141,22 +180,37 @@ def test_not_a_number_infinity_and_out_of_range(seed, figure):
     wire, decoder = CanWire(device), build_decoder(SETTINGS, device)
     readings, refused, numbers, wires = [], 0, 0, 0
     clean = shifted(driven(5.0, seed))
-    places = dict(zip(sorted(rng.sample(range(1000, len(clean) - 100), len(cases))), cases, strict=True))
+    places = dict(
+        zip(sorted(rng.sample(range(1000, len(clean) - 100), len(cases))), cases, strict=True)
+    )
     for number, r in enumerate(clean):
         readings.append(r)
         if number in places:
             channel, value = places[number]
             readings.append(Reading(r.stamp + 1, channel, value, r.received))
-            refused += isinstance(value, float) or not math.isnan(value[1])  # one absent axis is no fault
+            refused += isinstance(value, float) or not math.isnan(
+                value[1]
+            )  # one absent axis is no fault
             if (signal := SIGNALS.get(channel)) and not math.isfinite(value):
                 wires += 1
-                numbers += bool(decoder.decode(r.received, packed(wire.encode(signal, [value], r.stamp // 1000))))
+                numbers += bool(
+                    decoder.decode(
+                        r.received, packed(wire.encode(signal, [value], r.stamp // 1000))
+                    )
+                )
     ticks = ticks_of(readings)
     unfit = sum(int(np.sum(~np.isfinite(ticks[name]))) for name in ESTIMATE)
     row = "NaN, Inf, out of range"
     assert wires >= 18 and np.sum(ticks["status"] == Status.TRACKING) > 300
     figure(row, DRIVERS, "no numbers that passed the driver", numbers, "", 0)
-    figure(row, DRIVERS, f"impossible values not counted, of {refused}", refused - int(ticks["invalid"][-1]), "", 0)
+    figure(
+        row,
+        DRIVERS,
+        f"impossible values not counted, of {refused}",
+        refused - int(ticks["invalid"][-1]),
+        "",
+        0,
+    )
     figure(row, DRIVERS, "non-finite estimates", unfit, "", 0)
 
 
@@ -167,11 +221,24 @@ def impossible():
     """Channel and value: of scalar channels and of each axis of the wrench."""
     for channel in ("sinkage_pot", "motor_shunt", "motor_temperature"):
         known = SETTINGS.channels[channel]
-        for value in (*NO_NUMBERS, 1e300, -1e300, np.nextafter(known.low, -9e9), np.nextafter(known.high, 9e9)):
+        for value in (
+            *NO_NUMBERS,
+            1e300,
+            -1e300,
+            np.nextafter(known.low, -9e9),
+            np.nextafter(known.high, 9e9),
+        ):
             yield channel, float(value)
     limits = [SETTINGS.wrench.max_force] * 3 + [SETTINGS.wrench.max_torque] * 3
     for axis, limit in enumerate(limits):
-        for value in (math.inf, -math.inf, 1e300, -1e300, np.nextafter(limit, 9e9), -np.nextafter(limit, 9e9)):
+        for value in (
+            math.inf,
+            -math.inf,
+            1e300,
+            -1e300,
+            np.nextafter(limit, 9e9),
+            -np.nextafter(limit, 9e9),
+        ):
             yield "wrench", tuple(float(value) if n == axis else 0.1 for n in range(AXES))
     yield "wrench", (0.1, 0.1, math.nan, 0.1, 0.1, 0.1)  # without a load it is no wrench
     yield "wrench", (0.1, math.nan, 0.1, 0.1, 0.1, 0.1)
@@ -186,16 +253,32 @@ def test_duplicate_late_and_reordered_stamps(seed, figure):
     rng = random.Random(seed)
     clean = shifted(driven(8.0, seed))
     delayed = [r._replace(received=r.stamp + rng.randrange(40_000_000)) for r in clean]
-    twice = [r._replace(received=r.received + rng.randrange(5_000_000)) for r in delayed if rng.random() < 0.1]
+    twice = [
+        r._replace(received=r.received + rng.randrange(5_000_000))
+        for r in delayed
+        if rng.random() < 0.1
+    ]
     permuted = sorted([*delayed, *twice], key=lambda r: r.received)
     straight = sorted((r._replace(received=r.stamp) for r in clean), key=lambda r: r.stamp)
     same, other = ticks_of(straight), ticks_of(permuted)
     length = min(len(same["stamp"]), len(other["stamp"]))
-    compared = [name for name in TICK_NAMES if name not in ("consumed", "duplicates", "stale", "status", "flags")]
+    compared = [
+        name
+        for name in TICK_NAMES
+        if name not in ("consumed", "duplicates", "stale", "status", "flags")
+    ]
     different = sum(
-        not np.array_equal(same[name][50:length], other[name][50:length], equal_nan=True) for name in compared
+        not np.array_equal(same[name][50:length], other[name][50:length], equal_nan=True)
+        for name in compared
     )
     row = "duplicate, late or reordered stamps"
-    figure(row, PIPELINE, "fields that differ from the sorted run, but for those of arrival", different, "", 0)
+    figure(
+        row,
+        PIPELINE,
+        "fields that differ from the sorted run, but for those of arrival",
+        different,
+        "",
+        0,
+    )
     counted = abs(int(other["duplicates"][-1]) - len(twice)) / len(twice)
     figure(row, PIPELINE, "duplicates not counted", counted * 100, "%", 1)

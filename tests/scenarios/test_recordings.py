@@ -7,12 +7,12 @@ import random
 
 import pytest
 
-from estimator.recording.mcapfile import RecordingError
-from estimator.recording.salvage import read
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli.command import DAMAGED, DONE
+from gritd.tools.commands import recover
+from tests.estimator.recording.test_salvage import HOSTILE, probe, write_sample
 from tests.scenarios.rig import driven, service
-from tests.test_salvage import HOSTILE, probe, write_sample
-from tools import recover
-from tools.command import DAMAGED, DONE
 
 HUGE = "hostile or huge recording"
 FLIPPED = "recording with flipped bits"
@@ -36,7 +36,9 @@ def check(path, figure):
     seconds, memory, said = probe(path)
     assert "\n" not in said.strip()
     figure(HUGE, OWN, "memory", memory, "MB", 256)
-    figure(HUGE, OWN, "processor time to the error, with Python's start", seconds, "s", 2, real=True)
+    figure(
+        HUGE, OWN, "processor time to the error, with Python's start", seconds, "s", 2, real=True
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +65,9 @@ def test_flipped_bits(original, tmp_path, seed, figure):
         found = [repr(message) for message in recording.messages()]
         wrong += sum(message not in written for message in found)
         silent += len(found) < len(written) and not recording.damage
-    figure(FLIPPED, "a daemon's recording, flips simulated", "wrong messages returned", wrong, "", 0)
+    figure(
+        FLIPPED, "a daemon's recording, flips simulated", "wrong messages returned", wrong, "", 0
+    )
     figure(FLIPPED, "a daemon's recording, flips simulated", "losses not reported", silent, "", 0)
 
 

@@ -14,11 +14,15 @@ from tests.scenarios.rig import ROOT
 UNIT = ROOT / "config" / "gritd.service"
 EXPOSURE = 2.5  # of systemd-analyze security; 0 is best, 10 worst
 
-systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
+systemd = pytest.mark.skipif(
+    shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed"
+)
 
 
 def analyze(*arguments):
-    return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        ["systemd-analyze", *arguments], capture_output=True, text=True, check=False
+    )
 
 
 @systemd
@@ -33,8 +37,12 @@ def test_the_unit_is_right(tmp_path):
 @systemd
 def test_the_unit_is_hardened(figure):
     done = analyze("security", "--offline=true", "--no-pager", str(UNIT))
-    exposure = float(re.search(r"exposure level for gritd\.service: ([\d.]+)", done.stdout).group(1))
-    figure("hardening of the unit", "systemd-analyze security", "exposure", exposure, "of 10", EXPOSURE)
+    exposure = float(
+        re.search(r"exposure level for gritd\.service: ([\d.]+)", done.stdout).group(1)
+    )
+    figure(
+        "hardening of the unit", "systemd-analyze security", "exposure", exposure, "of 10", EXPOSURE
+    )
 
 
 KEYS = r"SUBSYSTEMS?|KERNEL|DRIVERS?|ACTION|ATTRS?\{\w+\}|ENV\{\w+\}|SYMLINK|GROUP|MODE|NAME"
@@ -56,7 +64,9 @@ def test_the_files_of_an_installation(tmp_path):
     config.write_text("# mine\n")
     assert "kept" in install("files", tmp_path)
     assert config.read_text() == "# mine\n"
-    assert {"etc/systemd/system/gritd.service", "etc/udev/rules.d/90-gritd.rules"} <= below(tmp_path)
+    assert {"etc/systemd/system/gritd.service", "etc/udev/rules.d/90-gritd.rules"} <= below(
+        tmp_path
+    )
     assert {"usr/lib/sysusers.d/gritd.conf", "etc/gritd/testbed.dbc"} <= below(tmp_path)
     install("uninstall", tmp_path)
     assert below(tmp_path) == {"etc/gritd/config.yaml", "etc/gritd/testbed.dbc"}
@@ -65,7 +75,9 @@ def test_the_files_of_an_installation(tmp_path):
 def install(command, root):
     environment = {"DESTDIR": str(root), "PATH": "/usr/bin:/bin"}
     script = str(ROOT / "tools" / "install")
-    return subprocess.run([script, command], env=environment, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(
+        [script, command], env=environment, capture_output=True, text=True, check=True
+    ).stdout
 
 
 def below(root):

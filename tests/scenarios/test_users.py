@@ -19,18 +19,28 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from estimator.daemon.publish import MAX_CLIENTS
-from estimator.recording.salvage import read
-from tests.scenarios.rig import LIMIT, ROOT, WIRES, DaemonProcess, Wires, driven, rows, service, verified
-from tools.command import CommandError
-from tools.status import connected, reports
+from gritd.estimator.daemon.publish import MAX_CLIENTS
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli.command import CommandError
+from gritd.tools.commands.status import connected, reports
+from tests.scenarios.rig import (
+    LIMIT,
+    ROOT,
+    WIRES,
+    DaemonProcess,
+    Wires,
+    driven,
+    rows,
+    service,
+    verified,
+)
 
 
 def test_second_instance(tmp_path, seed, figure):
     with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
         began, spent = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
         second = subprocess.run(
-            [sys.executable, "-m", "tools.cli", "run", "--config", str(wires.config)],
+            [sys.executable, "-m", "gritd", "run", "--config", str(wires.config)],
             cwd=ROOT, capture_output=True, text=True, check=False,
         )  # fmt: skip
         took, after = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -47,10 +57,14 @@ def test_second_instance(tmp_path, seed, figure):
 
 def test_nobody_listens_any_more(tmp_path, figure):
     """What it says goes into a pipe whose other end is closed: it runs on, and closes its log when it is told to."""
-    command = [sys.executable, "-m", "tools.cli", "run", "--status", "0.1", "--config"]
+    command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
         daemon = subprocess.Popen(
-            [*command, str(wires.config)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            [*command, str(wires.config)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
         daemon.stdout.close()
@@ -65,10 +79,14 @@ def test_nobody_listens_any_more(tmp_path, figure):
 
 def test_somebody_does_not_read(tmp_path, figure):
     """What it says goes into a pipe that is full and stays open: it ends when it is told to, all the same."""
-    command = [sys.executable, "-m", "tools.cli", "run", "--status", "0.1", "--config"]
+    command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
         daemon = subprocess.Popen(
-            [*command, str(wires.config)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            [*command, str(wires.config)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         fcntl.fcntl(daemon.stdout, fcntl.F_SETPIPE_SZ, resource.getpagesize())
         path = next(line for line in daemon.stdout if line.startswith("logging to ")).split()[-1]
@@ -96,7 +114,10 @@ def test_watchers_do_not_slow_the_loop(tmp_path, seed, figure):
         time.sleep(3.0)
         daemon.stop()
     loop = rows(daemon.path(), "/loop")
-    for name, some in (("nobody watches", loop["stamp"] < began), ("32 ask for reports", loop["stamp"] > began)):
+    for name, some in (
+        ("nobody watches", loop["stamp"] < began),
+        ("32 ask for reports", loop["stamp"] > began),
+    ):
         late = np.quantile(loop["lateness"][some], 0.99) * 1e3
         figure("watchers", WIRES, f"lateness, 99 %, while {name}", late, "ms", 4.0, real=True)
     assert verified(daemon.path())
@@ -138,11 +159,19 @@ def test_a_device_it_may_not_open_is_a_clear_error(folder_of_nobody, figure):
         os.chmod(port, 0o600)
         with DaemonProcess(wires.config, user=nobody) as daemon:
             daemon.heard("device encoders WAITING")
-            assert "Permission denied (is the user in the port's group, often dialout?)" in daemon.text
+            assert (
+                "Permission denied (is the user in the port's group, often dialout?)" in daemon.text
+            )
             os.chmod(port, 0o666)
             daemon.heard("device encoders OPEN")
             daemon.stop()
-    figure("unprivileged user", f"{WIRES}, as nobody", "lines that say why a port cannot be opened", 1, "")
+    figure(
+        "unprivileged user",
+        f"{WIRES}, as nobody",
+        "lines that say why a port cannot be opened",
+        1,
+        "",
+    )
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.command import DAMAGED, USAGE, CommandError
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 
 Array = NDArray[np.float64]
 LARGEST = 1e15  # no number of a rig's log is beyond: counts of it must fit into 64 bits
@@ -28,7 +28,9 @@ class RigFileError(CommandError):
 
 def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re.Match[str]]]:
     """Files whose name matches, in the folders and among the files given, sorted. Raises RigFileError."""
-    files = sorted({file for path in paths for file in _below(path)}, key=lambda file: (file.name, str(file)))
+    files = sorted(
+        {file for path in paths for file in _below(path)}, key=lambda file: (file.name, str(file))
+    )
     matches = ((file, pattern.fullmatch(file.name)) for file in files)
     return [(file, match) for file, match in matches if match]
 
@@ -46,9 +48,13 @@ def read_text(path: Path) -> str:
         return (gzip.decompress(data) if path.suffix == ".gz" else data).decode("utf-8-sig")
     except (OSError, EOFError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise RigFileError(f"{path}: cannot be read: {reason}; expected a text file, plain or gzipped") from None
+        raise RigFileError(
+            f"{path}: cannot be read: {reason}; expected a text file, plain or gzipped"
+        ) from None
     except UnicodeDecodeError:
-        raise RigFileError(f"{path}: found bytes that are not UTF-8; expected a text file") from None
+        raise RigFileError(
+            f"{path}: found bytes that are not UTF-8; expected a text file"
+        ) from None
 
 
 def read_table(path: Path, columns: Sequence[str]) -> Table:
@@ -56,7 +62,9 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
     reader = csv.DictReader(line for line in read_text(path).splitlines() if line.strip())
     missing = [name for name in columns if name not in (reader.fieldnames or ())]
     if missing:
-        raise RigFileError(f"{path}: found no column {missing[0]}; expected the columns {', '.join(columns)}")
+        raise RigFileError(
+            f"{path}: found no column {missing[0]}; expected the columns {', '.join(columns)}"
+        )
     table: Table = {name: [] for name in columns}
     for number, row in enumerate(reader, start=2):
         for name in columns:
@@ -72,7 +80,9 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
 
 def numbers(path: Path, table: Table, name: str) -> Array:
     """One column as finite numbers, shape (n,). Raises RigFileError naming the row."""
-    return np.array([number(path, f"row {row}: {name}", text) for row, text in enumerate(table[name], start=2)])
+    return np.array(
+        [number(path, f"row {row}: {name}", text) for row, text in enumerate(table[name], start=2)]
+    )
 
 
 def number(path: Path, where: str, text: str) -> float:
@@ -101,11 +111,18 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), columns)
     except ValueError:
-        values = np.array([[number(path, f"row {i}", text) for text in row] for i, row in enumerate(rows, skip + 1)])
+        values = np.array(
+            [
+                [number(path, f"row {i}", text) for text in row]
+                for i, row in enumerate(rows, skip + 1)
+            ]
+        )
     good = np.all(np.abs(values) <= LARGEST, axis=1)
     if not np.all(good):
         bad = int(np.argmin(good)) + skip + 1
-        raise RigFileError(f"{path}: row {bad}: found a number that is not finite; expected {columns} finite numbers")
+        raise RigFileError(
+            f"{path}: row {bad}: found a number that is not finite; expected {columns} finite numbers"
+        )
     return values
 
 

@@ -12,12 +12,12 @@ from string import Template
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator import config
-from estimator.readings import CHANNELS, Reading
-from estimator.recording import RunInfo, RunWriter
-from estimator.recording.mcapfile import reported
-from tools.command import USAGE
-from tools.importers._files import Array, RigFileError
+from gritd.estimator.config import configuration as config
+from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.recording.mcapfile import reported
+from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.tools.cli.command import USAGE
+from gritd.tools.importers._files import Array, RigFileError
 
 NS = 1_000_000_000
 TEMPLATES = resources.files("config")
@@ -62,11 +62,15 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         reason = error.strerror or error
-        raise RigFileError(f"{path}: cannot be written: {reason}; expected a folder for the output", USAGE) from None
+        raise RigFileError(
+            f"{path}: cannot be written: {reason}; expected a folder for the output", USAGE
+        ) from None
     return config.load(path)
 
 
-def write(path: Path, streams: Sequence[Stream], configured: config.Configuration, run: RunInfo) -> Path:
+def write(
+    path: Path, streams: Sequence[Stream], configured: config.Configuration, run: RunInfo
+) -> Path:
     """One recording of raw topics, readings by stamp and then by the order of the channels. Replaces an earlier import.
 
     Raises RecordingError.
@@ -76,7 +80,9 @@ def write(path: Path, streams: Sequence[Stream], configured: config.Configuratio
         path.unlink(missing_ok=True)
     order = {channel: place for place, channel in enumerate(CHANNELS)}
     writer = RunWriter(path, (), configured.text, run)
-    merged = heapq.merge(*(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel]))
+    merged = heapq.merge(
+        *(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel])
+    )
     for reading in merged:
         writer.reading(reading)
     writer.close()

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from estimator.settings import Uncertain
-from tools.importers._files import Array
-from tools.importers._recording import NS, Stream, stamps
+from gritd.estimator.config.settings import Uncertain
+from gritd.tools.importers._files import Array
+from gritd.tools.importers._recording import NS, Stream, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]
@@ -58,11 +58,17 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
     """The segments one after the other, as the channels of a recording. Scatter has another order in every run."""
     seconds = np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
-    times = np.concatenate([stamps(START, seconds + spacing * number) for number in range(len(conditions))])
+    times = np.concatenate(
+        [stamps(START, seconds + spacing * number) for number in range(len(conditions))]
+    )
     sinkage = _all([c.sinkage for c in conditions], *run, 3)
     found = [
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
-        Stream("carriage_encoder", times, _travel([c.carriage_speed for c in conditions], counting.carriage)),
+        Stream(
+            "carriage_encoder",
+            times,
+            _travel([c.carriage_speed for c in conditions], counting.carriage),
+        ),
         Stream("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
     if any(c.current is not None for c in conditions):
@@ -89,4 +95,6 @@ def _all(values: Sequence[Uncertain | None], *seed: int) -> Array:
     scores /= scores.std()
     length = round(RATE * DURATION / INDEPENDENT)
     known = [value or Uncertain(0.0) for value in values]
-    return np.concatenate([v.value + v.sigma * np.repeat(order.permutation(scores), length) for v in known])
+    return np.concatenate(
+        [v.value + v.sigma * np.repeat(order.permutation(scores), length) for v in known]
+    )

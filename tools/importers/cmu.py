@@ -14,14 +14,24 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator import config
-from estimator.recording import RunInfo
-from estimator.settings import Uncertain
-from tools.command import number as number_of
-from tools.importers import Progress
-from tools.importers._files import Array, RigFileError, find, increasing, matrix, number, numbers, read_table, read_text
-from tools.importers._recording import NS, Stream, configuration, counts, stamps, write
-from tools.importers._segments import Condition, Counting, scatter_of_mean, streams
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.recording.run import RunInfo
+from gritd.tools.cli.command import number as number_of
+from gritd.tools.importers._files import (
+    Array,
+    RigFileError,
+    find,
+    increasing,
+    matrix,
+    number,
+    numbers,
+    read_table,
+    read_text,
+)
+from gritd.tools.importers._recording import NS, Stream, configuration, counts, stamps, write
+from gritd.tools.importers._segments import Condition, Counting, scatter_of_mean, streams
+from gritd.tools.importers.registry import Progress
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
@@ -35,16 +45,41 @@ CONTACT = 2.0  # [N] force at which a plate has met the sand
 TABLE = re.compile(r"(smooth|grouser)_(?:all_trials|first_trial)_steady_state\.csv")
 LOG = re.compile(r"gr\d+_(vx_10|grouser)__([\d-]+)__10_(\d+)_0_(\d+)\.txt(?:\.gz)?")
 INDEX = re.compile(r"beta0_trials_index\.csv")
-PRESSED = re.compile(r"(f-d-large-box|testbed-deflection)__force-displacement_(\w+)\.ft\.csv(?:\.gz)?")
-COLUMNS = ("avg_Fx", "std_Fx", "avg_Fy", "std_Fy", "avg_Fz", "std_Fz", "avg_Vx", "avg_Vry", "avg_Z", "std_Z")
-PLATES = {"1": 60, "2": 60, "3": 60, "4": 100, "5": 100, "6": 100, "7": 80, "8": 80, "9": 80}  # run -> diameter [mm]
+PRESSED = re.compile(
+    r"(f-d-large-box|testbed-deflection)__force-displacement_(\w+)\.ft\.csv(?:\.gz)?"
+)
+COLUMNS = (
+    "avg_Fx",
+    "std_Fx",
+    "avg_Fy",
+    "std_Fy",
+    "avg_Fz",
+    "std_Fz",
+    "avg_Vx",
+    "avg_Vry",
+    "avg_Z",
+    "std_Z",
+)
+PLATES = {
+    "1": 60,
+    "2": 60,
+    "3": 60,
+    "4": 100,
+    "5": 100,
+    "6": 100,
+    "7": 80,
+    "8": 80,
+    "9": 80,
+}  # run -> diameter [mm]
 HOURS_BEHIND = {"f-d-large-box": 5, "testbed-deflection": 4}  # of the rig's clock, by time of year
 
 COUNTING = Counting(COUNT, COUNT, pot_scale=-1e-3, pot_offset=-START_HEIGHT * 1e-3)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both")
+    parser.add_argument(
+        "--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both"
+    )
     parser.add_argument(
         "--rim-speed",
         type=number_of(low=0.0),
@@ -66,14 +101,20 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     written = [args.output / "cmu.yaml"]
     for file, match in tables:
         if match[1] in wheels:
-            written += _import_table(file, match[1], args.rim_speed, args.output, configured, progress)
-    loads = {name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()}
+            written += _import_table(
+                file, match[1], args.rim_speed, args.output, configured, progress
+            )
+    loads = {
+        name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()
+    }
     for file, match in logs:
         wheel = "smooth" if match[1] == "vx_10" else "grouser"
         if wheel in wheels:
             written.append(_import_log(file, wheel, loads, args.output, configured))
     if pressed:
-        written.append(_import_pressed([(file, match[1], match[2]) for file, match in pressed], args.output))
+        written.append(
+            _import_pressed([(file, match[1], match[2]) for file, match in pressed], args.output)
+        )
     return written
 
 
@@ -91,13 +132,19 @@ def _import_table(
     """A recording of each row: it was a trial of its own, with a load of its own."""
     trials = _numbered([row for row in _straight(path) if not speeds or row[0] in speeds])
     if not trials:
-        raise RigFileError(f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0")
+        raise RigFileError(
+            f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0"
+        )
     written = []
     progress("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
     for speed, repeat, condition in trials:
         name = f"{wheel}-{speed:03.0f}-{repeat}"
         progress(_row(name, condition))
-        info = RunInfo(name=name, nominal_load=round(condition.load.value, 2), notes=f"{wheel} wheel; a steady state")
+        info = RunInfo(
+            name=name,
+            nominal_load=round(condition.load.value, 2),
+            notes=f"{wheel} wheel; a steady state",
+        )
         made = streams([condition], COUNTING, round(speed), repeat)
         written.append(write(output / f"{wheel}-table" / f"{name}.mcap", made, configured, info))
     return written
@@ -109,7 +156,9 @@ def _straight(path: Path) -> list[tuple[float, Condition]]:
     straight = numbers(path, table, "beta") == 0.0
     commanded = numbers(path, table, "Vry")[straight]
     columns = {name: numbers(path, table, name)[straight] for name in COLUMNS}
-    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    rows = [
+        dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
+    ]
     if not rows:
         raise RigFileError(f"{path}: found no row with beta 0; expected straight driving")
     return [(float(speed), _condition(row)) for speed, row in zip(commanded, rows, strict=True)]
@@ -131,7 +180,9 @@ def _numbered(rows: list[tuple[float, Condition]]) -> list[tuple[float, int, Con
     """Commanded speed, number of the repeat from 1, and condition; by rising speed."""
     ordered = sorted(rows, key=lambda row: row[0])
     speeds = [speed for speed, _ in ordered]
-    return [(speed, number_ - speeds.index(speed) + 1, c) for number_, (speed, c) in enumerate(ordered)]
+    return [
+        (speed, number_ - speeds.index(speed) + 1, c) for number_, (speed, c) in enumerate(ordered)
+    ]
 
 
 def _row(name: str, condition: Condition) -> str:
@@ -152,7 +203,9 @@ def _loads(path: Path) -> dict[str, float]:
     table = read_table(path, ("file", "W_N", "match_resid"))
     return {
         name: number(path, f"{name}: W_N", load)
-        for name, load, residual in zip(table["file"], table["W_N"], table["match_resid"], strict=True)
+        for name, load, residual in zip(
+            table["file"], table["W_N"], table["match_resid"], strict=True
+        )
         if load and residual and number(path, f"{name}: match_resid", residual) < TRUSTED_MATCH
     }
 
@@ -176,7 +229,11 @@ def _import_log(
     ]
     plain = path.name.removesuffix(".gz")
     name = plain.removesuffix(".txt")
-    info = RunInfo(name=name, nominal_load=loads.get(plain), notes=f"{wheel} wheel; raw log; no forces recorded")
+    info = RunInfo(
+        name=name,
+        nominal_load=loads.get(plain),
+        notes=f"{wheel} wheel; raw log; no forces recorded",
+    )
     return write(output / f"{wheel}-logs" / f"{name}.mcap", logged, configured, info)
 
 
@@ -217,17 +274,26 @@ def read_penetration(path: Path, series: str, which: str) -> Penetration:
     last = int(np.argmax(force))
     before = np.flatnonzero(force[:last] < CONTACT)
     if not before.size or last - before[-1] < 100:
-        raise RigFileError(f"{path}: found no loading from under {CONTACT:g} N over a second; expected one")
+        raise RigFileError(
+            f"{path}: found no loading from under {CONTACT:g} N over a second; expected one"
+        )
     height = np.interp(forces[:, 0], clock, rows[:, 4])
     pressed = slice(int(before[-1]), last + 1)
-    return Penetration(f"{series}-{which}", _body(series, which), force[pressed], height[before[-1]] - height[pressed])
+    return Penetration(
+        f"{series}-{which}",
+        _body(series, which),
+        force[pressed],
+        height[before[-1]] - height[pressed],
+    )
 
 
 def _forces(path: Path) -> tuple[float, Array]:
     """Zero of Fz [N], and rows of time [s], Fx … Tz."""
     found = re.match(r"# zero offsets[^:]*:((?: *,? *-?[\d.]+){6})\n", read_text(path))
     if not found:
-        raise RigFileError(f"{path}: row 1: found no zero offsets; expected '# zero offsets …: Fx,Fy,Fz,Tx,Ty,Tz'")
+        raise RigFileError(
+            f"{path}: row 1: found no zero offsets; expected '# zero offsets …: Fx,Fy,Fz,Tx,Ty,Tz'"
+        )
     return number(path, "row 1", found[1].split(",")[2]), matrix(path, 7, skip=2)
 
 

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from estimator.recording import RunInfo
-from tools.importers import Progress
-from tools.importers._files import LARGEST, Array, RigFileError, find, increasing
-from tools.importers._recording import Stream, configuration, stamps, write
-from tools.importers._segments import START
+from gritd.estimator.recording.run import RunInfo
+from gritd.tools.importers._files import LARGEST, Array, RigFileError, find, increasing
+from gritd.tools.importers._recording import Stream, configuration, stamps, write
+from gritd.tools.importers._segments import START
+from gritd.tools.importers.registry import Progress
 
 NAME = "emps"
 SUMMARY = "motor drive with friction, no soil: position and motor force at 1 kHz"
@@ -35,15 +35,21 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     """One recording a file, one configuration. Raises RigFileError, RecordingError."""
     logs = {file: read_log(file) for file, _ in find(args.paths, FILE)}
     if not logs:
-        raise RigFileError(f"{args.paths[0]}: found no log; expected DATA_EMPS.mat or DATA_EMPS_PULSES.mat")
+        raise RigFileError(
+            f"{args.paths[0]}: found no log; expected DATA_EMPS.mat or DATA_EMPS_PULSES.mat"
+        )
     gains = sorted({float(log["gtau"][0]) for log in logs.values()})
     if len(gains) > 1:
-        raise RigFileError(f"{next(iter(logs))}: gtau: found {gains[0]:g} and {gains[1]:g}; expected one drive")
+        raise RigFileError(
+            f"{next(iter(logs))}: gtau: found {gains[0]:g} and {gains[1]:g}; expected one drive"
+        )
     configured = configuration("rig_emps.yaml", args.output, "emps.yaml", gain=f"{gains[0]:.12f}")
     written = [args.output / "emps.yaml"]
     for file, log in logs.items():
         name = file.stem.lower().replace("_", "-")
-        progress(f"{name}: {len(log['t'])} samples, position {np.ptp(log['qm']):.4f} m peak to peak")
+        progress(
+            f"{name}: {len(log['t'])} samples, position {np.ptp(log['qm']):.4f} m peak to peak"
+        )
         info = RunInfo(name=name, notes="drive without soil")
         written.append(write(args.output / f"{name}.mcap", _streams(log), configured, info))
     return written
@@ -64,7 +70,9 @@ def read_log(path: Path) -> dict[str, Array]:
     for name, values in log.items():
         expected = 1 if name == "gtau" else len(log["t"])
         if len(values) != expected or not np.all(np.abs(values) <= LARGEST):
-            raise RigFileError(f"{path}: {name}: found {len(values)} values; expected {expected}, all finite")
+            raise RigFileError(
+                f"{path}: {name}: found {len(values)} values; expected {expected}, all finite"
+            )
     increasing(path, "t", log["t"], first=1)
     return log
 

@@ -17,13 +17,15 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from estimator.recording import RunInfo
-from tools.importers import Progress, positive
-from tools.importers._files import Array, RigFileError, find, increasing, numbers, read_table
-from tools.importers._recording import UNKNOWN, Stream, configuration, counts, stamps, write
+from gritd.estimator.recording.run import RunInfo
+from gritd.tools.importers._files import Array, RigFileError, find, increasing, numbers, read_table
+from gritd.tools.importers._recording import UNKNOWN, Stream, configuration, counts, stamps, write
+from gritd.tools.importers.registry import Progress, positive
 
 NAME = "mgst"
-SUMMARY = "single wheel in GRC-1 simulant: motion, sinkage, current, load, drawbar pull, axle torque"
+SUMMARY = (
+    "single wheel in GRC-1 simulant: motion, sinkage, current, load, drawbar pull, axle torque"
+)
 
 RADIUS = 0.075  # [m]
 WHEEL_COUNT = 1.96665e-3 * 0.01 / RADIUS  # [rad] quantum of the rim speed over one sample
@@ -95,7 +97,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave out what comes before this time of the rig's log",
     )
     parser.add_argument(
-        "--lag", type=positive, metavar="SECONDS", help="of the force/torque log behind the rig's; default: correlate"
+        "--lag",
+        type=positive,
+        metavar="SECONDS",
+        help="of the force/torque log behind the rig's; default: correlate",
     )
 
 
@@ -103,9 +108,14 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     """One recording a trial, one configuration for all. Raises RigFileError, RecordingError."""
     trials = [read_trial(*pair) for pair in _pairs(args.paths)]
     known = {"drawbar_pull": "2", "torque": "0.3"}
-    sigmas = {f"{name}_sigma": f"{UNKNOWN:.1f}" if name in args.conceal else text for name, text in known.items()}
+    sigmas = {
+        f"{name}_sigma": f"{UNKNOWN:.1f}" if name in args.conceal else text
+        for name, text in known.items()
+    }
     source = "motor_shunt" if "torque" in args.conceal else "wrench"
-    configured = configuration("rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas)
+    configured = configuration(
+        "rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas
+    )
     written = [args.output / "mgst.yaml"]
     progress(HEADER)
     for trial in trials:
@@ -129,16 +139,22 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
     rigs = find(paths, RIG_FILE)
     sensors = {match[2]: file for file, match in find(paths, SENSOR_FILE)}
     if not rigs:
-        raise RigFileError(f"{paths[0]}: found no rig log; expected files like 20210208-165209-trio-s20-p925.rig.csv")
+        raise RigFileError(
+            f"{paths[0]}: found no rig log; expected files like 20210208-165209-trio-s20-p925.rig.csv"
+        )
     for file, match in rigs:
         if match[2] not in sensors:
-            raise RigFileError(f"{file}: found no sensor log; expected 1-g_{match[3]}-{match[2]}.processed.csv.gz")
+            raise RigFileError(
+                f"{file}: found no sensor log; expected 1-g_{match[3]}-{match[2]}.processed.csv.gz"
+            )
     return [(file, sensors[match[2]], match) for file, match in rigs]
 
 
 def read_trial(rig: Path, sensor: Path, name: re.Match[str]) -> Trial:
     """Both logs of a trial. Raises RigFileError."""
-    return Trial(f"mgst-{name[3]}-{name[2]}", int(name[3]), _read_rig(rig, name[1]), _read_sensor(sensor))
+    return Trial(
+        f"mgst-{name[3]}-{name[2]}", int(name[3]), _read_rig(rig, name[1]), _read_sensor(sensor)
+    )
 
 
 def _read_rig(path: Path, date: str) -> Rig:
@@ -172,15 +188,21 @@ def _times(path: Path, texts: list[str]) -> Array:
     found = [re.fullmatch(r"(?:0 days )?(\d+):(\d\d):(\d\d(?:\.\d+)?)", text) for text in texts]
     for row, (text, match) in enumerate(zip(texts, found, strict=True), start=2):
         if match is None:
-            raise RigFileError(f"{path}: row {row}: found {text[:40]!r}; expected a time such as 16:52:18.010000")
+            raise RigFileError(
+                f"{path}: row {row}: found {text[:40]!r}; expected a time such as 16:52:18.010000"
+            )
     return np.array([int(m[1]) * 3600 + int(m[2]) * 60 + float(m[3]) for m in found if m])
 
 
 def _midnight(path: Path, date: str) -> int:
     try:
-        return int(datetime.strptime(date, "%Y%m%d").replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        return (
+            int(datetime.strptime(date, "%Y%m%d").replace(tzinfo=UTC).timestamp()) * 1_000_000_000
+        )
     except ValueError:
-        raise RigFileError(f"{path}: found {date} in its name; expected a date such as 20210208") from None
+        raise RigFileError(
+            f"{path}: found {date} in its name; expected a date such as 20210208"
+        ) from None
 
 
 # ---- the two clocks ------------------------------------------------------------------------------------------------
@@ -198,9 +220,13 @@ def find_lag(trial: Trial) -> tuple[float, float]:
     axle = _fluctuation(np.interp(grid, trial.sensor.t, trial.sensor.torque))
     begin = 150
     if len(grid) < begin + 300:
-        raise RigFileError(f"{trial.name}: found {grid.size / 100:.1f} s of data; expected 4.5 s or more, or --lag")
+        raise RigFileError(
+            f"{trial.name}: found {grid.size / 100:.1f} s of data; expected 4.5 s or more, or --lag"
+        )
     lags = np.arange(20, 101)
-    fits = [float(np.corrcoef(motor[begin:], axle[begin - lag : len(axle) - lag])[0, 1]) for lag in lags]
+    fits = [
+        float(np.corrcoef(motor[begin:], axle[begin - lag : len(axle) - lag])[0, 1]) for lag in lags
+    ]
     best = int(np.argmax(fits))
     return float(lags[best]) / 100, fits[best]
 
@@ -214,7 +240,9 @@ def _fluctuation(values: Array) -> Array:
 # ---- writing -------------------------------------------------------------------------------------------------------
 
 
-def _streams(trial: Trial, lag: float, begin: float, pull: str, concealed: set[str]) -> list[Stream]:
+def _streams(
+    trial: Trial, lag: float, begin: float, pull: str, concealed: set[str]
+) -> list[Stream]:
     """The channels from `begin` (0 is the start of the wheel, a little before the first force) to where a log ends."""
     rig, sensor = trial.rig, trial.sensor
     shared = (rig.t >= begin) & (rig.t <= lag + sensor.t[-1])
@@ -250,7 +278,9 @@ def _wrench(sensor: Sensor, pull: str, concealed: set[str]) -> Array:
 def _info(trial: Trial, lag: float, pull: str, concealed: list[str]) -> RunInfo:
     hidden = ", ".join(sorted(set(concealed))) or "nothing"
     notes = f"slip {trial.slip} %; drawbar pull {pull}; sensor log lags {lag:.2f} s; concealed: {hidden}"
-    return RunInfo(name=trial.name, nominal_load=round(float(np.mean(trial.sensor.load)), 1), notes=notes)
+    return RunInfo(
+        name=trial.name, nominal_load=round(float(np.mean(trial.sensor.load)), 1), notes=notes
+    )
 
 
 # ---- what the table shows ------------------------------------------------------------------------------------------

@@ -15,20 +15,37 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.recording import RunInfo
-from estimator.settings import Uncertain
-from tools.importers import Progress, positive
-from tools.importers._files import RigFileError, Table, find, number, numbers, read_table, read_text
-from tools.importers._recording import configuration, write
-from tools.importers._segments import Condition, Counting, scatter_of_mean, streams
+from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.recording.run import RunInfo
+from gritd.tools.importers._files import (
+    RigFileError,
+    Table,
+    find,
+    number,
+    numbers,
+    read_table,
+    read_text,
+)
+from gritd.tools.importers._recording import configuration, write
+from gritd.tools.importers._segments import Condition, Counting, scatter_of_mean, streams
+from gritd.tools.importers.registry import Progress, positive
 
 NAME = "table"
-SUMMARY = "steady states from a table, one condition a row: slip, load, drawbar pull, sinkage, torque"
+SUMMARY = (
+    "steady states from a table, one condition a row: slip, load, drawbar pull, sinkage, torque"
+)
 
 CSV = re.compile(r".*\.csv(?:\.gz)?")
 CONSTANTS = ("source", "wheel_radius_m", "wheel_width_m", "soil_simulant", "soil_shear_modulus_k_m")
 MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m", "meas_torque_nm")
-SOIL = ("simulant", "n", "k_c_kN_per_m_n_plus_1", "k_phi_kN_per_m_n_plus_2", "cohesion_kPa", "friction_angle_deg")
+SOIL = (
+    "simulant",
+    "n",
+    "k_c_kN_per_m_n_plus_1",
+    "k_phi_kN_per_m_n_plus_2",
+    "cohesion_kPa",
+    "friction_angle_deg",
+)
 COUNT = 1e-6  # [m] of rim or carriage travel
 COUNTING = Counting(COUNT, COUNT, pot_scale=1.0, pot_offset=0.0)
 NOT_TAKEN = "not taken from the tables but left to be found: dry sands in general."
@@ -36,11 +53,21 @@ NOT_TAKEN = "not taken from the tables but left to be found: dry sands in genera
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--speed", type=positive, default=0.01, metavar="M/S", help="of the faster of rim and carriage, default 0.01"
+        "--speed",
+        type=positive,
+        default=0.01,
+        metavar="M/S",
+        help="of the faster of rim and carriage, default 0.01",
     )
-    for name, unit, default in (("drawbar-pull", "N", 0.5), ("sinkage", "m", 0.25e-3), ("torque", "N·m", 0.1)):
+    for name, unit, default in (
+        ("drawbar-pull", "N", 0.5),
+        ("sinkage", "m", 0.25e-3),
+        ("torque", "N·m", 0.1),
+    ):
         explained = f"standard deviation of a tabulated value [{unit}], default {default:g}"
-        parser.add_argument(f"--{name}-sigma", type=positive, default=default, metavar="SIGMA", help=explained)
+        parser.add_argument(
+            f"--{name}-sigma", type=positive, default=default, metavar="SIGMA", help=explained
+        )
     parser.add_argument(
         "--soil-strength",
         choices=("unknown", "table"),
@@ -68,13 +95,21 @@ def _has(path: Path, column: str) -> bool:
     return column in read_text(path).partition("\n")[0].strip().split(",")
 
 
-def _import(path: Path, soils: list[Path], args: argparse.Namespace, progress: Progress) -> list[Path]:
+def _import(
+    path: Path, soils: list[Path], args: argparse.Namespace, progress: Progress
+) -> list[Path]:
     table = read_table(path, CONSTANTS + MEASURED)
     conditions = _conditions(path, table, args)
     stem = path.name.partition(".")[0]
-    configured = configuration("rig_table.yaml", args.output, f"{stem}.yaml", **_values(path, table, soils, args))
+    configured = configuration(
+        "rig_table.yaml", args.output, f"{stem}.yaml", **_values(path, table, soils, args)
+    )
     load = float(np.mean([condition.load.value for condition in conditions]))
-    info = RunInfo(name=stem, nominal_load=round(load, 2), notes=f"{len(conditions)} steady states from a table")
+    info = RunInfo(
+        name=stem,
+        nominal_load=round(load, 2),
+        notes=f"{len(conditions)} steady states from a table",
+    )
     progress(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
     recording = write(args.output / f"{stem}.mcap", streams(conditions, COUNTING), configured, info)
     return [args.output / f"{stem}.yaml", recording]
@@ -85,7 +120,9 @@ def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Cond
     conditions = []
     for row, (load, slip, pull, sinkage, torque) in enumerate(zip(*columns, strict=True), start=2):
         if not -1.0 <= slip <= 1.0 or load <= 0.0:
-            raise RigFileError(f"{path}: row {row}: found slip {slip:g}, load {load:g}; expected -1 … 1, above 0 N")
+            raise RigFileError(
+                f"{path}: row {row}: found slip {slip:g}, load {load:g}; expected -1 … 1, above 0 N"
+            )
         conditions.append(
             Condition(
                 rim_speed=args.speed * min(1.0, 1.0 + slip),
@@ -99,7 +136,9 @@ def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Cond
     return conditions
 
 
-def _values(path: Path, table: Table, soils: list[Path], args: argparse.Namespace) -> dict[str, str]:
+def _values(
+    path: Path, table: Table, soils: list[Path], args: argparse.Namespace
+) -> dict[str, str]:
     """What the configuration's template asks for."""
     constant = {name: _constant(path, table, name) for name in CONSTANTS}
     soil = _soil(path, soils, constant["soil_simulant"])
@@ -130,8 +169,16 @@ def _values(path: Path, table: Table, soils: list[Path], args: argparse.Namespac
 def _strength(soil: dict[str, float], source: str) -> tuple[dict[str, float], str]:
     """Prior of cohesion [Pa] and tan φ, and the sentence that says where it is from."""
     if source == "unknown":
-        return {"cohesion": 500.0, "cohesion_sigma": 500.0, "tan_phi": 0.6, "tan_phi_sigma": 0.15}, NOT_TAKEN
-    cohesion, tan_phi = soil["cohesion_kPa"] * 1e3, math.tan(math.radians(soil["friction_angle_deg"]))
+        return {
+            "cohesion": 500.0,
+            "cohesion_sigma": 500.0,
+            "tan_phi": 0.6,
+            "tan_phi_sigma": 0.15,
+        }, NOT_TAKEN
+    cohesion, tan_phi = (
+        soil["cohesion_kPa"] * 1e3,
+        math.tan(math.radians(soil["friction_angle_deg"])),
+    )
     sigmas = {"cohesion_sigma": max(100.0, 0.5 * cohesion), "tan_phi_sigma": 0.1 * tan_phi}
     return {"cohesion": cohesion, "tan_phi": tan_phi, **sigmas}, "as tabulated."
 
@@ -140,7 +187,9 @@ def _constant(path: Path, table: Table, name: str) -> str:
     """The one value of a column. Raises RigFileError where rows differ."""
     values = sorted(set(table[name]))
     if len(values) > 1:
-        raise RigFileError(f"{path}: {name}: found {values[0]!r} and {values[1]!r}; expected one value for all rows")
+        raise RigFileError(
+            f"{path}: {name}: found {values[0]!r} and {values[1]!r}; expected one value for all rows"
+        )
     return values[0]
 
 

@@ -8,13 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from tools.diagnose.result import SoilFit, Trace
-from tools.report import figures, redo
-from tools.report.html import Markup, page, section, table, tag
-from tools.report.words import counted, held, listed, name_of, number, quantity, sentence, shown
+from gritd.tools.diagnose.explain.result import SoilFit, Trace
+from gritd.tools.report import figures, redo
+from gritd.tools.report.html import Markup, page, section, table, tag
+from gritd.tools.report.words import (
+    counted,
+    held,
+    listed,
+    name_of,
+    number,
+    quantity,
+    sentence,
+    shown,
+)
 
 ALL = "all runs"
-KEY = {"measured": "recorded", "before": "simulated as configured", "after": "simulated, soil fitted"}
+KEY = {
+    "measured": "recorded",
+    "before": "simulated as configured",
+    "after": "simulated, soil fitted",
+}
 NOTE = (
     "The original equations, driven by the recorded motion and the known load. Under a run: recorded less simulated, "
     "with ± 2σ of the noise as a band. Grey stretches are not in the errors: standstill, lifted, unsteady."
@@ -54,10 +67,15 @@ class Comparison:
     def errors(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of the table of errors: a row a run and one for all, in the units shown."""
         units = {channel: shown(_unit(self.traces, channel)) for channel in self.channels}
-        head = ["run", *(f"{name_of(channel)} [{unit or '–'}]" for channel, (unit, _) in units.items())]
+        head = [
+            "run",
+            *(f"{name_of(channel)} [{unit or '–'}]" for channel, (unit, _) in units.items()),
+        ]
         runs: list[tuple[str, str | None]] = [(run, run) for run in self.runs]
         rows = runs + ([(ALL, None)] if len(runs) > 1 else [])
-        return head, [[said, *(self._error(c, run, units[c][1]) for c in self.channels)] for said, run in rows]
+        return head, [
+            [said, *(self._error(c, run, units[c][1]) for c in self.channels)] for said, run in rows
+        ]
 
     def _error(self, channel: str, run: str | None, factor: float) -> str:
         sides = ("before", "after") if self.soil else ("before",)
@@ -76,7 +94,9 @@ def render(found: Comparison) -> str:
         f"gritd compare: {found.testbed}",
         _title(found),
         section(
-            "Errors", table(head, rows, numbers=1), tag("p", f"Root mean square: as configured{fitted}.", class_="note")
+            "Errors",
+            table(head, rows, numbers=1),
+            tag("p", f"Root mean square: as configured{fitted}.", class_="note"),
         ),
         section("Simulation against recording", tag("p", NOTE), _pictures(found)),
         _soil(found),
@@ -86,14 +106,20 @@ def render(found: Comparison) -> str:
 
 
 def _title(found: Comparison) -> Markup:
-    effects = f"with {listed([name_of(b) for b in found.baseline])}" if found.baseline else "no effects"
+    effects = (
+        f"with {listed([name_of(b) for b in found.baseline])}" if found.baseline else "no effects"
+    )
     kicker = f"gritd compare · {found.testbed} · {counted(len(found.runs), 'run')} · {effects}"
     said = f"As configured, the simulation is off by {_off(found, 'before')}."
     if found.soil:
         said += f" With the soil fitted, by {_off(found, 'after')}."
     lead = tag("p", held(said), class_="summary")
     return tag(
-        "header", tag("p", kicker, class_="kicker"), tag("h1", "Simulation and recording"), lead, class_="verdict"
+        "header",
+        tag("p", kicker, class_="kicker"),
+        tag("h1", "Simulation and recording"),
+        lead,
+        class_="verdict",
     )
 
 
@@ -102,14 +128,20 @@ def _off(found: Comparison, which: str) -> str:
     said = []
     for channel in found.channels:
         unit, factor = shown(_unit(found.traces, channel))
-        said.append(f"{number(found.rms(channel, None, which) * factor, 2)} {unit} in {name_of(channel)}")
+        said.append(
+            f"{number(found.rms(channel, None, which) * factor, 2)} {unit} in {name_of(channel)}"
+        )
     return listed(said)
 
 
 def _pictures(found: Comparison) -> Iterator[Markup]:
-    key = figures.legend({k: v for k, v in KEY.items() if found.soil or k != "after"} | {"unused": "not compared"})
+    key = figures.legend(
+        {k: v for k, v in KEY.items() if found.soil or k != "after"} | {"unused": "not compared"}
+    )
     if len(found.runs) == 1:
-        yield figures.figure(f"All channels of {found.runs[0]}.", figures.channels(found.traces), legend=key)
+        yield figures.figure(
+            f"All channels of {found.runs[0]}.", figures.channels(found.traces), legend=key
+        )
         return
     for channel in found.channels:
         of = [trace for trace in found.traces if trace.channel == channel]
@@ -122,11 +154,17 @@ def _soil(found: Comparison) -> Markup | None:
         return None
     key = figures.legend({"prior": "known before", "after": "fitted"})
     caption = "Soil, fitted within what was known before; ± 1σ thick and ± 2σ thin, as if nothing were left out."
-    return section("The soil", figures.figure(caption, figures.soil(found.soil), legend=key, small=True))
+    return section(
+        "The soil", figures.figure(caption, figures.soil(found.soil), legend=key, small=True)
+    )
 
 
 def _caveats(found: Comparison) -> Markup | None:
-    return section("Caveats", tag("ul", (tag("li", sentence(c)) for c in found.caveats))) if found.caveats else None
+    return (
+        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in found.caveats)))
+        if found.caveats
+        else None
+    )
 
 
 def printed(found: Comparison) -> str:
@@ -134,12 +172,16 @@ def printed(found: Comparison) -> str:
     head, rows = found.errors()
     widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
     lines = [
-        "  ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True)))
+        "  ".join(
+            c.ljust(w) if i == 0 else c.rjust(w)
+            for i, (c, w) in enumerate(zip(row, widths, strict=True))
+        )
         for row in (head, *rows)
     ]
     if found.soil:
         lines += ["", "root mean square residual as configured → with the soil fitted", ""]
         lines += [
-            f"{name_of(k):20}{quantity(found.soil.prior[k])}  →  {quantity(q)}" for k, q in found.soil.after.items()
+            f"{name_of(k):20}{quantity(found.soil.prior[k])}  →  {quantity(q)}"
+            for k, q in found.soil.after.items()
         ]
     return "\n".join([*lines, *(f"note: {caveat}" for caveat in found.caveats)])

@@ -7,11 +7,18 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from tools.diagnose import redo as diagnosed
-from tools.diagnose.result import STRAINED, Diagnosis, Hypothesis, Scatter, SoilFit, Trace
-from tools.report import figures, hypotheses, redo, tables
-from tools.report.html import Child, Markup, page, section, table, tag
-from tools.report.words import (
+from gritd.tools.commands import diagnose_redo as diagnosed
+from gritd.tools.diagnose.explain.result import (
+    STRAINED,
+    Diagnosis,
+    Hypothesis,
+    Scatter,
+    SoilFit,
+    Trace,
+)
+from gritd.tools.report import figures, hypotheses, redo, tables
+from gritd.tools.report.html import Child, Markup, page, section, table, tag
+from gritd.tools.report.words import (
     counted,
     held,
     listed,
@@ -30,18 +37,26 @@ from tools.report.words import (
 VERDICTS = {  # verdict -> its name, and what it means
     "consistent": ("Consistent", "Model and recordings agree within the noise."),
     "explained": ("Explained", "Model and recordings differ, and listed physics explains it."),
-    "unlisted": ("Not in the list", "Model and recordings differ, and no listed effect explains it."),
+    "unlisted": (
+        "Not in the list",
+        "Model and recordings differ, and no listed effect explains it.",
+    ),
     "insufficient": ("Not decided", "These recordings cannot tell."),
 }
 NOISE_SIZES = ("sigma", "configured", "configured_sigma")
 FEW = 3  # runs; of fewer, thirds are held out
 RUNS_HELD = "Every run is predicted by a fit to the other runs: none of its own samples were used."
-THIRDS_HELD = "Every third of a run is predicted by a fit to the rest: none of its own samples were used."
+THIRDS_HELD = (
+    "Every third of a run is predicted by a fit to the rest: none of its own samples were used."
+)
 DRAWN = (
     "Under each run: recorded less simulated, with ± 2σ of the noise as a band. Grey "
     "stretches were not compared: standstill, lifted, unsteady."
 )
-LOCATED_RUNS, OTHER_RUNS = 6, 3  # pictures in view of a channel where the misfit lives, and of another
+LOCATED_RUNS, OTHER_RUNS = (
+    6,
+    3,
+)  # pictures in view of a channel where the misfit lives, and of another
 
 
 def write(found: Diagnosis, path: Path) -> None:
@@ -93,14 +108,22 @@ def _verdict(found: Diagnosis) -> Markup:
 def explanation(found: Diagnosis) -> str:
     """What makes the difference between before and after, in words."""
     if found.accepted:
-        return name_of(found.accepted[0].effect) if len(found.accepted) == 1 else f"these {len(found.accepted)} effects"
+        return (
+            name_of(found.accepted[0].effect)
+            if len(found.accepted) == 1
+            else f"these {len(found.accepted)} effects"
+        )
     return "the empirical law" if found.law else "it"
 
 
 def _or_alike(h: Hypothesis) -> str:
     """An effect's name, and how many others the recordings cannot tell it from."""
     others = len(h.indistinguishable_from)
-    rivals = f" or {name_of(h.indistinguishable_from[0])}" if others == 1 else f" or one of {others} like it"
+    rivals = (
+        f" or {name_of(h.indistinguishable_from[0])}"
+        if others == 1
+        else f" or one of {others} like it"
+    )
     return name_of(h.effect) + (rivals if others else "")
 
 
@@ -112,7 +135,10 @@ def _together(found: Diagnosis, h: Hypothesis) -> float:
 
 def _figure(term: str, value: str, detail: str) -> Markup:
     return tag(
-        "div", tag("dt", term), tag("dd", held(value)), tag("dd", held(detail), class_="detail") if detail else None
+        "div",
+        tag("dt", term),
+        tag("dd", held(value)),
+        tag("dd", held(detail), class_="detail") if detail else None,
     )
 
 
@@ -137,7 +163,9 @@ def _figures(found: Diagnosis) -> Iterator[tuple[str, str, str]]:
 
 def _without(soil: SoilFit, key: str) -> str:
     known = f"known before {quantity(soil.prior.get(key))}"
-    return known if soil.before == soil.after else f"{quantity(soil.before.get(key))} without; {known}"
+    return (
+        known if soil.before == soil.after else f"{quantity(soil.before.get(key))} without; {known}"
+    )
 
 
 def _most_improved(found: Diagnosis) -> str | None:
@@ -151,7 +179,9 @@ def _change(found: Diagnosis, channel: str) -> tuple[str, str]:
     """Held-out error before and after, and the noise floor, with their unit."""
     unit = found.fit.unit.get(channel, "")
     seen, factor = shown(unit)
-    before, after = (number(side[channel] * factor, 2) for side in (found.fit.before, found.fit.after))
+    before, after = (
+        number(side[channel] * factor, 2) for side in (found.fit.before, found.fit.after)
+    )
     change = before if before == after else f"{before} → {after}"
     return f"{change} {seen}".rstrip(), with_unit(found.fit.noise_floor.get(channel), unit, 2)
 
@@ -164,7 +194,9 @@ def _simulation(found: Diagnosis) -> Markup | None:
         return None
     runs = {trace.run for trace in found.traces}
     channels = dict.fromkeys(trace.channel for trace in found.traces)
-    drawn = [_one_run(found)] if len(runs) == 1 else [_channel(found, channel) for channel in channels]
+    drawn = (
+        [_one_run(found)] if len(runs) == 1 else [_channel(found, channel) for channel in channels]
+    )
     said = f"{RUNS_HELD if len(runs) >= FEW else THIRDS_HELD} {DRAWN}"
     return section("Simulation against recording", paragraph(said), drawn)
 
@@ -172,7 +204,9 @@ def _simulation(found: Diagnosis) -> Markup | None:
 def _one_run(found: Diagnosis) -> Markup:
     """All its channels side by side."""
     caption = "; ".join(_error_words(found, trace.channel) for trace in found.traces)
-    return figures.figure(sentence(caption), figures.channels(found.traces), legend=_key(found, found.traces))
+    return figures.figure(
+        sentence(caption), figures.channels(found.traces), legend=_key(found, found.traces)
+    )
 
 
 def _channel(found: Diagnosis, channel: str) -> Markup:
@@ -217,7 +251,9 @@ def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
     changes = places[0].changes if places else ()
     marks = {"change": "starts or stops"} if changes else {}
     key = figures.legend({"mean": "mean", "band": "± 2σ of the noise", **marks})
-    caption = f"{about}. {sentence(tables.named(found, places[0].where))}" if places else f"{about}."
+    caption = (
+        f"{about}. {sentence(tables.named(found, places[0].where))}" if places else f"{about}."
+    )
     runs = list(dict.fromkeys(trace.run for trace in found.traces))
     drawn = figures.scatter(scatter, explanation(found), runs, changes)
     return figures.figure(caption, drawn, legend=key, small=True)
@@ -227,23 +263,33 @@ def _hypotheses(found: Diagnosis) -> Markup | None:
     if not found.hypotheses:
         return None
     title = "What was left out" if found.accepted else "What was tried"
-    return section(title, paragraph(hypotheses.introduction(found)), hypotheses.groups(found.hypotheses))
+    return section(
+        title, paragraph(hypotheses.introduction(found)), hypotheses.groups(found.hypotheses)
+    )
 
 
 def _soil(found: Diagnosis) -> Markup | None:
     if found.soil is None:
         return None
     legend = {"prior": "known before", **_fitted(found)}
-    strain = found.soil.strained() or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
+    strain = (
+        found.soil.strained()
+        or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
+    )
     caption = f"Soil, ± 1σ thick and ± 2σ thin. {strain}"
-    drawn = figures.figure(caption, figures.soil(found.soil), legend=figures.legend(legend), small=True)
+    drawn = figures.figure(
+        caption, figures.soil(found.soil), legend=figures.legend(legend), small=True
+    )
     return section("The soil", drawn)
 
 
 def _fitted(found: Diagnosis) -> dict[str, str]:
     if found.soil is None or found.soil.before == found.soil.after:
         return {"after": "fitted"}
-    return {"before": f"fitted without {explanation(found)}", "after": f"fitted with {explanation(found)}"}
+    return {
+        "before": f"fitted without {explanation(found)}",
+        "after": f"fitted with {explanation(found)}",
+    }
 
 
 # ---- the end -------------------------------------------------------------------------------------------------------
@@ -252,7 +298,9 @@ def _fitted(found: Diagnosis) -> dict[str, str]:
 def _caveats(found: Diagnosis) -> Markup | None:
     said = list(found.caveats)
     if found.baseline:
-        said.insert(0, f"The configuration already models {listed([name_of(b) for b in found.baseline])}")
+        said.insert(
+            0, f"The configuration already models {listed([name_of(b) for b in found.baseline])}"
+        )
     return section("Caveats", tag("ul", (tag("li", sentence(c)) for c in said))) if said else None
 
 
@@ -269,13 +317,18 @@ def _next(found: Diagnosis) -> Markup | None:
         "section",
         tag("h2", "Next experiment"),
         tag("p", sentence(following.action), class_="summary"),
-        paragraph(sentence(gain)) if math.isfinite(following.expected_gain_nats) or following.separates else None,
+        paragraph(sentence(gain))
+        if math.isfinite(following.expected_gain_nats) or following.separates
+        else None,
         class_="next",
     )
 
 
 def _redo(found: Diagnosis, name: str) -> Markup:
-    noise = [(name_of(channel), _noise(found, channel, values)) for channel, values in found.noise.items()]
+    noise = [
+        (name_of(channel), _noise(found, channel, values))
+        for channel, values in found.noise.items()
+    ]
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
     return section("To redo it", _again(found, name), redo.content(found.redo), noise_table)
 
@@ -285,9 +338,7 @@ def _again(found: Diagnosis, name: str) -> list[Markup] | None:
     if not isinstance(found.redo.get("files"), Mapping):
         return None
     command = shlex.join(["gritd", "diagnose", "--redo", name])
-    said = (
-        "This page holds what it takes beside the recordings: they are checked by their hashes, and results compared."
-    )
+    said = "This page holds what it takes beside the recordings: they are checked by their hashes, and results compared."
     embedded = tag("pre", diagnosed.as_json(found), id=diagnosed.EMBEDDED, hidden="hidden")
     return [paragraph(said), tag("pre", command, class_="command"), embedded]
 

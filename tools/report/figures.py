@@ -7,11 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.terramechanics.soil import Array
-from tools.diagnose.result import Quantity, Scatter, SoilFit, Trace
-from tools.report import plot
-from tools.report.html import Child, Markup, tag
-from tools.report.words import counted, covariate_shown, held, name_of, number, quantity, shown
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.result import Quantity, Scatter, SoilFit, Trace
+from gritd.tools.report import plot
+from gritd.tools.report.html import Child, Markup, tag
+from gritd.tools.report.words import (
+    counted,
+    covariate_shown,
+    held,
+    name_of,
+    number,
+    quantity,
+    shown,
+)
 
 BINS = 12  # of a scatter's running mean
 FEWEST = 4  # values in a bin
@@ -34,7 +42,13 @@ ROWS = Rows()
 
 def figure(caption: str, *content: Child, legend: Child = None, small: bool = False) -> Markup:
     """`small` figures are never parted by a page break."""
-    return tag("figure", legend, *content, tag("figcaption", held(caption)), class_="small" if small else None)
+    return tag(
+        "figure",
+        legend,
+        *content,
+        tag("figcaption", held(caption)),
+        class_="small" if small else None,
+    )
 
 
 def panels(items: Iterable[Child]) -> Markup:
@@ -49,7 +63,11 @@ def panel(title: str, drawing: Markup, beside: str = "") -> Markup:
 
 def legend(entries: Mapping[str, str]) -> Markup:
     """Class of a mark -> what it is."""
-    return tag("ul", (tag("li", tag("i", class_=f"swatch {c}"), said) for c, said in entries.items()), class_="legend")
+    return tag(
+        "ul",
+        (tag("li", tag("i", class_=f"swatch {c}"), said) for c, said in entries.items()),
+        class_="legend",
+    )
 
 
 # ---- traces --------------------------------------------------------------------------------------------------------
@@ -57,7 +75,9 @@ def legend(entries: Mapping[str, str]) -> Markup:
 
 def differs(trace: Trace | Scatter) -> bool:
     """Whether the explanation changes the prediction at all."""
-    return not np.array_equal(np.asarray(trace.before, float), np.asarray(trace.after, float), equal_nan=True)
+    return not np.array_equal(
+        np.asarray(trace.before, float), np.asarray(trace.after, float), equal_nan=True
+    )
 
 
 def rms(trace: Trace, which: str) -> float:
@@ -97,7 +117,9 @@ def trace_picture(trace: Trace) -> Markup:
     """Recording and simulation; under them recorded − simulated on a scale of its own."""
     unit, factor = shown(trace.unit)
     time, used = np.asarray(trace.time, float) - trace.time[0], np.asarray(trace.used, bool)
-    measured, before, after = (np.asarray(v, float) * factor for v in (trace.measured, trace.before, trace.after))
+    measured, before, after = (
+        np.asarray(v, float) * factor for v in (trace.measured, trace.before, trace.after)
+    )
     both = differs(trace)
     seen = used if used.any() else np.ones(time.shape, bool)
     span = (0.0, float(time[-1]) or 1.0)
@@ -106,7 +128,9 @@ def trace_picture(trace: Trace) -> Markup:
     )
     top = plot.axes(span, plot.limits(measured[seen], before[seen], after[seen]), *ROWS.signal)
     noise = 2.0 * _known(trace.sigma) * factor
-    low = plot.axes(span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual)
+    low = plot.axes(
+        span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual
+    )
     label = f"{name_of(trace.channel)} of run {trace.run}: recording and simulation over time, with the residual below"
     return plot.picture(
         ROWS.height,
@@ -118,7 +142,10 @@ def trace_picture(trace: Trace) -> Markup:
         plot.frame(low, "residual", below="time [s]", most=3),
         plot.line(top, time, measured, "line measured"),
         (plot.line(top, time, values, f"line {kind}") for values, kind in simulated),
-        (plot.line(low, time, measured - values, f"line thin {kind}") for values, kind in simulated),
+        (
+            plot.line(low, time, measured - values, f"line thin {kind}")
+            for values, kind in simulated
+        ),
     )
 
 
@@ -135,13 +162,17 @@ def drawn_against(of: Scatter) -> str:
     return "run" if first == "constant" else first
 
 
-def scatter(of: Scatter, explanation: str, runs: Sequence[str], changes: Sequence[float] = ()) -> Markup:
+def scatter(
+    of: Scatter, explanation: str, runs: Sequence[str], changes: Sequence[float] = ()
+) -> Markup:
     """Residuals without and with the explanation, on one scale; their mean through them.
 
     changes: values of the covariate at which the misfit starts or stops; of runs, the number of the first run beyond.
     """
     unit, factor = shown(of.unit)
-    sides = [(f"without {explanation}", "before")] + ([(f"with {explanation}", "after")] if differs(of) else [])
+    sides = [(f"without {explanation}", "before")] + (
+        [(f"with {explanation}", "after")] if differs(of) else []
+    )
     values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
     sigma = _known(of.sigma) * factor
     y_limits = plot.limits(*values.values(), [-2 * sigma, 2 * sigma], keep=0.0)
@@ -155,7 +186,9 @@ def scatter(of: Scatter, explanation: str, runs: Sequence[str], changes: Sequenc
             plot.frame(at, f"residual [{unit or '–'}]", below=name, names=names),
             plot.dots(at, *_some(x, values[kind]), f"dots {kind}"),
             plot.uprights(at, _marked(of, changes), "change") if changes else None,
-            _levels(at, of, values[kind]) if names else plot.line(at, *running_mean(x, values[kind]), "line mean"),
+            _levels(at, of, values[kind])
+            if names
+            else plot.line(at, *running_mean(x, values[kind]), "line mean"),
         )
         drawn.append(panel(title if len(sides) > 1 else "", plot.picture(224.0, label, *marks)))
     return panels(drawn)
@@ -168,7 +201,9 @@ def _marked(of: Scatter, changes: Sequence[float]) -> list[float]:
     return [change * covariate_shown(of.covariate, of.covariate_unit)[1] for change in changes]
 
 
-Along = tuple[Array, str, tuple[float, float], list[str] | None]  # values, label, limits, names of 0, 1, 2 …
+Along = tuple[
+    Array, str, tuple[float, float], list[str] | None
+]  # values, label, limits, names of 0, 1, 2 …
 
 
 def _along(of: Scatter) -> Along:
@@ -188,16 +223,24 @@ def _by_run(of: Scatter, runs: Sequence[str]) -> Along:
         own = run == each
         x[own] += COLUMN * (np.arange(own.sum()) / max(own.sum() - 1, 1) - 0.5)
     longest = max(MOST_LETTERS // count, 1)
-    names = [(n if len(n) <= longest else str(i + 1)) for i, n in enumerate([*runs, *[""] * (count - len(runs))])]
+    names = [
+        (n if len(n) <= longest else str(i + 1))
+        for i, n in enumerate([*runs, *[""] * (count - len(runs))])
+    ]
     return x, "run", (-0.5, count - 0.5), names
 
 
 def _levels(at: plot.Axes, of: Scatter, values: Array) -> list[Markup]:
     """The mean of each run, as wide as its column."""
     run = np.asarray(of.run, dtype=int)
-    means = [(each, float(np.nanmean(values[run == each]))) for each in np.unique(run[np.isfinite(values)]).tolist()]
+    means = [
+        (each, float(np.nanmean(values[run == each])))
+        for each in np.unique(run[np.isfinite(values)]).tolist()
+    ]
     half = 0.5 * COLUMN
-    return [plot.line(at, [each - half, each + half], [mean, mean], "line mean") for each, mean in means]
+    return [
+        plot.line(at, [each - half, each + half], [mean, mean], "line mean") for each, mean in means
+    ]
 
 
 def _some(x: Array, y: Array) -> tuple[Array, Array]:
@@ -228,7 +271,10 @@ def soil(of: SoilFit) -> Markup:
     if of.before == of.after:
         rows = [known, ("fitted", of.after, "after")]
     return panels(
-        panel(name_of(key), intervals(name_of(key), [(label, side.get(key), kind) for label, side, kind in rows]))
+        panel(
+            name_of(key),
+            intervals(name_of(key), [(label, side.get(key), kind) for label, side, kind in rows]),
+        )
         for key in of.prior
     )
 
@@ -238,7 +284,10 @@ def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Ma
     there = [(label, q, kind) for label, q, kind in rows if q is not None and np.isfinite(q.value)]
     ends = [q.value + s * _known(q.sigma) for _, q, _ in there for s in (-2.0, 2.0)]
     across = plot.Scale(*plot.limits(ends), 88.0, 212.0)
-    marks = [_interval(across, 14.0 + 24.0 * i, label, q, kind) for i, (label, q, kind) in enumerate(there)]
+    marks = [
+        _interval(across, 14.0 + 24.0 * i, label, q, kind)
+        for i, (label, q, kind) in enumerate(there)
+    ]
     said = "; ".join(f"{label} {quantity(q)}" for label, q, _ in there)
     return plot.picture(8.0 + 24.0 * len(there), f"{name}: {said}", *marks)
 

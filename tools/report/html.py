@@ -14,7 +14,9 @@ from typing import TypeAlias
 SHORT = 16  # letters that are never broken in a table
 VOID = frozenset(("meta", "br", "path", "line", "rect", "circle"))
 # Controls, lone surrogates (from file names that are not UTF-8) and marks that turn the direction of writing.
-UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+UNPRINTABLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -29,7 +31,9 @@ Child: TypeAlias = "str | Iterable[Child] | None"
 
 def escape(text: str) -> Markup:
     """The text as it should be seen; what cannot be seen becomes U+FFFD."""
-    return text if isinstance(text, Markup) else Markup(html.escape(UNPRINTABLE.sub("\ufffd", text)))
+    return (
+        text if isinstance(text, Markup) else Markup(html.escape(UNPRINTABLE.sub("\ufffd", text)))
+    )
 
 
 def join(*children: Child) -> Markup:
@@ -50,14 +54,18 @@ def tag(name: str, /, *children: Child, **attributes: str | float | None) -> Mar
         for key, value in attributes.items()
         if value is not None
     )
-    return Markup(f"<{name}{said}/>" if name in VOID else f"<{name}{said}>{join(*children)}</{name}>")
+    return Markup(
+        f"<{name}{said}/>" if name in VOID else f"<{name}{said}>{join(*children)}</{name}>"
+    )
 
 
 def _attribute(value: str | float) -> str:
     return escape(value) if isinstance(value, str) else f"{value:.2f}".rstrip("0").rstrip(".")
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int = 0, caption: str = "") -> Markup:
+def table(
+    head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int = 0, caption: str = ""
+) -> Markup:
     """A table whose first column names the row and whose columns from `numbers` (0: none) on are numbers.
 
     On a narrow screen each row becomes a block, every cell under the name of its column.
@@ -68,7 +76,11 @@ def table(head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int 
         if 0 < numbers <= at:
             return "number"
         return (
-            "short" if isinstance(content, str) and not isinstance(content, Markup) and len(content) <= SHORT else None
+            "short"
+            if isinstance(content, str)
+            and not isinstance(content, Markup)
+            and len(content) <= SHORT
+            else None
         )
 
     def cell(at: int, content: Child) -> Markup:
@@ -89,7 +101,7 @@ def section(title: str, *content: Child) -> Markup:
 
 def page(title: str, *body: Child) -> str:
     """The whole document, style included."""
-    style = resources.files("tools.report").joinpath("style.css").read_text(encoding="utf-8")
+    style = resources.files("gritd.tools.report").joinpath("style.css").read_text(encoding="utf-8")
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -99,4 +111,6 @@ def page(title: str, *body: Child) -> str:
         tag("title", title),
         tag("style", Markup(style)),
     )
-    return "<!DOCTYPE html>\n" + tag("html", head, tag("body", tag("main", *body)), lang="en") + "\n"
+    return (
+        "<!DOCTYPE html>\n" + tag("html", head, tag("body", tag("main", *body)), lang="en") + "\n"
+    )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tools.diagnose.result import Diagnosis, Hypothesis
-from tools.report.html import Child, Markup, table, tag
-from tools.report.words import counted, held, listed, name_of, nats, number, percent
+from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis
+from gritd.tools.report.html import Child, Markup, table, tag
+from gritd.tools.report.words import counted, held, listed, name_of, nats, number, percent
 
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
@@ -24,7 +24,9 @@ def introduction(found: Diagnosis) -> str:
 def groups(of: Sequence[Hypothesis]) -> Markup:
     """Likely ones as bars, the rest in a folded table."""
     grouped = together(of)
-    likely = [g for g in grouped if g[0].accepted or max(h.probability for h in g) >= UNLIKELY][:MOST]
+    likely = [g for g in grouped if g[0].accepted or max(h.probability for h in g) >= UNLIKELY][
+        :MOST
+    ]
     rest = [h for g in grouped if g not in likely for h in g]
     return tag("div", (_group(g) for g in likely), _rest(rest, bool(likely)), class_="hypotheses")
 
@@ -35,7 +37,11 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
     groups: list[list[Hypothesis]] = []
     for h in of:
         near = {h.effect, *h.indistinguishable_from} & known
-        joined = [g for g in groups if any(o.effect in near or h.effect in o.indistinguishable_from for o in g)]
+        joined = [
+            g
+            for g in groups
+            if any(o.effect in near or h.effect in o.indistinguishable_from for o in g)
+        ]
         groups = [g for g in groups if g not in joined]
         groups.append([o for g in joined for o in g] + [h])
     order = {h.effect: (not h.accepted, i) for i, h in enumerate(of)}
@@ -50,15 +56,40 @@ def _group(group: Sequence[Hypothesis]) -> Markup:
     total = min(sum(h.probability for h in group), 1.0)
     said = f"Not told apart by these recordings; together {percent(total)}."
     bars = (_bar(h) for h in group)
-    return tag("div", tag("p", held(said), class_="apart"), bars, _separation(group), class_="group several")
+    return tag(
+        "div",
+        tag("p", held(said), class_="apart"),
+        bars,
+        _separation(group),
+        class_="group several",
+    )
 
 
 def _bar(h: Hypothesis) -> Markup:
     width = f"width:{100.0 * min(max(h.probability, 0.0), 1.0):.1f}%"
-    label = tag("p", tag("b", name_of(h.effect)), " accepted" if h.accepted else None, class_="effect")
-    value = tag("p", tag("b", percent(h.probability)), f" · gain {nats(h.heldout_gain_nats)}", class_="value")
-    track = tag("div", tag("div", style=width), class_="track accepted" if h.accepted else "track", aria_hidden="true")
-    return tag("div", label, value, track, tag("p", h.sentence, class_="note") if h.sentence else None, class_="bar")
+    label = tag(
+        "p", tag("b", name_of(h.effect)), " accepted" if h.accepted else None, class_="effect"
+    )
+    value = tag(
+        "p",
+        tag("b", percent(h.probability)),
+        f" · gain {nats(h.heldout_gain_nats)}",
+        class_="value",
+    )
+    track = tag(
+        "div",
+        tag("div", style=width),
+        class_="track accepted" if h.accepted else "track",
+        aria_hidden="true",
+    )
+    return tag(
+        "div",
+        label,
+        value,
+        track,
+        tag("p", h.sentence, class_="note") if h.sentence else None,
+        class_="bar",
+    )
 
 
 def _separation(group: Sequence[Hypothesis]) -> Child:
@@ -71,15 +102,23 @@ def _separation(group: Sequence[Hypothesis]) -> Child:
             if rival in inside and pair not in ways.setdefault(how, []):
                 ways[how].append(pair)
     items = (tag("li", f"{'; '.join(pairs)}: {how}") for how, pairs in ways.items())
-    return (tag("p", "What would tell them apart:", class_="note"), tag("ul", items, class_="note")) if ways else None
+    return (
+        (tag("p", "What would tell them apart:", class_="note"), tag("ul", items, class_="note"))
+        if ways
+        else None
+    )
 
 
 def _rest(of: Sequence[Hypothesis], others: bool) -> Child:
     if not of:
         return None
-    least = f", each below {percent(max(max(h.probability for h in of), UNLIKELY))}" if others else ""
+    least = (
+        f", each below {percent(max(max(h.probability for h in of), UNLIKELY))}" if others else ""
+    )
     summary = f"{counted(len(of), 'other effect' if others else 'effect')} tried{least}"
     rows = [(name_of(h.effect), percent(h.probability), number(h.heldout_gain_nats, 2)) for h in of]
     return tag(
-        "details", tag("summary", summary), table(("effect", "probability", "held-out gain [nats]"), rows, numbers=1)
+        "details",
+        tag("summary", summary),
+        table(("effect", "probability", "held-out gain [nats]"), rows, numbers=1),
     )

@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from estimator.terramechanics.soil import Array
-from tools.report.html import Child, Markup, tag
-from tools.report.words import fixed
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.report.html import Child, Markup, tag
+from gritd.tools.report.words import fixed
 
 W = 360.0  # [px] of every picture
 LEFT, RIGHT = 44.0, 8.0  # margins of the axes: room for tick labels
@@ -51,7 +51,14 @@ class Axes:
 
 def picture(height: float, label: str, *marks: Child) -> Markup:
     """The whole picture; `label` says in words what is to be seen."""
-    return tag("svg", tag("title", label), *marks, class_="plot", viewBox=f"0 0 {W:g} {height:g}", role="img")
+    return tag(
+        "svg",
+        tag("title", label),
+        *marks,
+        class_="plot",
+        viewBox=f"0 0 {W:g} {height:g}",
+        role="img",
+    )
 
 
 def axes(x: tuple[float, float], y: tuple[float, float], top: float, bottom: float) -> Axes:
@@ -59,7 +66,9 @@ def axes(x: tuple[float, float], y: tuple[float, float], top: float, bottom: flo
     return Axes(Scale(*x, LEFT, W - RIGHT), Scale(*y, bottom, top))
 
 
-def limits(*values: Array | Sequence[float], margin: float = 0.06, keep: float | None = None) -> tuple[float, float]:
+def limits(
+    *values: Array | Sequence[float], margin: float = 0.06, keep: float | None = None
+) -> tuple[float, float]:
     """Least and greatest finite value with a margin; `keep` is inside too. Never empty."""
     every = np.concatenate([np.ravel(np.asarray(v, dtype=float)) for v in values] or [np.zeros(0)])
     every = every[np.isfinite(every)]
@@ -87,7 +96,12 @@ def tick_labels(values: Sequence[float]) -> list[str]:
 
 
 def frame(
-    at: Axes, label: str, *, below: str | None = None, most: int = 5, names: Sequence[str] | None = None
+    at: Axes,
+    label: str,
+    *,
+    below: str | None = None,
+    most: int = 5,
+    names: Sequence[str] | None = None,
 ) -> Markup:
     """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None leaves it bare.
 
@@ -101,8 +115,14 @@ def frame(
         parts.append(text(at.x.start - 6, height + 3.5, said, "end"))
     parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
     if below is not None:
-        widths = ticks(at.x.low, at.x.high, 6) if names is None else [float(i) for i in range(len(names))]
-        for value, said in zip(widths, names if names is not None else tick_labels(widths), strict=True):
+        widths = (
+            ticks(at.x.low, at.x.high, 6)
+            if names is None
+            else [float(i) for i in range(len(names))]
+        )
+        for value, said in zip(
+            widths, names if names is not None else tick_labels(widths), strict=True
+        ):
             parts.append(text(float(at.x(value)), at.y.start + 14, said, "middle"))
         parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
     return tag("g", parts)
@@ -158,13 +178,24 @@ def dots(at: Axes, x: Array, y: Array, class_: str) -> Markup:
     """One path of round dots: a tenth of the size of as many circles."""
     good = np.isfinite(x) & np.isfinite(y)
     places = zip(at.x(x[good]).tolist(), at.y(y[good]).tolist(), strict=True)
-    return at.clipped(tag("path", class_=class_, d="".join(f"M{px:.1f} {py:.1f}h0" for px, py in places)))
+    return at.clipped(
+        tag("path", class_=class_, d="".join(f"M{px:.1f} {py:.1f}h0" for px, py in places))
+    )
 
 
 def band(at: Axes, low: float, high: float, class_: str = "band") -> Markup:
     """The height between two values, over the whole width."""
     top, bottom = float(at.y(high)), float(at.y(low))
-    return at.clipped(tag("rect", class_=class_, x=at.x.start, y=top, width=at.x.end - at.x.start, height=bottom - top))
+    return at.clipped(
+        tag(
+            "rect",
+            class_=class_,
+            x=at.x.start,
+            y=top,
+            width=at.x.end - at.x.start,
+            height=bottom - top,
+        )
+    )
 
 
 def stretches(at: Axes, x: Array, marked: Array, class_: str) -> Markup | None:
@@ -178,5 +209,7 @@ def stretches(at: Axes, x: Array, marked: Array, class_: str) -> Markup | None:
         left, right = float(place[start]), float(place[min(end, last)])
         if np.isfinite(left + right) and right > left:
             height = at.y.start - at.y.end
-            parts.append(tag("rect", class_=class_, x=left, y=at.y.end, width=right - left, height=height))
+            parts.append(
+                tag("rect", class_=class_, x=left, y=at.y.end, width=right - left, height=height)
+            )
     return at.clipped(*parts)

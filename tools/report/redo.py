@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tools.report.html import Child, Markup, table, tag
+from gritd.tools.report.html import Child, Markup, table, tag
 
 NAMES = {"sha256": "SHA-256"}
 
@@ -17,7 +17,9 @@ def content(redo: Mapping[str, Any]) -> list[Markup]:
     """The command line first, long texts last."""
     command = redo.get("command", "")
     others = {key: _records(key, value) for key, value in redo.items() if key != "command"}
-    short = {key: value for key, value in others.items() if not _tabular(value) and not _long(value)}
+    short = {
+        key: value for key, value in others.items() if not _tabular(value) and not _long(value)
+    }
     rows = [(_name(key), tag("span", _words(value), class_="code")) for key, value in short.items()]
     parts = [tag("pre", _command(command), class_="command")] if command else []
     parts += [_files(key, value) for key, value in others.items() if _tabular(value)]
@@ -27,7 +29,11 @@ def content(redo: Mapping[str, Any]) -> list[Markup]:
 
 def _records(key: str, value: Any) -> Any:
     """Files with nothing but their checksum become a table too."""
-    if key == "files" and isinstance(value, Mapping) and all(isinstance(v, str) for v in value.values()):
+    if (
+        key == "files"
+        and isinstance(value, Mapping)
+        and all(isinstance(v, str) for v in value.values())
+    ):
         return [{"file": name, "sha256": sha256} for name, sha256 in value.items()]
     return value
 
@@ -58,7 +64,10 @@ def _files(key: str, value: Any) -> Markup:
     named = isinstance(value, Mapping)
     records = [{key: name, **record} for name, record in value.items()] if named else list(value)
     columns = list(dict.fromkeys(column for record in records for column in record))
-    rows = [[tag("span", _words(record.get(column, "")), class_="code") for column in columns] for record in records]
+    rows = [
+        [tag("span", _words(record.get(column, "")), class_="code") for column in columns]
+        for record in records
+    ]
     return table([_name(column) for column in columns], rows)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from tools.diagnose.result import Diagnosis, Location, Quantity
-from tools.diagnose.wheel_rig import UNITS
-from tools.report.html import Markup, section, table, tag
-from tools.report.words import (
+from gritd.tools.diagnose.explain.result import Diagnosis, Location, Quantity
+from gritd.tools.diagnose.rig.wheel import UNITS
+from gritd.tools.report.html import Markup, section, table, tag
+from gritd.tools.report.words import (
     NOTHING,
     covariate_shown,
     listed,
@@ -41,7 +41,11 @@ def parameters(found: Diagnosis) -> Markup | None:
 
 def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """Calibration constants that are not zero by more than STRAYED of their uncertainty."""
-    return {name: q for name, q in nuisance.items() if q.sigma > 0.0 and abs(q.value) > STRAYED * q.sigma}
+    return {
+        name: q
+        for name, q in nuisance.items()
+        if q.sigma > 0.0 and abs(q.value) > STRAYED * q.sigma
+    }
 
 
 def location(found: Diagnosis) -> Markup | None:
@@ -71,7 +75,10 @@ def _changes(found: Diagnosis, place: Location) -> str:
         return listed([run_name(found, change) for change in place.changes])
     unit, factor = covariate_shown(place.covariate, UNITS.get(place.covariate, ""))
     return listed(
-        [spaced(change * factor, unit, 2 if abs(change * factor) < DECADE else 3) for change in place.changes]
+        [
+            spaced(change * factor, unit, 2 if abs(change * factor) < DECADE else 3)
+            for change in place.changes
+        ]
     )
 
 
@@ -89,7 +96,13 @@ def held_out(found: Diagnosis) -> Markup | None:
         return None
     innovations = fit.innovation_before is not None or fit.innovation_after is not None
     sides = ["without", "with"] if fit.before != fit.after else ["error"]
-    head = ["channel", *sides, "noise floor", f"{sides[-1]} ÷ floor", *(["innovations"] if innovations else [])]
+    head = [
+        "channel",
+        *sides,
+        "noise floor",
+        f"{sides[-1]} ÷ floor",
+        *(["innovations"] if innovations else []),
+    ]
     rows = []
     for channel, before in fit.before.items():
         after, floor = fit.after.get(channel), fit.noise_floor.get(channel)
@@ -100,12 +113,19 @@ def held_out(found: Diagnosis) -> Markup | None:
         rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
     notes = [tag("p", UNSEEN)]
     if innovations:
-        notes.append(tag("p", "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest."))
+        notes.append(
+            tag(
+                "p",
+                "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest.",
+            )
+        )
     if fit.innovation_note:
         notes.append(tag("p", fit.innovation_note))
     if found.remaining:
         notes.append(tag("p", sentence(named(found, found.remaining))))
-    return section("Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note"))
+    return section(
+        "Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note")
+    )
 
 
 def _innovation(found: Diagnosis, channel: str) -> str:

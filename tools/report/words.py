@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from tools.diagnose.result import SOIL, Quantity
+from gritd.tools.diagnose.explain.result import SOIL, Quantity
 
 NOTHING = "–"
 PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
@@ -42,7 +42,11 @@ def held(words: str) -> str:
 def sentence(words: str) -> str:
     """With a capital and a full stop."""
     words = held(words.strip())
-    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) or not words else ".")
+    return (
+        words[:1].upper()
+        + words[1:]
+        + ("" if words.endswith((".", "!", "?")) or not words else ".")
+    )
 
 
 def shown(unit: str) -> tuple[str, float]:
@@ -87,7 +91,11 @@ def quantity(q: Quantity | None) -> str:
         return NOTHING
     unit, factor = _unit_for(q)
     value, sigma = q.value * factor, q.sigma * factor
-    return f"{uncertain(value, sigma)} {unit}".rstrip() if unit != "°" else f"{uncertain(value, sigma)}°"
+    return (
+        f"{uncertain(value, sigma)} {unit}".rstrip()
+        if unit != "°"
+        else f"{uncertain(value, sigma)}°"
+    )
 
 
 def _unit_for(q: Quantity) -> tuple[str, float]:
@@ -137,7 +145,11 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 
 def nats(value: float | None) -> str:
     """Evidence: whole nats, tenths where they matter."""
-    return NOTHING if value is None or not math.isfinite(value) else f"{fixed(value, int(abs(value) < 10.0))} nats"
+    return (
+        NOTHING
+        if value is None or not math.isfinite(value)
+        else f"{fixed(value, int(abs(value) < 10.0))} nats"
+    )
 
 
 def counted(count: int, what: str) -> str:

@@ -1,4 +1,4 @@
-"""`python -m tools.proof.real`: the five proofs on real recordings, and what docs/proof.md says of them."""
+"""`python -m gritd.tools.proof.real`: the five proofs on real recordings, and what docs/proof.md says of them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,20 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from tools.cli import guarded
-from tools.command import DONE, FAILED, USAGE, CommandError, Parser
-from tools.proof.real import cmu, ding, emps, figure, mgst
-from tools.proof.real.bench import ROOT, Bench
-from tools.proof.real.page import page, section
-from tools.proof.real.proof import Finding, Proof
+from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.main import guarded
+from gritd.tools.proof.real import cmu, ding, emps, figure, mgst
+from gritd.tools.proof.real.bench import ROOT, Bench
+from gritd.tools.proof.real.page import page, section
+from gritd.tools.proof.real.proof import Finding, Proof
 
-PROOFS: tuple[Proof, ...] = (mgst.DRIVETRAIN, mgst.SIDE_WALL, cmu.GROUSERS, emps.FRICTION, ding.STRENGTH)
+PROOFS: tuple[Proof, ...] = (
+    mgst.DRIVETRAIN,
+    mgst.SIDE_WALL,
+    cmu.GROUSERS,
+    emps.FRICTION,
+    ding.STRENGTH,
+)
 DATA = ROOT.parent / "shared" / "real"
 DOCS, PAGE = ROOT / "docs", "proof.md"
 
@@ -32,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     for number, proof in enumerate(chosen, start=1):
         missing = arguments.data / proof.rig
         if not missing.is_dir():
-            print(f"{proof.title}: skipped, found no {missing}; docs/importing.md says where the data are")
+            print(
+                f"{proof.title}: skipped, found no {missing}; docs/importing.md says where the data are"
+            )
             continue
         try:
             _prove(proof, arguments.data, arguments.output, f"{number} of {len(chosen)}")
@@ -47,14 +55,18 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="gritd-proof-") as work, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        bench = Bench(data.resolve(), Path(work), lambda what: _step(f"{place}, {proof.name}: {what}", began))
+        bench = Bench(
+            data.resolve(), Path(work), lambda what: _step(f"{place}, {proof.name}: {what}", began)
+        )
         finding = proof.run(bench)
     seconds = time.monotonic() - began
     _tell(proof, finding, seconds)
     figure.draw(folder / f"proof-{proof.name}.png", finding.panels)
     target = folder / PAGE
     old = target.read_text(encoding="utf-8") if target.exists() else "# Proofs on real recordings\n"
-    target.write_text(page(old, proof.name, section(proof, finding, bench.commands, seconds)), encoding="utf-8")
+    target.write_text(
+        page(old, proof.name, section(proof, finding, bench.commands, seconds)), encoding="utf-8"
+    )
 
 
 def _step(what: str, began: float) -> None:
@@ -62,19 +74,30 @@ def _step(what: str, began: float) -> None:
 
 
 def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
-    print(f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, {seconds:.0f} s")
+    print(
+        f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, {seconds:.0f} s"
+    )
     for asked in finding.asked:
-        print(f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; found {asked.found}")
+        print(
+            f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; found {asked.found}"
+        )
 
 
 def _parser() -> Parser:
     parser = Parser(
-        prog="python -m tools.proof.real", description="Proofs of diagnose on other laboratories' recordings."
+        prog="python -m gritd.tools.proof.real",
+        description="Proofs of diagnose on other laboratories' recordings.",
     )
-    parser.add_argument("--data", type=_folder, default=DATA, metavar="DIR", help="the public files, a folder a rig")
+    parser.add_argument(
+        "--data", type=_folder, default=DATA, metavar="DIR", help="the public files, a folder a rig"
+    )
     names = [p.name for p in PROOFS]
-    parser.add_argument("--only", action="append", choices=names, metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--output", type=_folder, default=DOCS, metavar="DIR", help="where proof.md and figures go")
+    parser.add_argument(
+        "--only", action="append", choices=names, metavar="NAME", help=f"of {', '.join(names)}"
+    )
+    parser.add_argument(
+        "--output", type=_folder, default=DOCS, metavar="DIR", help="where proof.md and figures go"
+    )
     return parser
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tools.command import CommandError
+from gritd.tools.cli.command import CommandError
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -39,7 +39,9 @@ class Said:
     @property
     def group(self) -> set[str]:
         """Accepted effects, and what the diagnosis says it cannot tell from them."""
-        return {n for name, h in self.accepted.items() for n in (name, *h["indistinguishable_from"])}
+        return {
+            n for name, h in self.accepted.items() for n in (name, *h["indistinguishable_from"])
+        }
 
 
 @dataclass
@@ -76,15 +78,26 @@ class Bench:
         shown = (a.replace(f"{self.data}/", "").replace(f"{self.folder}/", "") for a in arguments)
         self.commands.append("gritd " + " ".join(shown))
         done = subprocess.run(
-            [sys.executable, "-m", "tools.cli", *arguments],
+            [sys.executable, "-m", "gritd", *arguments],
             cwd=self.folder, env=_environment(), capture_output=True, text=True, check=False,
         )  # fmt: skip
         if done.returncode:
-            raise CommandError(f"{self.commands[-1]}: exit {done.returncode}: {done.stderr.strip() or 'nothing said'}")
+            raise CommandError(
+                f"{self.commands[-1]}: exit {done.returncode}: {done.stderr.strip() or 'nothing said'}"
+            )
         return done.stdout
 
 
 def _environment() -> dict[str, str]:
     """Ours without what could tell, and one thread a process."""
-    kept = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "VIRTUAL_ENV")}
-    return kept | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONUTF8": "1"}
+    kept = {
+        k: v
+        for k, v in os.environ.items()
+        if k in ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "VIRTUAL_ENV")
+    }
+    return kept | {
+        "PYTHONPATH": str(ROOT),
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+        "PYTHONUTF8": "1",
+    }

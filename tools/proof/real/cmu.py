@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from estimator.terramechanics.soil import Array
-from tools.proof.real.bench import Bench, Said
-from tools.proof.real.judge import Judge, rms
-from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.judge import Judge, rms
+from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
 DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
 FIT, HELD = ("10", "20", "100"), ("12", "40")
@@ -23,23 +23,35 @@ TABLES = (
     "cmu/penetration",
 )
 YIELDS = 0.0125e-3  # [m/N] of the frame, pressed on a rigid stop
-DEPTH, FACTOR = 0.02, 1.5  # [m] at which the learnt modulus is compared with the plates', and how near it must be
-PLATE, DEPTHS = 0.060, (4.0, 25.0)  # [m] plate nearest to the wheel's width; [mm] over which the moduli are fitted
+DEPTH, FACTOR = (
+    0.02,
+    1.5,
+)  # [m] at which the learnt modulus is compared with the plates', and how near it must be
+PLATE, DEPTHS = (
+    0.060,
+    (4.0, 25.0),
+)  # [m] plate nearest to the wheel's width; [mm] over which the moduli are fitted
 
 
 def _run(bench: Bench) -> Finding:
     smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
-    first = bench.diagnosed(list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth")
+    first = bench.diagnosed(
+        list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth"
+    )
     learnt = bench.folder / "cmu-learnt.yaml"
     learnt.write_text(
-        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.found), encoding="utf-8"
+        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.found),
+        encoding="utf-8",
     )
     fit, held = (
-        bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES) / "grouser-table"
+        bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES)
+        / "grouser-table"
         for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
     )
     second = bench.diagnosed(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
-    seen, unseen = (_conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.found) for f in (fit, held))
+    seen, unseen = (
+        _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.found) for f in (fit, held)
+    )
     rows = [
         (label, f"{speed} mm/s", *(f"{unseen[channel][i, k]:.2f}" for i in (1, 2, 3)))
         for channel, (label, _) in CHANNELS.items() for k, speed in enumerate(HELD)
@@ -47,11 +59,16 @@ def _run(bench: Bench) -> Finding:
     heads = ("held-out state", "rim speed", "measured", "as if smooth", "with what was found")
     labels = ("measured", "as if smooth", "with what was found; the states between were not seen")
     panels = [
-        Panel(label, _sorted(np.hstack((seen[c], unseen[c]))), "slip [–]", label, labels, points=True)
+        Panel(
+            label, _sorted(np.hstack((seen[c], unseen[c]))), "slip [–]", label, labels, points=True
+        )
         for c, (label, _) in CHANNELS.items()
     ]
     return Finding(
-        [first, second], _asked(first, second, unseen, smooth / "penetration.csv"), Table(heads, rows), panels
+        [first, second],
+        _asked(first, second, unseen, smooth / "penetration.csv"),
+        Table(heads, rows),
+        panels,
     )
 
 
@@ -63,9 +80,16 @@ def with_soil(text: str, found: dict[str, Any]) -> str:
     """A configuration with the soil that a diagnosis fitted, values and sigmas."""
     document = yaml.safe_load(text)
     after = found["soil"]["after"]
-    units = {"cohesion": ("c", "Pa"), "tan_phi": ("tan_phi", ""), "shear_modulus": ("k", "m"), "exponent": ("n", "")}
+    units = {
+        "cohesion": ("c", "Pa"),
+        "tan_phi": ("tan_phi", ""),
+        "shear_modulus": ("k", "m"),
+        "exponent": ("n", ""),
+    }
     for name, (symbol, unit) in units.items():
-        document["soil"][name] = {key: _written(after[symbol][key], unit) for key in ("value", "sigma")}
+        document["soil"][name] = {
+            key: _written(after[symbol][key], unit) for key in ("value", "sigma")
+        }
     modulus = after["K"]
     document["soil"]["k_c"] = "0 kN/m^(n+1)"
     document["soil"]["k_phi"] = f"{modulus['value'] / 1e3:.6g} kN/m^(n+2)"
@@ -79,10 +103,16 @@ def _written(value: float, unit: str) -> Any:
 
 def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
     """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of each channel."""
-    models = ([run.measured for run in judge.rig.runs], judge.predicted(None), judge.predicted(found))
+    models = (
+        [run.measured for run in judge.rig.runs],
+        judge.predicted(None),
+        judge.predicted(found),
+    )
     out = {}
     for channel, (_, factor) in CHANNELS.items():
-        out[channel] = judge.means(channel, judge.covariate("slip"), *([run[channel] for run in m] for m in models))
+        out[channel] = judge.means(
+            channel, judge.covariate("slip"), *([run[channel] for run in m] for m in models)
+        )
         out[channel][1:] *= factor
     return out
 
@@ -95,11 +125,17 @@ def moduli(path: Path) -> tuple[float, float]:
     """Exponent n and modulus [Pa/mⁿ] by least squares on the logarithms, the frame's yielding taken off the depth."""
     body = f"plate {PLATE * 1e3:.0f} mm"
     with path.open(encoding="utf-8") as stream:
-        rows = [(float(r["depth_mm"]), float(r["force_N"])) for r in csv.DictReader(stream) if r["body"] == body]
+        rows = [
+            (float(r["depth_mm"]), float(r["force_N"]))
+            for r in csv.DictReader(stream)
+            if r["body"] == body
+        ]
     depth, force = np.array(rows).T
     depth = depth - 1e3 * YIELDS * force
     inside = (depth > DEPTHS[0]) & (depth < DEPTHS[1])
-    n, log_k = np.polyfit(np.log(depth[inside] * 1e-3), np.log(force[inside] / (np.pi * (0.5 * PLATE) ** 2)), 1)
+    n, log_k = np.polyfit(
+        np.log(depth[inside] * 1e-3), np.log(force[inside] / (np.pi * (0.5 * PLATE) ** 2)), 1
+    )
     return float(n), float(np.exp(log_k))
 
 
@@ -110,7 +146,13 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
     named = "Does it name grousers, or a group that holds them?"
     asked = [
         _of_modulus(first, pressed),
-        Asked(differ, "drawbar_pull, sinkage", listed(channels), set(CHANNELS) <= set(channels), REASON),
+        Asked(
+            differ,
+            "drawbar_pull, sinkage",
+            listed(channels),
+            set(CHANNELS) <= set(channels),
+            REASON,
+        ),
         Asked(named, "grousers", group, "grousers" in second.group, REASON),
         _of_frame(first, second),
     ]
@@ -119,7 +161,13 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
         worse, better = rms(before - measured), rms(after - measured)
         question = f"Is the {label} of unseen states predicted better?"
         asked.append(
-            Asked(question, "error halved", f"{worse:.2f} before, {better:.2f} after", better < 0.5 * worse, REASON)
+            Asked(
+                question,
+                "error halved",
+                f"{worse:.2f} before, {better:.2f} after",
+                better < 0.5 * worse,
+                REASON,
+            )
         )
     return asked
 

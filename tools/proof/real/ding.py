@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.terramechanics.soil import Array
-from tools.proof.real.bench import Bench, Said
-from tools.proof.real.judge import Judge, rms
-from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.judge import Judge, rms
+from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
 COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
 CHANNELS = {
@@ -44,8 +44,15 @@ def _run(bench: Bench) -> Finding:
 
 def _table(columns: list[Array]) -> Table:
     """Every point as measured, by the published soil, by the fitted one, and with effects; then the errors."""
-    rows = [[f"{slip:.0%}", *(_four(c[1:, k]) for c in columns)] for k, slip in enumerate(columns[0][0])]
-    rows.append(["r.m.s. error", *(_four(np.array([0.0, *(rms(m - c[1]) for m in c[2:])])) for c in columns)])
+    rows = [
+        [f"{slip:.0%}", *(_four(c[1:, k]) for c in columns)] for k, slip in enumerate(columns[0][0])
+    ]
+    rows.append(
+        [
+            "r.m.s. error",
+            *(_four(np.array([0.0, *(rms(m - c[1]) for m in c[2:])])) for c in columns),
+        ]
+    )
     four = "measured / soil as published / as fitted, no effect / with what was found"
     return Table((f"slip; {four}", *(label for label, _ in CHANNELS.values())), rows)
 
@@ -65,7 +72,13 @@ def _asked(said: Said) -> list[Asked]:
     found = listed(said.accepted) or said.found["verdict"]
     return [
         Asked("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
-        Asked("Is the measured friction angle within two sigma?", f"{FRICTION:g}°", angle, near[1], REASON),
+        Asked(
+            "Is the measured friction angle within two sigma?",
+            f"{FRICTION:g}°",
+            angle,
+            near[1],
+            REASON,
+        ),
         Asked(grows, "slip_sinkage", found, "slip_sinkage" in said.group),
     ]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from estimator import config
-from estimator.recording import salvage
-from estimator.terramechanics.soil import Array
-from tools.proof.real.bench import Bench, Said
-from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.estimator.config import configuration as config
+from gritd.estimator.recording import salvage
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
 PUBLISHED = {"M": (95.11, "kg"), "Fv": (203.5, "N·s/m"), "Fc": (20.39, "N")}
 WITHIN = 0.03
@@ -26,10 +26,17 @@ def _run(bench: Bench) -> Finding:
     folder = bench.imported("emps", "emps", files=["emps"])
     said = bench.diagnosed([folder / "data-emps.mcap"], folder / "emps.yaml", "emps-data")
     fitted, unseen = (_regression(folder / f"data-emps{name}.mcap") for name in ("", "-pulses"))
-    bare = np.append(np.linalg.lstsq(fitted.columns[:, :2], fitted.force, rcond=None)[0], (0.0, 0.0))
+    bare = np.append(
+        np.linalg.lstsq(fitted.columns[:, :2], fitted.force, rcond=None)[0], (0.0, 0.0)
+    )
     found = stated(said)
     rows = [
-        (name, *(f"{c:.2f}" for c in model), f"{fitted.error(model):.2%}", f"{unseen.error(model):.2%}")
+        (
+            name,
+            *(f"{c:.2f}" for c in model),
+            f"{fitted.error(model):.2%}",
+            f"{unseen.error(model):.2%}",
+        )
         for name, model in (
             ("inertia and viscous friction", bare),
             ("with what was found", found),
@@ -38,11 +45,23 @@ def _run(bench: Bench) -> Finding:
         )
     ]
     rows.append(("published", *(f"{v:.2f}" for v, _ in PUBLISHED.values()), "", "", ""))
-    heads = ("model", "M [kg]", "Fv [N·s/m]", "Fc [N]", "offset [N]", "error, DATA_EMPS", "error, DATA_EMPS_PULSES")
+    heads = (
+        "model",
+        "M [kg]",
+        "Fv [N·s/m]",
+        "Fc [N]",
+        "offset [N]",
+        "error, DATA_EMPS",
+        "error, DATA_EMPS_PULSES",
+    )
     shown = (unseen.time >= SPAN[0]) & (unseen.time <= SPAN[1])
-    curves = np.stack((unseen.time, unseen.force, unseen.columns @ bare, unseen.columns @ found))[:, shown]
+    curves = np.stack((unseen.time, unseen.force, unseen.columns @ bare, unseen.columns @ found))[
+        :, shown
+    ]
     labels = ("measured", "inertia and viscous friction", "with what was found")
-    panel = Panel("DATA_EMPS_PULSES, which the diagnosis did not see", curves, "time [s]", "force [N]", labels)
+    panel = Panel(
+        "DATA_EMPS_PULSES, which the diagnosis did not see", curves, "time [s]", "force [N]", labels
+    )
     asked = _asked(said, found, unseen.error(bare), unseen.error(found))
     return Finding([said], asked, Table(heads, rows), [panel])
 
@@ -72,7 +91,9 @@ def _regression(path: Path) -> Regression:
     count = settings.channels["wheel_encoder"].calibration.scale.value
     position = _low_passed(counts["count"] * count, POSITION)
     speed = np.gradient(position, 1.0 / RATE)
-    columns = np.column_stack((np.gradient(speed, 1.0 / RATE), speed, np.sign(speed), np.ones_like(speed)))
+    columns = np.column_stack(
+        (np.gradient(speed, 1.0 / RATE), speed, np.sign(speed), np.ones_like(speed))
+    )
     force = volts["volts"] * settings.drive.torque_constant.value
     kept = slice(None, None, EVERY)
     return Regression(
@@ -88,12 +109,16 @@ def _low_passed(values: Array, cutoff: float) -> Array:
 
 def stated(said: Said) -> Array:
     """Mass, viscous friction, Coulomb friction and offset (4,) that the diagnosis states; 0 where it states none."""
-    gain = config.loads(said.found["redo"]["configuration"], "emps.yaml").settings.drive.torque_constant.value
+    gain = config.loads(
+        said.found["redo"]["configuration"], "emps.yaml"
+    ).settings.drive.torque_constant.value
     constants = said.found["nuisance"]
     asymmetry = said.values("asymmetric_friction").get("difference", 0.0)
     offset = gain * said.values("current_offset").get("offset", 0.0)
     coulomb = said.values("coulomb_friction").get("loss", 0.0)
-    return np.array([constants["inertia"]["value"], constants["damping"]["value"], coulomb, asymmetry + offset])
+    return np.array(
+        [constants["inertia"]["value"], constants["damping"]["value"], coulomb, asymmetry + offset]
+    )
 
 
 def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]:
@@ -101,7 +126,12 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
     group = listed(sorted(said.group)) or "nothing"
     remains = said.found["remaining"]
     asked = [
-        Asked("Which friction does it name first?", "coulomb_friction", first, first == "coulomb_friction"),
+        Asked(
+            "Which friction does it name first?",
+            "coulomb_friction",
+            first,
+            first == "coulomb_friction",
+        ),
         Asked(
             "Does it name the asymmetry, or a group that holds it?",
             "asymmetric_friction",
@@ -113,8 +143,12 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
     for (name, (value, unit)), estimate in zip(PUBLISHED.items(), found.tolist(), strict=False):
         off = estimate / value - 1.0
         shown = f"{estimate:.2f} {unit} ({off:+.1%})"
-        asked.append(Asked(f"{name}?", f"{value} {unit} ± {WITHIN:.0%}", shown, abs(off) <= WITHIN, REASON))
-    asked.append(Asked("Does it say that something remains?", "yes", remains, "something remains" in remains))
+        asked.append(
+            Asked(f"{name}?", f"{value} {unit} ± {WITHIN:.0%}", shown, abs(off) <= WITHIN, REASON)
+        )
+    asked.append(
+        Asked("Does it say that something remains?", "yes", remains, "something remains" in remains)
+    )
     question = "Is the force of the unseen log predicted better?"
     errors = f"{before:.2%} before, {after:.2%} after"
     asked.append(Asked(question, "error more than halved", errors, after < 0.5 * before))

@@ -8,8 +8,8 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tools.figure import plain
-from tools.proof.real.proof import Panel
+from gritd.tools.proof.real.proof import Panel
+from gritd.tools.report.figure import plain
 
 WIDE, LEAST, HIGH, DPI = 4.2, 8.4, 2.9, 80  # [in] of a panel, of a drawing at least; [1/in]
 COLOURS = ("#111111", "#c1121f", "#00798c")

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from estimator import config
-from estimator.effects import make
-from estimator.effects.base import Effect
-from estimator.settings import Settings
-from estimator.terramechanics.soil import Array
-from tools.diagnose.load import read_all, signals
-from tools.diagnose.rig import Known
-from tools.diagnose.wheel_rig import WheelRig
-from tools.importers._segments import DURATION, PAUSE
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Known
+from gritd.tools.diagnose.rig.signals import read_all, signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.importers._segments import DURATION, PAUSE
 
 RATE = 10.0  # [Hz]
 RIG_STAGES = ("testbed", "drivetrain", "sensor")  # what stands between soil and reading
@@ -30,7 +30,9 @@ class Judge:
 
     def __init__(self, recordings: Sequence[Path], configuration: Path) -> None:
         self.settings: Settings = config.load(configuration).settings
-        self.rig = WheelRig([signals(r, self.settings, RATE) for r in read_all(sorted(recordings))], self.settings)
+        self.rig = WheelRig(
+            [signals(r, self.settings, RATE) for r in read_all(sorted(recordings))], self.settings
+        )
 
     def time(self, run: int) -> Array:
         return np.asarray(self.rig.runs[run].time - self.rig.runs[run].time[0])
@@ -38,13 +40,17 @@ class Judge:
     def measured(self, run: int, channel: str) -> Array:
         return np.asarray(self.rig.runs[run].measured[channel])
 
-    def predicted(self, found: dict[str, Any] | None, when: str = "after") -> list[dict[str, Array]]:
+    def predicted(
+        self, found: dict[str, Any] | None, when: str = "after"
+    ) -> list[dict[str, Array]]:
         """Every channel of every run: by the configuration alone (None), 'before' with the soil fitted without effects,
         'after' with both.
         """
         if found is None:
             return self.rig.predict(np.zeros(len(self.rig.constants)), ())
-        return self.rig.predict(self._constants(found, when), effects(found) if when == "after" else ())
+        return self.rig.predict(
+            self._constants(found, when), effects(found) if when == "after" else ()
+        )
 
     def freed(self, found: dict[str, Any], channel: str) -> list[Array]:
         """A channel of every run less what the accepted effects of the rig, and its calibration, put on it."""
@@ -52,10 +58,16 @@ class Judge:
         acting = effects(found)
         ideal = [e for e in acting if e.stage not in RIG_STAGES]
         plain = np.array(
-            [0.0 if k.name.startswith(f"{channel}_") else x for k, x in zip(self.rig.constants, u, strict=True)]
+            [
+                0.0 if k.name.startswith(f"{channel}_") else x
+                for k, x in zip(self.rig.constants, u, strict=True)
+            ]
         )
         added = zip(self.rig.predict(u, acting), self.rig.predict(plain, ideal), strict=True)
-        return [self.measured(n, channel) - (real[channel] - bare[channel]) for n, (real, bare) in enumerate(added)]
+        return [
+            self.measured(n, channel) - (real[channel] - bare[channel])
+            for n, (real, bare) in enumerate(added)
+        ]
 
     def means(self, channel: str, *series: Sequence[Array]) -> Array:
         """Means (rows, conditions) of series of every run over each steady state, where the channel counts."""
@@ -63,7 +75,10 @@ class Judge:
         for n, run in enumerate(self.rig.runs):
             number = np.floor((self.time(n) + 0.5 * PAUSE) / (DURATION + PAUSE))
             inside = run.used[channel]
-            parts += [[np.nanmean(s[n][inside & (number == k)]) for s in series] for k in np.unique(number[inside])]
+            parts += [
+                [np.nanmean(s[n][inside & (number == k)]) for s in series]
+                for k in np.unique(number[inside])
+            ]
         return np.array(parts).T
 
     def covariate(self, name: str) -> list[Array]:
@@ -73,7 +88,12 @@ class Judge:
         """In prior σ; what the result does not state stays at its prior mean."""
         soil = (found["soil"] or {}).get(when, {})
         stated = {**(found["nuisance"] if when == "after" else {}), **soil}
-        return np.array([_strain(k, stated[k.name]["value"]) if k.name in stated else 0.0 for k in self.rig.constants])
+        return np.array(
+            [
+                _strain(k, stated[k.name]["value"]) if k.name in stated else 0.0
+                for k in self.rig.constants
+            ]
+        )
 
 
 def effects(found: dict[str, Any]) -> tuple[Effect, ...]:

@@ -9,18 +9,31 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.terramechanics.soil import Array
-from tools.proof.real.bench import Bench, Said
-from tools.proof.real.judge import Judge, rms
-from tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.judge import Judge, rms
+from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
 
-BEGIN = ("--begin", "3")  # [s] from which the importer's own table takes means: the start is no steady driving
-FOLDS = ((0, 3), (1, 4), (2, 5))  # a trial of 20 % and one of 70 % slip, judged by what the other four said
+BEGIN = (
+    "--begin",
+    "3",
+)  # [s] from which the importer's own table takes means: the start is no steady driving
+FOLDS = (
+    (0, 3),
+    (1, 4),
+    (2, 5),
+)  # a trial of 20 % and one of 70 % slip, judged by what the other four said
 DRAWN = (0, 3)
 LABELS = ("concealed", "as read", "freed, trial held out")
 LOSS, LOSS_ABOUT = 1.8, 0.5  # [N·m] that the drivetrain takes, by the concealed sensor
 WALL, WALL_ABOUT = 33.0, 8.0  # [N] that the side wall takes, by the authors' correction
-STEADY_LOSSES = ("coulomb_friction", "viscous_friction", "current_offset", "asymmetric_friction", "stribeck_friction")
+STEADY_LOSSES = (
+    "coulomb_friction",
+    "viscous_friction",
+    "current_offset",
+    "asymmetric_friction",
+    "stribeck_friction",
+)
 DRAGS = ("side_wall_rubbing", "bed_slope", "force_crosstalk")
 
 
@@ -56,12 +69,26 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
     whole = bench.imported("mgst", "judge", *BEGIN, files=["mgst"])
     trials = sorted(seen.glob("*.mcap"))
     said = bench.diagnosed(trials, seen / "mgst.yaml", f"{hidden.name}-all")
-    held = sorted((h for fold in FOLDS for h in _held(hidden, bench, trials, fold, whole)), key=lambda h: h.trial)
+    held = sorted(
+        (h for fold in FOLDS for h in _held(hidden, bench, trials, fold, whole)),
+        key=lambda h: h.trial,
+    )
     rows = [
-        (h.trial, *(f"{np.nanmean(v):.2f}" for v in (h.true, h.read, h.freed)), *(f"{e:.2f}" for e in h.errors))
+        (
+            h.trial,
+            *(f"{np.nanmean(v):.2f}" for v in (h.true, h.read, h.freed)),
+            *(f"{e:.2f}" for e in h.errors),
+        )
         for h in held
     ]
-    heads = ("trial", f"concealed [{hidden.unit}]", "as read", "freed", "error before", "error after")
+    heads = (
+        "trial",
+        f"concealed [{hidden.unit}]",
+        "as read",
+        "freed",
+        "error before",
+        "error after",
+    )
     label = f"{hidden.read.replace('_', ' ')} [{hidden.unit}]"
     panels = [
         Panel(h.trial, np.stack((h.time, h.true, h.read, h.freed)), "time [s]", label, LABELS)
@@ -70,28 +97,48 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
     return Finding([said], hidden.ask(said, held), Table(heads, rows), panels)
 
 
-def _held(hidden: Hidden, bench: Bench, trials: Sequence[Path], fold: Sequence[int], whole: Path) -> list[Held]:
+def _held(
+    hidden: Hidden, bench: Bench, trials: Sequence[Path], fold: Sequence[int], whole: Path
+) -> list[Held]:
     configuration = trials[0].parent / "mgst.yaml"
     others = [t for n, t in enumerate(trials) if n not in fold]
-    said = bench.diagnosed(others, configuration, f"{hidden.name}-without-{'-'.join(str(n + 1) for n in fold)}")
+    said = bench.diagnosed(
+        others, configuration, f"{hidden.name}-without-{'-'.join(str(n + 1) for n in fold)}"
+    )
     here = [trials[n] for n in fold]
-    reads, judge = Judge(here, configuration), Judge([whole / t.name for t in here], whole / "mgst.yaml")
+    reads, judge = (
+        Judge(here, configuration),
+        Judge([whole / t.name for t in here], whole / "mgst.yaml"),
+    )
     freed = reads.freed(said.found, hidden.read)
     return [
-        Held(t.stem, judge.time(n), judge.measured(n, hidden.true), reads.measured(n, hidden.read), freed[n])
+        Held(
+            t.stem,
+            judge.time(n),
+            judge.measured(n, hidden.true),
+            reads.measured(n, hidden.read),
+            freed[n],
+        )
         for n, t in enumerate(here)
     ]
 
 
 def _differs(said: Said, channel: str) -> Asked:
     channels = dict.fromkeys(place["channel"] for place in said.found["location"])
-    return Asked(f"Is {channel} among the channels that differ?", channel, listed(channels), channel in channels)
+    return Asked(
+        f"Is {channel} among the channels that differ?",
+        channel,
+        listed(channels),
+        channel in channels,
+    )
 
 
 def _names(said: Said, what: str, wanted: Sequence[str], reason: str) -> Asked:
     found = listed(said.accepted) or said.found["verdict"]
     question = f"Does it name {what}, or a group that holds one?"
-    return Asked(question, f"one of {listed(wanted)}", found, bool(said.group & set(wanted)), reason)
+    return Asked(
+        question, f"one of {listed(wanted)}", found, bool(said.group & set(wanted)), reason
+    )
 
 
 def _nearer(said: Said, held: Sequence[Held], unit: str) -> Asked:
@@ -102,15 +149,23 @@ def _nearer(said: Said, held: Sequence[Held], unit: str) -> Asked:
         f"in all {len(held)}, error more than halved",
         f"in {better}; error {before:.2f} {unit} before, {after:.2f} after",
         better == len(held) and after < 0.5 * before,
-        "" if said.accepted else "No effect was accepted, so only the strain of the channel's calibration frees it.",
+        ""
+        if said.accepted
+        else "No effect was accepted, so only the strain of the channel's calibration frees it.",
     )
 
 
 # ---- the drivetrain ------------------------------------------------------------------------------------------------
 
-SPEED, TORQUE, CONSTANT = 0.462, 7.9, 6.2  # [rad/s]; [N·m] of the motor, between 20 and 70 % slip; [N·m/A]
+SPEED, TORQUE, CONSTANT = (
+    0.462,
+    7.9,
+    6.2,
+)  # [rad/s]; [N·m] of the motor, between 20 and 70 % slip; [N·m/A]
 Values = Mapping[str, float]
-LOST: Mapping[str, Callable[[Values], float]] = {  # [N·m] that an effect takes at this speed and torque
+LOST: Mapping[
+    str, Callable[[Values], float]
+] = {  # [N·m] that an effect takes at this speed and torque
     "coulomb_friction": lambda p: p["loss"],
     "viscous_friction": lambda p: p["damping"] * SPEED,
     "current_offset": lambda p: p["offset"] * CONSTANT,
@@ -127,7 +182,13 @@ def _of_drivetrain(said: Said, held: Sequence[Held]) -> list[Asked]:
     return [
         _differs(said, "torque"),
         _names(said, "a torque loss that does not depend on speed", STEADY_LOSSES, REASON_LOSS),
-        Asked("How large is it?", f"{LOSS} ± {LOSS_ABOUT} N·m", found, abs(loss - LOSS) <= LOSS_ABOUT, REASON_LOSS),
+        Asked(
+            "How large is it?",
+            f"{LOSS} ± {LOSS_ABOUT} N·m",
+            found,
+            abs(loss - LOSS) <= LOSS_ABOUT,
+            REASON_LOSS,
+        ),
         _nearer(said, held, "N·m"),
     ]
 
@@ -174,7 +235,13 @@ def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:
     return [
         _differs(said, "drawbar_pull"),
         _names(said, "the wall's drag", DRAGS, REASON_WALL),
-        Asked(question, f"{WALL:g} ± {WALL_ABOUT:g} N", f"{taken:.1f} N", abs(taken - WALL) <= WALL_ABOUT, REASON_WALL),
+        Asked(
+            question,
+            f"{WALL:g} ± {WALL_ABOUT:g} N",
+            f"{taken:.1f} N",
+            abs(taken - WALL) <= WALL_ABOUT,
+            REASON_WALL,
+        ),
         _nearer(said, held, "N"),
     ]
 

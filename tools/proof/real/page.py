@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from tools.proof.real.proof import Asked, Finding, Proof, Table
+from gritd.tools.proof.real.proof import Asked, Finding, Proof, Table
 
 BEGIN = "<!-- {name}: from here on written by `make proof` -->\n"
 END = "<!-- {name}: to here -->\n"
@@ -23,7 +23,9 @@ def section(proof: Proof, finding: Finding, commands: Sequence[str], seconds: fl
     return "\n".join(_lines(proof, finding, commands, seconds))
 
 
-def _lines(proof: Proof, finding: Finding, commands: Sequence[str], seconds: float) -> Iterator[str]:
+def _lines(
+    proof: Proof, finding: Finding, commands: Sequence[str], seconds: float
+) -> Iterator[str]:
     yield f"### {proof.title}"
     yield ""
     yield f"**Concealed.** {flowing(proof.concealed)}"
@@ -58,9 +60,13 @@ def _missed(asked: Sequence[Asked]) -> Iterator[str]:
     """Each reason once, after the questions it stands for."""
     reasons: dict[str, list[str]] = {}
     for a in asked:
-        reasons.setdefault(flowing(a.reason) or "The reason was not found.", []).append(f"*{a.question}*")
+        reasons.setdefault(flowing(a.reason) or "The reason was not found.", []).append(
+            f"*{a.question}*"
+        )
     if reasons:
-        yield "**Missed.** " + " ".join(f"{' '.join(questions)} {why}" for why, questions in reasons.items())
+        yield "**Missed.** " + " ".join(
+            f"{' '.join(questions)} {why}" for why, questions in reasons.items()
+        )
         yield ""
 
 

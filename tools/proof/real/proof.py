@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from estimator.terramechanics.soil import Array
-from tools.proof.real.bench import Bench, Said
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.proof.real.bench import Bench, Said
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,55 @@
+"""The configuration file: strict YAML to `Settings`, with the effective text that is saved beside every run.
+
+An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in table.py.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from gritd.estimator.config.effects import quantities
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.config.table import EffectSchema, table
+from gritd.estimator.config.yamltree import ConfigError, compose, read_text, serialise
+from gritd.estimator.recording.run import RunInfo
+
+__all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text"]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What a configuration file says.
+
+    settings: typed, SI.
+    text:     the effective YAML: every default filled in, units as written; loading it gives the same settings.
+    source:   the file's name, for messages.
+    run:      the `run` section, with its defaults where the file has none.
+    """
+
+    settings: Settings
+    text: str
+    source: str
+    run: RunInfo = field(default_factory=RunInfo)
+
+
+def load(
+    path: str | os.PathLike[str], effect_schema: EffectSchema | None = quantities
+) -> Configuration:
+    """Read a configuration file; a relative DBC path counts from its folder. Raises ConfigError."""
+    return loads(read_text(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
+
+
+def loads(
+    text: str,
+    name: str,
+    folder: Path | None = None,
+    effect_schema: EffectSchema | None = quantities,
+) -> Configuration:
+    """Read configuration text; `name` stands in messages. Without a folder a relative DBC path stays as it is.
+
+    Raises ConfigError.
+    """
+    (settings, run), complete = table(folder, effect_schema).read(compose(text, name))
+    return Configuration(settings, serialise(complete), name, run)

@@ -1,0 +1,64 @@
+"""The library of effects: physics that may be at work on a testbed and that Eqs. (1)-(10) leave out.
+
+Each module of this package but `base` and this one defines one Effect; the file's name is the effect's name. `EFFECTS` finds them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+
+from gritd.estimator.effects.base import STAGES, Effect
+
+SHARED = ("base", "library")  # modules of this package that are no effect
+
+
+def _find() -> dict[str, type[Effect]]:
+    found = {}
+    folder = str(Path(__file__).parent)
+    for module in sorted(m.name for m in pkgutil.iter_modules([folder]) if m.name not in SHARED):
+        members = vars(importlib.import_module(f"{__package__}.{module}")).values()
+        own = [
+            m
+            for m in members
+            if isinstance(m, type) and issubclass(m, Effect) and m.__module__.endswith("." + module)
+        ]
+        if len(own) != 1:
+            raise TypeError(
+                f"estimator/effects/{module}.py: expected one subclass of Effect, found {len(own)}"
+            )
+        found[module] = own[0]
+    return found
+
+
+def make(name: str, values: Mapping[str, float]) -> Effect:
+    """The effect of this name; parameters not given keep their default. ValueError names what does not exist."""
+    if name not in EFFECTS:
+        raise ValueError(f"effects: no effect '{name}'; there are {', '.join(EFFECTS)}")
+    effect = EFFECTS[name]
+    known = {parameter.name: parameter for parameter in effect.parameters()}
+    for key, value in values.items():
+        if key not in known:
+            raise ValueError(f"effects.{name}: no parameter '{key}'; there are {', '.join(known)}")
+        bounds = known[key]
+        if not bounds.low <= value <= bounds.high:
+            raise ValueError(
+                f"effects.{name}.{key}: {value:g} is outside {bounds.low:g} … {bounds.high:g} {bounds.unit}"
+            )
+    return effect(**values)
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Effects in the order in which they act, whatever order they are listed in."""
+    return tuple(
+        sorted(
+            effects,
+            key=lambda e: (STAGES.index(e.stage), e.name, *(getattr(e, f.name) for f in fields(e))),
+        )
+    )
+
+
+EFFECTS: dict[str, type[Effect]] = _find()

@@ -1,0 +1,179 @@
+"""The vertical balance: the entry angle θ₁ at which the soil of Eqs. (1)-(9) carries the load."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.stages.situation import ContactLaw
+from gritd.estimator.terramechanics.original import Forces, forces
+from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
+
+ORDER = 8  # nodes a zone: W, DP and T/r within 3e-7 of W when driving, 2e-5 down to 10 % braking (test_forward.py)
+TOLERANCE = 1e-9  # relative difference of W from the load at which θ₁ is accepted
+CHUNK = 1024  # samples solved together: their nodes stay in the processor's cache
+DEEPEST = 1.5  # [rad] a wheel sunk to its axle is bogged; θ₁ stops here and the sample is flagged
+TOP = np.log(DEEPEST)
+SHALLOWEST = 1e-5  # [rad] a lighter touch is no contact
+ROUNDS = 60
+
+
+Index = NDArray[np.intp]
+
+
+class Contact(NamedTuple):
+    """One set of samples: each field a float or an array (n,)."""
+
+    soil: Soil
+    law: ContactLaw
+    slip: Scalar
+    load: Scalar
+
+
+class Balance(NamedTuple):
+    theta_1: Array  # [rad]
+    forces: Forces  # at θ₁, each (n,)
+    overloaded: Array  # bool: the load exceeds what the soil carries; forces are those at DEEPEST
+
+
+def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER) -> Forces:
+    """Forces of Eqs. (8)-(10) under the contact law; θₘ and θ₂ keep their ratio to θ₁."""
+    soil, law = contact.soil, contact.law
+    return forces(
+        wheel,
+        replace(soil, cohesion=soil.cohesion * law.strength, tan_phi=soil.tan_phi * law.strength),
+        theta_1,
+        contact.slip,
+        theta_m=np.clip(law.theta_m_ratio, 0.0, 1.0) * theta_1,
+        theta_2=-law.theta_2_ratio * theta_1,
+        mobilisation=law.mobilisation,
+        order=order,
+    )
+
+
+def solve(
+    wheel: Wheel, contact: Contact, theta_1: Array | None = None, order: int = ORDER
+) -> Balance:
+    """θ₁ with W(θ₁) = load at every sample, and the forces there.
+
+    theta_1: (n,) a solution for nearby parameters, to start from.
+    """
+    load = np.asarray(contact.load, dtype=float)
+    parts = [slice(start, start + CHUNK) for start in range(0, load.size, CHUNK)]
+    solved = [
+        _solve_chunk(wheel, _take(contact, s), None if theta_1 is None else theta_1[s], order)
+        for s in parts
+    ]
+    joined = [np.concatenate([part[field] for part in solved]) for field in (0, 2)]
+    return Balance(
+        joined[0],
+        Forces(*map(np.concatenate, zip(*(part[1] for part in solved), strict=True))),
+        joined[1],
+    )
+
+
+def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int) -> Balance:
+    load = np.asarray(contact.load, dtype=float)
+    guess = bekker_entry_angle(wheel, contact.soil, load) if start is None else start
+    theta_1, overloaded = np.zeros(load.size), np.zeros(load.size, dtype=bool)
+    kept = np.zeros((len(Forces._fields), load.size))
+    touching = np.flatnonzero(load > 0.0)
+    if touching.size:
+        found = _iterate(
+            wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order
+        )
+        theta_1[touching], kept[:, touching], overloaded[touching] = found
+    return Balance(theta_1, Forces(*kept), overloaded)
+
+
+def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balance:
+    """Secant steps on ln W against ln θ₁, which is nearly straight with slope 2n + 1, kept inside a bracket."""
+    solution, overloaded = np.empty(guess.size), np.zeros(guess.size, dtype=bool)
+    kept = np.empty((len(Forces._fields), guess.size))
+    left = np.arange(guess.size)  # samples not yet solved
+    x = np.log(np.clip(guess, 10.0 * SHALLOWEST, DEEPEST))
+    slope = np.broadcast_to(2.0 * np.asarray(contact.soil.exponent) + 1.0, x.shape)
+    low, high = np.full(x.size, np.log(SHALLOWEST)), np.full(x.size, np.inf)
+    before = np.full((2, x.size), np.nan)  # the last x and its miss
+    for _ in range(ROUNDS):
+        forces = rim_forces(wheel, contact, np.exp(x), order)
+        miss = _miss(forces, contact)
+        slope = _slope(slope, x - before[0], miss - before[1])
+        low, high = np.where(miss < 0.0, x, low), np.where(miss > 0.0, x, high)
+        bogged = low >= TOP
+        solution[left], kept[:, left], overloaded[left] = x, forces, bogged & (miss < -TOLERANCE)
+        rest = np.flatnonzero((np.abs(miss) > TOLERANCE) & (high - low > 1e-15) & ~bogged)
+        if not rest.size:
+            break
+        before = np.stack((x[rest], miss[rest]))
+        x = _ahead(before[0] - before[1] / slope[rest], low[rest], high[rest])
+        left, contact, slope, low, high = (
+            left[rest],
+            _take(contact, rest),
+            slope[rest],
+            low[rest],
+            high[rest],
+        )
+    return Balance(np.exp(solution), Forces(*kept), overloaded)
+
+
+def _ahead(step: Array, low: Array, high: Array) -> Array:
+    """The step, no deeper than TOP; where it leaves the bracket, the middle of the bracket."""
+    step = np.minimum(step, TOP)
+    return np.where((step > low) & (step < high), step, 0.5 * (low + np.minimum(high, TOP)))
+
+
+def _miss(forces: Forces, contact: Contact) -> Array:
+    """ln(W/load); where the soil would pull the wheel down, a large negative number."""
+    miss: Array = np.log(np.maximum(forces.load / contact.load, 1e-30))
+    return miss
+
+
+def _slope(slope: Array, step: Array, change: Array) -> Array:
+    """Secant slope where it is defined and plausible, else the one before."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        secant = change / step
+    return np.where((secant > 0.2) & (secant < 20.0), secant, slope)
+
+
+def bekker_entry_angle(wheel: Wheel, soil: Soil, load: Array) -> Array:
+    """First guess of θ₁ [rad] without shear: z = [3W/((3 − n) b K √(2r))]^(2/(2n + 1)), Bekker (1969)."""
+    n = np.minimum(soil.exponent, 2.5)
+    carried = (3.0 - n) * wheel.width * np.asarray(soil.modulus) * np.sqrt(2.0 * wheel.radius)
+    sinkage = (3.0 * np.maximum(load, 0.0) / carried) ** (2.0 / (2.0 * n + 1.0))
+    angle: Array = np.arccos(np.clip(1.0 - sinkage / wheel.radius, np.cos(DEEPEST), 1.0))
+    return angle
+
+
+def _take(contact: Contact, index: slice | Index) -> Contact:
+    """The same contact at some of its samples; what is one float for all stays so."""
+    soil, law = contact.soil, contact.law
+    return Contact(
+        Soil(
+            *(
+                _at(v, index)
+                for v in (
+                    soil.cohesion,
+                    soil.tan_phi,
+                    soil.shear_modulus,
+                    soil.exponent,
+                    soil.modulus,
+                )
+            )
+        ),
+        ContactLaw(
+            _at(law.theta_m_ratio, index),
+            _at(law.theta_2_ratio, index),
+            _at(law.strength, index),
+            law.mobilisation,
+        ),
+        _at(contact.slip, index),
+        _at(contact.load, index),
+    )
+
+
+def _at(value: Scalar, index: slice | Index) -> Scalar:
+    return value[index] if isinstance(value, np.ndarray) and value.ndim else value

@@ -1,0 +1,215 @@
+"""The forward model: measured motion, load, soil and effects in; sinkage, forces, current and readings out.
+
+    motion → soil → contact → load → vertical balance → wheel → testbed → drivetrain → sensors
+
+Every stage starts from the paper's model and passes through the effects in turn; without effects it is the paper's.
+Arrays in, arrays out: all fields (n,), one run in order of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from gritd.estimator.effects import in_order
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model import balance
+from gritd.estimator.stages.situation import (
+    ContactLaw,
+    Motion,
+    Reaction,
+    Sensed,
+    Situation,
+    situation_of,
+)
+from gritd.estimator.terramechanics.original import Forces
+from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
+
+HEATING_ROUNDS = (
+    30  # at most; current and torque factor depend on each other and settle in a few rounds
+)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What the testbed does, each field (n,); `sensed` is what its channels read."""
+
+    slip: Array  # true i [-]
+    theta_1: Array  # [rad]
+    overloaded: Array  # bool: the load exceeds what the soil carries, θ₁ is held at balance.DEEPEST
+    sinkage: Array  # of the axle [m]
+    drawbar_pull: Array  # [N]
+    load: Array  # [N]
+    torque: Array  # at the axle [N·m]
+    motor_torque: Array  # axle torque and losses [N·m], seen from the axle
+    current: Array  # [A]
+    sensed: Sensed
+
+
+def simulate_arrays(
+    wheel: Wheel,
+    soil: Soil,
+    motion: Motion,
+    effects: Sequence[Effect] = (),
+    *,
+    torque_constant: float = 1.0,
+    theta_1: Array | None = None,
+    order: int = balance.ORDER,
+) -> Response:
+    """The response of the testbed to a motion.
+
+    motion:          measured, arrays (n,) of one run; a field that does not vary may be a float.
+    torque_constant: as configured, torque at the axle per ampere [N·m/A].
+    theta_1:         (n,) of an earlier call with nearby parameters: the balance starts there.
+    order:           quadrature nodes in each zone of the contact.
+    """
+    effects = in_order(effects)
+    wheel, situation = prepare(wheel, motion, effects)
+    soil = reduce(lambda soil, e: e.soil(soil, situation), effects, soil)
+    situation = replace(
+        situation, cohesion=soil.cohesion, tan_phi=soil.tan_phi, shear_modulus=soil.shear_modulus
+    )
+    law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
+    solved = _balance(wheel, soil, law, motion, situation, effects, theta_1, order)
+    situation = loaded(situation, wheel, solved.theta_1, solved.forces)
+    reaction = react(situation, effects)
+    situation, motor_torque = drive(
+        replace(situation, torque=reaction.torque), effects, torque_constant
+    )
+    return _response(situation, solved, reaction, motor_torque, effects)
+
+
+def _response(
+    situation: Situation,
+    solved: balance.Balance,
+    reaction: Reaction,
+    motor_torque: Scalar,
+    effects: Sequence[Effect],
+) -> Response:
+    sensed = Sensed(
+        reaction.sinkage, situation.current, reaction.drawbar_pull, reaction.load, reaction.torque
+    )
+    n = solved.theta_1.shape
+    return Response(
+        slip=_full(situation.slip, n),
+        theta_1=solved.theta_1,
+        overloaded=solved.overloaded,
+        sinkage=_full(reaction.sinkage, n),
+        drawbar_pull=_full(reaction.drawbar_pull, n),
+        load=_full(reaction.load, n),
+        torque=_full(reaction.torque, n),
+        motor_torque=_full(motor_torque, n),
+        current=_full(situation.current, n),
+        sensed=reduce(lambda sensed, e: e.sensors(sensed, situation), effects, sensed),
+    )
+
+
+def prepare(wheel: Wheel, motion: Motion, effects: Sequence[Effect]) -> tuple[Wheel, Situation]:
+    """The true wheel, and the situation of its true motion."""
+    wheel = reduce(lambda wheel, e: e.geometry(wheel), effects, wheel)
+    motion = reduce(lambda motion, e: e.motion(motion, wheel), effects, motion)
+    return wheel, situation_of(motion, wheel)
+
+
+def paper_contact(wheel: Wheel, situation: Situation) -> ContactLaw:
+    """θₘ by Eq. (5), θ₂ = 0, shear by Eq. (2)."""
+    return ContactLaw(theta_m_ratio=np.clip(wheel.c1 + wheel.c2 * situation.slip, 0.0, 1.0))
+
+
+def loaded(situation: Situation, wheel: Wheel, theta_1: Scalar, forces: Forces) -> Situation:
+    """The situation once the rim stresses are known; in reverse drawbar pull and torque change sign."""
+    return replace(
+        situation,
+        theta_1=theta_1,
+        sinkage=2.0 * wheel.radius * np.sin(0.5 * theta_1) ** 2,
+        carried=forces.load,
+        torque=forces.torque * situation.direction,
+        drawbar_pull=forces.drawbar_pull * situation.direction,
+    )
+
+
+def react(situation: Situation, effects: Sequence[Effect]) -> Reaction:
+    """What the axle and then the testbed's sensors feel."""
+    reaction = Reaction(
+        situation.drawbar_pull, situation.carried, situation.torque, situation.sinkage
+    )
+    reaction = reduce(lambda reaction, e: e.wheel(reaction, situation), effects, reaction)
+    return reduce(lambda reaction, e: e.testbed(reaction, situation), effects, reaction)
+
+
+def drive(
+    situation: Situation, effects: Sequence[Effect], torque_constant: float
+) -> tuple[Situation, Scalar]:
+    """Motor current for the axle torque of the situation, and the motor torque behind it [N·m].
+
+    The factor on the torque constant may depend on the current itself (heating), hence the rounds.
+    """
+    motor_torque = reduce(
+        lambda torque, e: torque + e.torque_loss(situation), effects, situation.torque
+    )
+    situation = replace(situation, current=motor_torque / torque_constant)
+    for _ in range(HEATING_ROUNDS):
+        current = motor_torque / (torque_constant * torque_factor(situation, effects))
+        settled = np.allclose(current, situation.current, rtol=1e-9, atol=1e-12)
+        situation = replace(situation, current=current)
+        if settled:
+            break
+    return situation, motor_torque
+
+
+def torque_factor(situation: Situation, effects: Sequence[Effect]) -> Scalar:
+    """True over configured torque constant, all effects together."""
+    factor: Scalar = 1.0
+    for effect in effects:
+        factor = factor * effect.torque_factor(situation)
+    return factor
+
+
+def axle_torque(situation: Situation, effects: Sequence[Effect], torque_constant: float) -> Scalar:
+    """Axle torque [N·m] behind the true current of the situation: the exact inverse of `drive`."""
+    torque = torque_constant * torque_factor(situation, effects) * situation.current
+    return reduce(lambda torque, e: torque - e.torque_loss(situation), effects, torque)
+
+
+def corrected(sensed: Sensed, situation: Situation, effects: Sequence[Effect]) -> Sensed:
+    """True values behind the readings: sensor effects undone in reverse order."""
+    return reduce(
+        lambda sensed, e: e.correct(sensed, situation), reversed(in_order(effects)), sensed
+    )
+
+
+def _balance(
+    wheel: Wheel,
+    soil: Soil,
+    law: ContactLaw,
+    motion: Motion,
+    situation: Situation,
+    effects: Sequence[Effect],
+    theta_1: Array | None,
+    order: int,
+) -> balance.Balance:
+    n = np.broadcast_shapes(
+        np.shape(motion.time), np.shape(situation.load), np.shape(situation.slip)
+    )
+
+    def solve(situation: Situation, start: Array | None) -> balance.Balance:
+        load = reduce(lambda load, e: e.load(load, situation), effects, situation.load)
+        return balance.solve(
+            wheel, balance.Contact(soil, law, situation.slip, _full(load, n)), start, order
+        )
+
+    if motion.sinkage is not None:
+        return solve(replace(situation, sinkage=motion.sinkage), theta_1)
+    if not any(e.needs_sinkage for e in effects):
+        return solve(situation, theta_1)
+    predicted = balance.solve(
+        wheel, balance.Contact(soil, law, situation.slip, _full(situation.load, n)), theta_1, order
+    )
+    return solve(loaded(situation, wheel, predicted.theta_1, predicted.forces), predicted.theta_1)
+
+
+def _full(value: Scalar, shape: tuple[int, ...]) -> Array:
+    return np.broadcast_to(np.asarray(value, dtype=float), shape)

@@ -1,0 +1,99 @@
+"""A recording as the loop saw it: tick by tick, each with the readings it consumed.
+
+Where the recording holds ticks, file order tells which tick consumed which reading. Where it holds raw topics only
+(another rig's data), ticks are built at the configured rate from the first to the last receive time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from gritd.estimator.config.settings import Place, Settings
+from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.recording.salvage import Message, Recording
+from gritd.estimator.wheel.sync import NS
+
+TICK, CHECKPOINT = "/tick", "/checkpoint"
+_RAW = {f"/raw/{channel}": channel for channel in CHANNELS}
+
+
+class Checkpoint(NamedTuple):
+    """What a tick began with: effective configuration and state (checkpoint.decode) as text."""
+
+    stamp: int  # of the tick before [ns]
+    configuration: str
+    state: str
+
+
+class RecordedTick(NamedTuple):
+    """Time of a tick [ns], the readings it consumed, its logged fields and the checkpoint before it, if any."""
+
+    stamp: int
+    readings: list[Reading]
+    logged: tuple[Any, ...] | None
+    checkpoint: Checkpoint | None = None
+
+
+def played(recording: Recording, rate: float) -> Iterator[RecordedTick]:
+    """The ticks of a recording; `rate` [Hz] is used where it has none of its own."""
+    return _logged(recording) if recording.counts[TICK] else _built(recording, rate)
+
+
+def reading_of(message: Message) -> Reading | None:
+    """The reading in a raw message; None for every other topic."""
+    topic, received, values = message
+    channel = _RAW.get(topic)
+    if channel is None:
+        return None
+    return Reading(
+        values[0], channel, values[1] if len(values) == 2 else tuple(values[1:]), received
+    )
+
+
+def _logged(recording: Recording) -> Iterator[RecordedTick]:
+    waiting: list[Reading] = []
+    checkpoint = None
+    for message in recording.messages():
+        if message[0] == TICK:
+            yield RecordedTick(message[2][0], waiting, message[2], checkpoint)
+            waiting, checkpoint = [], None
+        elif message[0] == CHECKPOINT:
+            waiting, checkpoint = [], Checkpoint(*message[2])
+        elif (reading := reading_of(message)) is not None:
+            waiting.append(reading)
+
+
+def _built(recording: Recording, rate: float) -> Iterator[RecordedTick]:
+    readings = _in_order(recording.messages())
+    if not readings:
+        return
+    period, taken = round(NS / rate), 0
+    start, end = readings[0].received, readings[-1].received
+    for stamp in range(start, end + period, period):
+        first = taken
+        while taken < len(readings) and readings[taken].received <= stamp:
+            taken += 1
+        yield RecordedTick(stamp, readings[first:taken], None)
+
+
+def _in_order(messages: Iterable[Message]) -> list[Reading]:
+    readings = [reading for reading in map(reading_of, messages) if reading is not None]
+    return sorted(readings, key=lambda reading: reading.received)
+
+
+def settings_for(settings: Settings, run: RunInfo) -> Settings:
+    """The settings of one run: its place on the bed, and its nominal load where it states one."""
+    settings = replace(settings, place=Place(run.pass_number, run.start_position))
+    if run.nominal_load is None:
+        return settings
+    nominal = replace(settings.load.nominal, value=run.nominal_load)
+    return replace(settings, load=replace(settings.load, nominal=nominal))
+
+
+def without_absent(settings: Settings, recording: Recording) -> Settings:
+    """The settings without a force/torque sensor that the recording does not hold."""
+    absent = settings.wrench is not None and not recording.counts["/raw/wrench"]
+    return replace(settings, wrench=None) if absent else settings

@@ -1,0 +1,69 @@
+"""A recorded run taken through the pipeline again: ticks, and checkpoints where a part or a configuration begins.
+
+A checkpoint is met in one of two ways. Coming from the ticks before it, the state must be the logged one to the bit:
+the change of configuration is recomputed like everything else. Coming from nowhere (the first part kept, or messages
+lost before it) the logged state is where the course begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from gritd.estimator.config.configuration import ConfigError, Configuration, loads
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.offline.playback import Checkpoint, RecordedTick
+from gritd.estimator.online.carry import carried
+from gritd.estimator.online.checkpoint import decode, encode
+from gritd.estimator.online.pipeline import Pipeline, TickRecord
+from gritd.estimator.recording.run import RecordingError
+
+
+class Course:
+    """`settings_of` gives the run's settings from a configuration; `engine` replaces the configured one."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        settings_of: Callable[[Configuration], Settings],
+        engine: str | None = None,
+    ) -> None:
+        self._settings_of, self._engine = settings_of, engine
+        self._text = configuration.text
+        self.pipeline = Pipeline(settings_of(configuration), engine)
+        self._state = self.pipeline.start()
+        self.known = True  # whether the state is the run's own, so that its ticks can be compared
+
+    def step(self, tick: RecordedTick) -> TickRecord:
+        self._state, record = self.pipeline.step(self._state, tick.readings, tick.stamp)
+        return record
+
+    def lose(self) -> None:
+        """Messages are missing from here on: until the next checkpoint the state is anybody's."""
+        self.known = False
+
+    def reconfigure(self, checkpoint: Checkpoint) -> None:
+        """Take over the checkpoint's configuration, as the daemon did. Raises RecordingError."""
+        if checkpoint.configuration == self._text:
+            return
+        before, self.pipeline = self.pipeline.settings, self._pipeline_of(checkpoint)
+        self._state = carried(self.pipeline, self._state, before)
+        self._text = checkpoint.configuration
+
+    def resume(self, checkpoint: Checkpoint) -> bool:
+        """Go on from the logged state; False if one that was known differs from it. Raises RecordingError."""
+        self.reconfigure(checkpoint)
+        same = not self.known or encode(self._state) == checkpoint.state
+        try:
+            self._state = decode(checkpoint.state, self.pipeline.settings)
+        except ValueError as error:
+            raise RecordingError(f"/checkpoint: {error}") from None
+        self.known = True
+        return same
+
+    def _pipeline_of(self, checkpoint: Checkpoint) -> Pipeline:
+        try:
+            return Pipeline(
+                self._settings_of(loads(checkpoint.configuration, "/checkpoint")), self._engine
+            )
+        except ConfigError as error:
+            raise RecordingError(str(error)) from None

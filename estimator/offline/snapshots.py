@@ -1,0 +1,388 @@
+"""Snapshots of a whole recording at once: what `sync.Sync` would say at chosen ticks, from arrays.
+
+`Sync` takes one reading after another, because on line there is no other way. A recording has them all, and each of
+Sync's rules is a statement about a sorted array: late is what its tick consumed after the window had closed, a repeated
+reading is the second of one stamp, a window is a slice between two searches, a jump a difference of neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.config.settings import Calibration, Settings
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS, WRENCH_FIELDS
+from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.offline.playback import TICK
+from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.terramechanics.soil import Array
+from gritd.estimator.wheel.sync import NS, STUCK_AFTER, Measured, Snapshot
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+ANALOGUE = ("sinkage_pot", "motor_shunt")
+NEVER = -(1 << 62)  # [ns]
+
+
+class Stream(NamedTuple):
+    """Readings of one channel in the order in which they were consumed."""
+
+    stamp: Ints  # (n,) [ns]
+    received: Ints  # (n,) [ns]
+    tick: Ints  # (n,) number of the tick that consumed it
+    values: NDArray[Any]  # (n,) raw, or (n, 6) of the wrench
+
+
+class Played(NamedTuple):
+    """The ticks of a recording and the readings each of them consumed: `playback.played` in arrays."""
+
+    ticks: Ints  # (k,) [ns]
+    streams: dict[str, Stream]
+
+
+def played(recording: Recording, rate: float) -> Played:
+    """Ticks as logged, else built at `rate` [Hz] from the first to the last receive time.
+
+    Raises RecordingError where a raw topic is not what the contract says.
+    """
+    raw = {channel: recording.arrays(f"/raw/{channel}") for channel in CHANNELS}
+    raw = {channel: rows for channel, rows in raw.items() if rows.size}
+    if recording.counts[TICK]:
+        logged = recording.arrays(TICK)
+        ticks, consumed = (
+            logged["stamp"],
+            {name: np.searchsorted(logged["order"], r["order"]) for name, r in raw.items()},
+        )
+    else:
+        raw = {
+            channel: rows[np.argsort(rows["log_time"], kind="stable")]
+            for channel, rows in raw.items()
+        }
+        ticks = _built(raw, round(NS / rate))
+        consumed = {
+            channel: np.searchsorted(ticks, rows["log_time"]) for channel, rows in raw.items()
+        }
+    return Played(
+        ticks, {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
+    )
+
+
+def _built(raw: Mapping[str, NDArray[np.void]], period: int) -> Ints:
+    if not raw:
+        return np.empty(0, np.int64)
+    start = min(int(rows["log_time"][0]) for rows in raw.values())
+    end = max(int(rows["log_time"][-1]) for rows in raw.values())
+    return np.arange(start, end + period, period)
+
+
+def _stream(channel: str, rows: NDArray[np.void], tick: Ints, ticks: int) -> Stream:
+    """What some tick consumed; readings after the last tick are left out."""
+    rows, tick = rows[tick < ticks], tick[tick < ticks]
+    columns = [rows[name] for name in CHANNELS[channel]]
+    return Stream(
+        rows["stamp"],
+        rows["log_time"],
+        tick,
+        columns[0] if len(columns) == 1 else np.stack(columns, axis=1),
+    )
+
+
+def snapshots(settings: Settings, played: Played, chosen: Ints) -> list[Snapshot]:
+    """What Sync says at the ticks numbered `chosen`, shape (m,), ascending; equal to rounding."""
+    view = View(settings, played, chosen)
+    wheel, carriage = (
+        view.slope("wheel_encoder", 1.0),
+        view.slope("carriage_encoder", settings.pulley_radius),
+    )
+    means = {name: view.mean(name) for name in settings.channels if name not in ENCODERS}
+    axes = view.wrench()
+    columns = (
+        view.ends - view.length // 2,
+        np.logical_and.reduce(
+            [wheel.known, carriage.known, *(means[name].known for name in ANALOGUE)]
+        ),
+        wheel.position,
+        measured(wheel),
+        carriage.position,
+        measured(carriage),
+        *(measured(means[name]) for name in ANALOGUE),
+        *map(measured, axes),
+        means.get("motor_temperature", view.nothing).value,
+        view.stale(),
+        view.stuck(wheel, carriage, means, axes),
+    )
+    rows = zip(
+        *(column if isinstance(column, list) else column.tolist() for column in columns),
+        strict=True,
+    )
+    return [Snapshot._make(row) for row in rows]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A quantity in every window, SI: NaN ± 0 where it is not known."""
+
+    value: Array  # (m,)
+    sigma: Array  # (m,)
+    known: Bools  # (m,)
+    still: Ints  # (m,) for how long the raw value has not changed at all [ns]
+
+
+@dataclass(frozen=True)
+class Motion(Series):
+    """The speed of an encoder, and its position."""
+
+    position: Array  # (m,)
+
+    @property
+    def moves(self) -> Bools:
+        return np.abs(self.value) > 4.0 * self.sigma
+
+
+def measured(series: Series) -> list[Measured]:
+    return list(map(Measured, series.value.tolist(), series.sigma.tolist()))
+
+
+class Members(NamedTuple):
+    """The accepted readings of a channel, and which of them lie in which window."""
+
+    stamp: Ints  # (n,) [ns], ascending
+    values: NDArray[Any]  # (n,)
+    reading: Ints  # (p,) numbers of the readings inside
+    window: Ints  # (p,) and of the window each is in
+    size: Ints  # (m,) readings in each window
+    first: Ints  # (m,) number of the first of them
+    last: Ints  # (m,) and of the last
+
+    def sum(self, values: Array) -> Array:
+        """Sums over each window (m,) of values (p,)."""
+        return np.bincount(self.window, values, len(self.size)).astype(float)
+
+    def still(self, ends: Ints) -> Ints:
+        """How long the value had not changed at the end of each window [ns], 0 in an empty one."""
+        changed = np.append(True, self.values[1:] != self.values[:-1])
+        since = np.maximum.accumulate(np.where(changed, self.stamp, 0))
+        return np.where(self.size > 0, ends - since[self.last], 0)
+
+
+class View:
+    """A recording seen through the windows that end at chosen ticks."""
+
+    def __init__(self, settings: Settings, played: Played, chosen: Ints) -> None:
+        self._settings = settings
+        self._streams = played.streams
+        self._chosen = chosen
+        self._ticks = played.ticks[chosen]
+        self._closed = played.ticks - round(
+            settings.rates.horizon * NS
+        )  # ends of the windows of all ticks [ns]
+        self.length = round(NS / settings.rates.update)
+        self.ends = self._closed[chosen]
+        nan, zero = np.full(len(chosen), np.nan), np.zeros(len(chosen))
+        self.nothing = Motion(nan, zero, zero > 0, np.zeros(len(chosen), np.int64), nan)
+
+    def mean(self, name: str) -> Series:
+        """An analogue channel."""
+        channel = self._settings.channels[name]
+        stream = self._streams.get(name)
+        if stream is None:
+            return self.nothing
+        valid = (channel.low <= stream.values) & (stream.values <= channel.high)
+        return self._mean(
+            stream, stream.values, valid, channel.latency, channel.noise, channel.calibration
+        )
+
+    def wrench(self) -> tuple[Series, Series, Series]:
+        """Load, drawbar pull and torque about the axle."""
+        wrench, stream = self._settings.wrench, self._streams.get("wrench")
+        if wrench is None or stream is None:
+            return self.nothing, self.nothing, self.nothing
+        limits = np.repeat([wrench.max_force, wrench.max_torque], 3)
+        absent = np.isnan(stream.values)  # an axis that is not measured
+        valid = (
+            np.all(absent | (np.abs(stream.values) <= limits), axis=1)
+            & ~absent[:, WRENCH_FIELDS.index("fz")]
+        )
+
+        def axis(name: str, noise: float, calibration: Calibration) -> Series:
+            values = stream.values[:, WRENCH_FIELDS.index(name)]
+            return self._mean(
+                stream, values, valid & ~np.isnan(values), wrench.latency, noise, calibration
+            )
+
+        return (
+            axis("fz", wrench.force_noise, wrench.load),
+            axis("fx", wrench.force_noise, wrench.drawbar_pull),
+            axis("ty", wrench.torque_noise, wrench.torque),
+        )
+
+    def _mean(
+        self,
+        stream: Stream,
+        values: Array,
+        valid: Bools,
+        latency: float,
+        noise: float,
+        calibration: Calibration,
+    ) -> Series:
+        members = self._members(stream, values, valid, latency)
+        if members is None:
+            return self.nothing
+        known = members.size > 0
+        count = np.where(known, members.size, 1)
+        mean = members.sum(members.values[members.reading]) / count
+        scale = calibration.scale.value
+        return Series(
+            np.where(known, mean * scale + calibration.offset.value, np.nan),
+            np.where(known, noise / np.sqrt(count) * abs(scale), 0.0),
+            known,
+            members.still(self.ends),
+        )
+
+    def slope(self, name: str, arm: float) -> Motion:
+        """Position and speed of an encoder; arm is the pulley radius, or 1 for an angle."""
+        channel, stream = self._settings.channels[name], self._streams.get(name)
+        members = None
+        if stream is not None:
+            members = self._members(
+                stream, stream.values, np.full(stream.stamp.shape, True), channel.latency
+            )
+        if members is None:
+            return self.nothing
+        members = members._replace(values=self._rebaselined(members, channel.max_rate))
+        mean, rate, sigma = _fitted(members, channel.noise)
+        span = members.stamp[members.last] - members.stamp[members.first]
+        known = (members.size >= 3) & (span >= self.length // 2)
+        scale = channel.calibration.scale.value * arm
+        return Motion(
+            np.where(known, rate * scale, np.nan),
+            np.where(known, sigma * abs(scale), 0.0),
+            known,
+            members.still(self.ends),
+            np.where(known, mean * scale + channel.calibration.offset.value * arm, np.nan),
+        )
+
+    def _members(
+        self, stream: Stream, values: NDArray[Any], valid: Bools, latency: float
+    ) -> Members | None:
+        """The readings in time, sorted, each stamp once; None without any."""
+        stamp = stream.stamp - round(latency * NS)
+        taken = np.flatnonzero(valid & (stamp > np.append(-1, self._closed)[stream.tick]))
+        taken = taken[np.argsort(stamp[taken], kind="stable")]
+        stamp = stamp[taken]
+        fresh = np.diff(stamp, prepend=-1) > 0
+        stamp, values = stamp[fresh], values[taken[fresh]]
+        if not stamp.size:
+            return None
+        low, high = (
+            np.searchsorted(stamp, self.ends - self.length, "right"),
+            np.searchsorted(stamp, self.ends, "right"),
+        )
+        count = high - low
+        window = np.repeat(np.arange(len(count)), count)
+        reading = np.arange(len(window)) + (low - np.cumsum(count) + count)[window]
+        return Members(
+            stamp,
+            values,
+            reading,
+            window,
+            count,
+            np.minimum(low, len(stamp) - 1),
+            np.maximum(high - 1, 0),
+        )
+
+    def _rebaselined(self, members: Members, max_rate: float) -> Ints:
+        """Counts with every jump taken out; see sync.SlopeWindow."""
+        stamp, counts = members.stamp, members.values
+        step, elapsed = np.diff(counts), np.diff(stamp)
+        opened = np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp[1:])]
+        fast = np.abs(step) * float(NS) > max_rate * elapsed + 2.0 * NS
+        # a reading that enters an empty window has nothing to jump from
+        fresh = np.searchsorted(self._closed, stamp[:-1]) < np.searchsorted(self._closed, stamp[1:])
+        jumps = np.flatnonzero(fast & ~(fresh & (stamp[:-1] <= opened))) + 1
+        shifted, shift, done = counts.copy(), 0, 0
+        for i in jumps.tolist():
+            shifted[done:i] += shift
+            start = int(np.searchsorted(stamp, opened[i - 1], "right"))
+            expected = _expected_step(
+                stamp[start:i], shifted[start:i], int(elapsed[i - 1]), self.length // 2
+            )
+            shift, done = shift + expected - int(step[i - 1]), i
+        shifted[done:] += shift
+        return shifted
+
+    def stale(self) -> Ints:
+        """CHANNEL_BITS of channels whose last bytes came longer ago than they may, or never."""
+        silence = {name: channel.stale_after for name, channel in self._settings.channels.items()}
+        if self._settings.wrench is not None:
+            silence["wrench"] = self._settings.wrench.stale_after
+        bits = np.zeros(len(self._ticks), np.int64)
+        for name, limit in silence.items():
+            bits += CHANNEL_BITS[name] * (self._ticks - self._heard(name) > round(limit * NS))
+        return bits
+
+    def _heard(self, name: str) -> Ints:
+        """When the last bytes of a channel had come, by the chosen ticks [ns]."""
+        stream = self._streams.get(name)
+        if stream is None:
+            return np.full(self._ticks.shape, NEVER)
+        latest = np.append(NEVER, np.maximum.accumulate(stream.received))
+        return latest[np.searchsorted(stream.tick, self._chosen, "right")]
+
+    def stuck(
+        self, wheel: Motion, carriage: Motion, means: Mapping[str, Series], axes: Sequence[Series]
+    ) -> Ints:
+        """CHANNEL_BITS of channels that stand still while others move; see sync.Sync."""
+        bits = CHANNEL_BITS["wheel_encoder"] * (carriage.moves & (wheel.still >= STUCK_AFTER))
+        moving = wheel.moves | carriage.moves
+        for name in ANALOGUE:
+            if self._settings.channels[name].noise > 0.0:
+                bits = bits + CHANNEL_BITS[name] * (moving & (means[name].still >= STUCK_AFTER))
+        return np.asarray(bits + CHANNEL_BITS["wrench"] * (moving & self._frozen(axes)))
+
+    def _frozen(self, axes: Sequence[Series]) -> Bools:
+        """Whether no axis of the wrench that is measured shows one digit of noise."""
+        wrench = self._settings.wrench
+        if wrench is None:
+            return np.zeros(len(self._ticks), bool)
+        noises = (wrench.force_noise, wrench.force_noise, wrench.torque_noise)
+        live = [
+            axis.known & ((axis.still < STUCK_AFTER) | (noise <= 0.0))
+            for axis, noise in zip(axes, noises, strict=True)
+        ]
+        return np.asarray(np.any([axis.known for axis in axes], axis=0) & ~np.any(live, axis=0))
+
+
+def _fitted(members: Members, noise: float) -> tuple[Array, Array, Array]:
+    """Mean, least-squares rate [raw/s] and its standard deviation in every window, each (m,); see sync.SlopeWindow."""
+    reading, window = members.reading, members.window
+    origin = members.values[members.first]
+    count = np.maximum(members.size, 1)
+    t = (members.stamp[reading] - members.stamp[members.first][window]).astype(float)
+    x = (members.values[reading] - origin[window]).astype(float)
+    mean = members.sum(x) / count
+    t -= (members.sum(t) / count)[window]
+    spread = members.sum(t * t)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a window of one reading has no slope
+        rate = members.sum(t * (x - mean[window])) / spread * NS
+        moved = np.abs(members.values[members.last] - origin).astype(float)
+        independent = np.minimum(count, (moved + 1.0) ** 2)
+        sigma = noise / (np.sqrt(spread) / NS) * np.sqrt(count / independent)
+    return origin + mean, rate, sigma
+
+
+def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> int:
+    """Counts that the readings before a jump predict for the time elapsed [ns], in exact integers as Sync has them."""
+    count = len(stamp)
+    if count < 3 or stamp[-1] - stamp[0] < shortest:
+        return 0
+    t, x = (stamp - stamp[0]).tolist(), (counts - counts[0]).tolist()
+    spread = count * sum([a * a for a in t]) - sum(t) ** 2
+    rate = (count * sum([a * b for a, b in zip(t, x, strict=True)]) - sum(t) * sum(x)) / spread * NS
+    expected: int = round(rate * elapsed / NS)
+    return expected

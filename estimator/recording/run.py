@@ -1,0 +1,335 @@
+"""The recording contract: topics of the raw channels, run metadata, and the writer of one run's file.
+
+File order is the order of the calls, and replay relies on it: the readings a tick consumed stand before that tick.
+See docs/recording.md.
+"""
+
+from __future__ import annotations
+
+import platform
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+
+from gritd.estimator.messages.readings import WRENCH_FIELDS, Reading
+from gritd.estimator.recording.cdr import ENCAPSULATION, TIME, Field, Topic, Values
+from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
+
+__all__ = [
+    "LOG_TOPIC",
+    "RAW_TOPICS",
+    "RecordingError",
+    "RunInfo",
+    "RunWriter",
+    "Topic",
+    "part_path",
+    "parts",
+]
+
+CHUNK_SIZE = 1 << 20  # [bytes] a chunk is closed at this size even if nobody flushes
+CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
+CHECKSUM = "crc32"
+
+_STAMP: Field = ("stamp", TIME, "when the sample was taken")
+
+
+def _raw(channel: str, schema: str, *fields: Field) -> Topic:
+    return Topic(f"/raw/{channel}", f"gritd_msgs/msg/{schema}", (_STAMP, *fields))
+
+
+_COUNT: Field = ("count", "int64", "encoder counts as read, unwrapped")
+_VOLTS: Field = ("volts", "float64", "as read by the ADC [V]")
+_FORCE = ("drawbar pull", "lateral force", "vertical load")
+
+RAW_TOPICS: tuple[Topic, ...] = (
+    _raw("wheel_encoder", "EncoderCount", _COUNT),
+    _raw("carriage_encoder", "EncoderCount", _COUNT),
+    _raw("sinkage_pot", "Voltage", _VOLTS),
+    _raw("motor_shunt", "Voltage", _VOLTS),
+    _raw(
+        "wrench",
+        "Wrench",
+        *(
+            (name, "float64", f"{doc} [N]")
+            for name, doc in zip(WRENCH_FIELDS[:3], _FORCE, strict=True)
+        ),
+        *((name, "float64", f"moment about {name[1]} [N·m]") for name in WRENCH_FIELDS[3:]),
+    ),
+    _raw(
+        "motor_temperature",
+        "Temperature",
+        ("celsius", "float64", "winding or housing temperature [°C]"),
+    ),
+)
+
+# Text for people; the ROS log message, so that Foxglove's and rqt's log panels show it.
+LOG_TOPIC = Topic(
+    "/log",
+    "rcl_interfaces/msg/Log",
+    (
+        ("stamp", TIME, ""),
+        ("level", "uint8", "10 debug, 20 info, 30 warning, 40 error, 50 fatal"),
+        ("name", "string", "who says it"),
+        ("msg", "string", ""),
+        ("file", "string", ""),
+        ("function", "string", ""),
+        ("line", "uint32", ""),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What one run was: kept in the metadata record `gritd.run`.
+
+    A recording has no gaps. Where messages had to be dropped (a full disk) a new file begins: `part` counts these, and
+    `lost_before` says how many messages are missing between the part before and this one.
+    """
+
+    name: str = ""
+    nominal_load: float | None = None  # [N]
+    pass_number: int = 1  # how many times the wheel has gone over this soil, this run included
+    start_position: float = 0.0  # [m] of the carriage on the bed
+    notes: str = ""
+    part: int = 0
+    lost_before: int = 0
+
+    def entries(self) -> dict[str, str]:
+        return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
+
+    @classmethod
+    def from_entries(cls, entries: Mapping[str, str]) -> RunInfo:
+        """The inverse of `entries`; unknown keys are ignored. Raises ValueError naming a key that cannot be read."""
+        return cls(
+            name=entries.get("name", ""),
+            nominal_load=_number(entries, "nominal_load", float),
+            pass_number=_number(entries, "pass_number", int, 1),
+            start_position=_number(entries, "start_position", float, 0.0),
+            notes=entries.get("notes", ""),
+            part=_number(entries, "part", int, 0),
+            lost_before=_number(entries, "lost_before", int, 0),
+        )
+
+
+def _number(
+    entries: Mapping[str, str], key: str, kind: type[int] | type[float], default: Any = None
+) -> Any:
+    text = entries.get(key, "")
+    try:
+        return kind(text) if text else default
+    except ValueError:
+        raise ValueError(f"{RUN}: {key}: {text!r} is not a number") from None
+
+
+def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
+    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not pass for a setting."""
+    kept = {key: value for key, value in entries.items() if key != CHECKSUM}
+    return {**kept, CHECKSUM: _checksum(name, kept)}
+
+
+def seal_holds(name: str, entries: Mapping[str, str], required: bool) -> bool:
+    """Whether the entries are as sealed; without a seal (another writer's), whether none is required."""
+    return sealed(name, entries) == entries if CHECKSUM in entries else not required
+
+
+def _checksum(name: str, entries: Mapping[str, str]) -> str:
+    text = "\0".join((name, *(part for item in sorted(entries.items()) for part in item)))
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """What computed this run: a replay that differs can say what changed."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in ("gritd", "numpy", "filterpy", "scipy"):
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
+
+
+def part_path(path: Path, part: int) -> Path:
+    """run.mcap, run.1.mcap, run.2.mcap, …"""
+    return path if part == 0 else path.with_suffix(f".{part}{path.suffix}")
+
+
+def parts(path: Path) -> list[Path]:
+    """The recording and the files that continue it, in order, as far as they exist."""
+    found = [path]
+    while (following := part_path(path, len(found))).exists():
+        found.append(following)
+    return found
+
+
+class RunWriter:
+    """One recording, written synchronously in the order of the calls.
+
+    `topics` come beside the raw topics and /log. The path must not exist yet. Messages gather in memory until `flush`,
+    or until a chunk is full. After an error the messages not yet written are kept, and `flush` may be called again.
+
+    Raises RecordingError where the file cannot be created or written, ValueError where a message does not fit its
+    topic.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        topics: Iterable[Topic],
+        config_yaml: str,
+        run: RunInfo,
+        *,
+        compression: str = "zstd",
+        chunk_size: int = CHUNK_SIZE,
+    ) -> None:
+        self.path = Path(path)
+        self._chunk_size = chunk_size
+        self._pending = _Pending()
+        self._file = McapFile(self.path, compression)
+        self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
+        with self._file.beginning():
+            self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **versions()}))
+            self._file.add_metadata(RUN, sealed(RUN, run.entries()))
+
+    def reading(self, reading: Reading) -> None:
+        """One raw reading, under its receive time."""
+        value = reading.value
+        values = (reading.stamp, *value) if isinstance(value, tuple) else (reading.stamp, value)
+        self.message("/raw/" + reading.channel, reading.received, values)
+
+    def message(self, topic: str, log_time: int, values: Values) -> None:
+        """One message; `values` in the order of the topic's fields, `log_time` in ns."""
+        try:
+            self._pending.add(self._encoders[topic](log_time, values))
+        except KeyError:
+            raise ValueError(f"{topic}: not a topic of this recording") from None
+        except (struct.error, TypeError) as error:
+            raise ValueError(
+                f"{topic}: {tuple(values)!r:.200} does not fit its fields: {error}"
+            ) from None
+        if len(self._pending.records) >= self._chunk_size:
+            self.write_out()
+
+    def write_out(self) -> None:
+        """Close the chunk and hand it to the kernel: from here on it survives the death of this process."""
+        if self._pending.starts:
+            self._file.add_chunk(self._pending.records, self._pending.starts)
+            self._pending = _Pending()
+
+    def flush(self) -> None:
+        """`write_out`, and wait until the medium has it: from here on it survives the loss of power."""
+        self.write_out()
+        self._file.sync()
+
+    def close(self) -> None:
+        """Write what is pending, the index and the summary. The file is closed even if that fails."""
+        try:
+            self.write_out()
+        except RecordingError:
+            self._file.abandon()
+            raise
+        self._file.close()
+
+    def finish(self, sync: Callable[[int], None]) -> None:
+        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor and may keep a copy."""
+        try:
+            self.write_out()
+            self._file.finish()
+            sync(self._file.fileno())
+        finally:
+            self._file.abandon()
+
+    def abandon(self) -> None:
+        """Close the file as it is, without an index. Nothing already written is lost."""
+        self._file.abandon()
+
+    def expect(self, size: int) -> None:
+        """Prepare for chunks of up to so many bytes."""
+        self._file.expect(size)
+
+    def adopt(self, other: RunWriter) -> None:
+        """Take over what `other` could not write, and its numbering; both must have been made with the same topics and
+        the same compression."""
+        self._pending, other._pending = other._pending, self._pending
+        self._encoders = other._encoders
+        self._file.adopt(other._file)
+
+    def fileno(self) -> int:
+        return self._file.fileno()
+
+
+class _Pending:
+    """Message records of the chunk being filled, and where each begins."""
+
+    def __init__(self) -> None:
+        self.records = bytearray()
+        self.starts: list[int] = []
+
+    def add(self, record: bytes) -> None:
+        self.starts.append(len(self.records))
+        self.records += record
+
+
+class _Encoder:
+    """Message records of one channel: MCAP's head and the CDR body, packed in one call where the topic is flat."""
+
+    def __init__(self, channel: int, topic: Topic) -> None:
+        self._channel = channel
+        self._codec = topic.codec
+        self._sequence = 0
+        self._length = MESSAGE_HEAD.size - RECORD_HEAD.size + self._codec.size
+        self._pack = struct.Struct(MESSAGE_HEAD.format + self._codec.format).pack
+
+    def __call__(self, log_time: int, values: Values) -> bytes:
+        number = (self._sequence + 1) & 0xFFFFFFFF
+        record = self._record(number, log_time, values)
+        self._sequence = number  # only now: a message that does not fit leaves no gap
+        return record
+
+    def _record(self, number: int, log_time: int, values: Values) -> bytes:
+        if self._codec.flat:
+            flat = self._codec.flatten(values)
+            return self._pack(
+                Opcode.MESSAGE,
+                self._length,
+                self._channel,
+                number,
+                log_time,
+                log_time,
+                ENCAPSULATION,
+                *flat,
+            )
+        body = self._codec.encode(values)
+        length = MESSAGE_HEAD.size - RECORD_HEAD.size + len(body)
+        return (
+            MESSAGE_HEAD.pack(Opcode.MESSAGE, length, self._channel, number, log_time, log_time)
+            + body
+        )
+
+
+def _define(file: McapFile, topics: Iterable[Topic]) -> dict[str, _Encoder]:
+    """Schemas and channels of the topics, numbered in their order. Raises ValueError where two disagree on a schema."""
+    schemas: dict[str, Schema] = {}
+    encoders: dict[str, _Encoder] = {}
+    for number, topic in enumerate(topics, start=1):
+        new = Schema(
+            id=len(schemas) + 1,
+            name=topic.schema_name,
+            encoding="ros2msg",
+            data=topic.schema.encode(),
+        )
+        schema = schemas.setdefault(topic.schema_name, new)
+        if schema.data != new.data or topic.name in encoders:
+            raise ValueError(
+                f"{topic.name}: defined twice, or its schema {topic.schema_name} is, differently"
+            )
+        file.define(schema, Channel(number, topic.name, "cdr", {}, schema.id))
+        encoders[topic.name] = _Encoder(number, topic)
+    return encoders

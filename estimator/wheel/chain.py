@@ -1,0 +1,267 @@
+"""The configured effects as the on-line filter uses them: one window at a time, in floats.
+
+Sensor and drivetrain effects are undone before the update, wheel and testbed effects are added to what is predicted,
+soil effects turn the estimated soil into the soil under this window, and contact effects act through the shift of the
+eight integrals (shift.py). Everything an effect does stands in its own file; here it is only put in order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import reduce
+from typing import NamedTuple
+
+from gritd.estimator.config.effects import configured
+from gritd.estimator.config.settings import ConfiguredEffect, Settings
+from gritd.estimator.effects import in_order, make
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.forward import axle_torque, corrected, paper_contact, prepare, react
+from gritd.estimator.stages.situation import Motion, Sensed, Situation
+from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
+from gritd.estimator.wheel.geometry import entry_angle
+from gritd.estimator.wheel.sync import Snapshot
+
+SOIL_STEP = 1e-4  # relative change by which the soil effects' slope is found
+
+
+class Context(NamedTuple):
+    """What the tracker knows beside the snapshot."""
+
+    time: float  # [s] since the run began
+    c: float  # present estimate [Pa]
+    tan_phi: float
+    k: float  # [m]
+    acceleration: float = 0.0  # dω/dt [rad/s²]
+    sinking: float = 0.0  # dz/dt [m/s]
+    memory: Mapping[str, float] = {}  # what effects remember, by name
+    origin: float = 0.0  # where the carriage stood when the run began, by its encoder [m]
+
+
+class Here(NamedTuple):
+    """The soil under this window from the estimated one: slope and offset of c [Pa], tan φ and k [m]."""
+
+    c_slope: float = 1.0
+    c_offset: float = 0.0
+    tan_phi_slope: float = 1.0
+    tan_phi_offset: float = 0.0
+    k_slope: float = 1.0
+    k_offset: float = 0.0
+
+
+class Added(NamedTuple):
+    """What wheel and testbed effects add to rim torque [N·m] and pull [N], linear in c [Pa], tan φ and k [m]."""
+
+    torque: float = 0.0
+    torque_by_c: float = 0.0
+    torque_by_tan_phi: float = 0.0
+    torque_by_k: float = 0.0
+    pull: float = 0.0
+    pull_by_c: float = 0.0
+    pull_by_tan_phi: float = 0.0
+    pull_by_k: float = 0.0
+
+
+class Undone(NamedTuple):
+    """What a window measures once the effects are accounted for, SI."""
+
+    wheel_speed: float  # [rad/s]
+    travel_speed: float  # [m/s]
+    sinkage: float  # of the rim in the soil [m]
+    torque: float  # at the axle, drivetrain undone [N·m]
+    load: float  # carried by the rim [N]
+    drawbar_pull: float  # [N]
+    here: Here
+    situation: Situation
+
+
+class Chain:
+    """The effects of a configuration at given parameter values, ready for one window after another."""
+
+    def __init__(self, settings: Settings, effects: tuple[Effect, ...]) -> None:
+        self.effects = in_order(effects)
+        self.acting = tuple(e for e in self.effects if not e.filter_only)
+        self.wheel: Wheel = reduce(lambda wheel, e: e.geometry(wheel), self.effects, settings.wheel)
+        self.reacts = any(e.stage in ("wheel", "testbed", "any") for e in self.acting)
+        self._settings = settings
+        soil = settings.soil
+        self._exponent = soil.exponent.value
+        self._modulus = soil.pressure_sinkage.modulus(settings.wheel.width)
+
+    def undo(self, snapshot: Snapshot, load: float, context: Context) -> Undone:
+        """Undo the sensor and drivetrain effects of a window and work out the others; load: W measured or assumed."""
+        wheel, situation = self._situation(snapshot, load, context)
+        read = Sensed(
+            snapshot.sinkage.value,
+            snapshot.current.value,
+            snapshot.drawbar_pull.value,
+            load,
+            snapshot.axle_torque.value,
+        )
+        situation = replace(situation, carried=load)
+        true = corrected(read, situation, self.effects)
+        carried = self._carried(float(true.load), situation)
+        situation = replace(situation, current=true.current, carried=carried, sinkage=true.sinkage)
+        torque = self._torque(true, situation)
+        situation = self._placed(
+            replace(situation, torque=torque, drawbar_pull=true.drawbar_pull), wheel
+        )
+        felt = react(situation, self.effects)
+        return Undone(
+            wheel_speed=float(situation.wheel_speed),
+            travel_speed=float(situation.carriage_speed),
+            sinkage=float(true.sinkage - (felt.sinkage - situation.sinkage)),
+            torque=float(torque),
+            load=float(carried - (felt.load - carried)),
+            drawbar_pull=float(true.drawbar_pull),
+            here=self._here(situation, context),
+            situation=situation,
+        )
+
+    def felt(
+        self, situation: Situation, torque: float, pull: float, soil: tuple[float, float, float]
+    ) -> tuple[float, float]:
+        """Axle torque [N·m] and drawbar pull [N] where the rim gives `torque` and `pull` in a soil (c, tan φ, k)."""
+        c, tan_phi, k = soil
+        situation = replace(
+            situation,
+            torque=torque,
+            drawbar_pull=pull,
+            cohesion=c,
+            tan_phi=tan_phi,
+            shear_modulus=k,
+        )
+        reaction = react(situation, self.effects)
+        return float(reaction.torque), float(reaction.drawbar_pull)
+
+    def _carried(self, load: float, situation: Situation) -> float:
+        """W on the soil: as measured, or what the effects leave of the weights."""
+        if self._settings.wrench is not None:
+            return load
+        carried: Scalar = load
+        for effect in self.effects:
+            carried = effect.load(carried, situation)
+        return float(carried)
+
+    def _torque(self, true: Sensed, situation: Situation) -> float:
+        if self._settings.drive.torque_source == "wrench":
+            return float(true.torque)
+        return float(
+            axle_torque(situation, self.effects, self._settings.drive.torque_constant.value)
+        )
+
+    def _situation(
+        self, snapshot: Snapshot, load: float, context: Context
+    ) -> tuple[Wheel, Situation]:
+        motion = Motion(
+            time=context.time,
+            wheel_angle=snapshot.wheel_angle,
+            wheel_speed=snapshot.wheel_speed.value,
+            carriage_position=snapshot.carriage_position - context.origin,
+            carriage_speed=snapshot.carriage_speed.value,
+            load=load,
+            pass_number=float(self._settings.place.pass_number),
+            start_position=self._settings.place.start_position,
+            temperature=snapshot.temperature,
+            wheel_acceleration=context.acceleration,
+            sinkage=snapshot.sinkage.value,
+        )
+        wheel, situation = prepare(self._settings.wheel, motion, self.effects)
+        situation = replace(
+            situation,
+            memory=context.memory,
+            sinking=context.sinking,
+            cohesion=context.c,
+            tan_phi=context.tan_phi,
+            shear_modulus=context.k,
+        )
+        return wheel, situation
+
+    @staticmethod
+    def _placed(situation: Situation, wheel: Wheel) -> Situation:
+        """With θ₁ of the corrected sinkage."""
+        return replace(situation, theta_1=entry_angle(wheel.radius, float(situation.sinkage)).value)
+
+    def _here(self, situation: Situation, context: Context) -> Here:
+        """Slope and offset of each soil parameter through the soil and contact effects."""
+        law = reduce(
+            lambda law, e: e.contact(law, situation),
+            self.effects,
+            paper_contact(self.wheel, situation),
+        )
+        at = self._soil(context.c, context.tan_phi, context.k, situation)
+        c, tan_phi, k = (x * (1.0 + SOIL_STEP) for x in (context.c, context.tan_phi, context.k))
+        near = self._soil(c, tan_phi, k, situation)
+        strength = float(law.strength)
+
+        def line(x: float, y: float, moved: float, factor: float) -> tuple[float, float]:
+            slope = (moved - y) / (x * SOIL_STEP) if x else 1.0
+            return factor * slope, factor * (y - slope * x)
+
+        return Here(
+            *line(context.c, float(at.cohesion), float(near.cohesion), strength),
+            *line(context.tan_phi, float(at.tan_phi), float(near.tan_phi), strength),
+            *line(context.k, float(at.shear_modulus), float(near.shear_modulus), 1.0),
+        )
+
+    def _soil(self, c: float, tan_phi: float, k: float, situation: Situation) -> Soil:
+        soil = Soil(c, tan_phi, k, self._exponent, self._modulus)
+        return reduce(lambda soil, e: e.soil(soil, situation), self.effects, soil)
+
+    def remember(
+        self, memory: Mapping[str, float], step: float, situation: Situation
+    ) -> dict[str, float]:
+        """What the effects remember, `step` [s] later."""
+        return {
+            e.name: e.remember(memory.get(e.name, e.at_start), step, situation)
+            for e in self.effects
+            if type(e).remember is not Effect.remember
+        }
+
+    def fresh_memory(self) -> dict[str, float]:
+        """What the effects remember before the run."""
+        return {e.name: e.at_start for e in self.effects if type(e).remember is not Effect.remember}
+
+
+def variants(settings: Settings) -> list[tuple[Effect, ...]]:
+    """The configured effects with one uncertain parameter moved by its sigma, for each such parameter in turn."""
+    found = []
+    for effect in settings.effects:
+        for name, value in effect.parameters.items():
+            if value.sigma > 0.0:
+                found.append(configured(_moved(settings.effects, effect, name)))
+    return found
+
+
+def _moved(
+    effects: tuple[ConfiguredEffect, ...], moved: ConfiguredEffect, name: str
+) -> tuple[ConfiguredEffect, ...]:
+    value = moved.parameters[name]
+    bounds = next(p for p in type(make(moved.name, {})).parameters() if p.name == name)
+    up = min(value.value + value.sigma, bounds.high)
+    parameters = {**moved.parameters, name: replace(value, value=up)}
+    return tuple(replace(e, parameters=parameters) if e is moved else e for e in effects)
+
+
+def with_latencies(settings: Settings) -> Settings:
+    """The settings with a configured sensor latency in the channels' own, and a horizon that waits for the slowest."""
+    delays = {
+        key: value.value
+        for effect in settings.effects
+        if effect.name == "sensor_latency"
+        for key, value in effect.parameters.items()
+    }
+    if not any(delays.values()):
+        return settings
+    names = {"sinkage_pot": "sinkage", "motor_shunt": "current"}
+    channels = {
+        name: replace(channel, latency=channel.latency + delays.get(names.get(name, ""), 0.0))
+        for name, channel in settings.channels.items()
+    }
+    wrench = settings.wrench and replace(
+        settings.wrench, latency=settings.wrench.latency + delays.get("force", 0.0)
+    )
+    horizon = settings.rates.horizon + max(0.0, *delays.values())
+    return replace(
+        settings, channels=channels, wrench=wrench, rates=replace(settings.rates, horizon=horizon)
+    )

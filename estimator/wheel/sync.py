@@ -1,0 +1,414 @@
+"""Readings in, one calibrated snapshot a tick out: all channels over the same window, 50 ms behind the present.
+
+Each channel keeps its readings sorted by stamp. A tick at t closes the window at t − horizon: readings up to there
+move in, readings older than the window move out. A reading that comes later than the horizon allows is counted and
+dropped, one that comes twice is counted and dropped, one that comes out of order but in time changes nothing: the
+result is that of the sorted stream, bit for bit.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf, isnan, sqrt
+from typing import Any, NamedTuple
+
+from gritd.estimator.config.settings import Channel, Settings
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.wheel.geometry import slope_sigma
+
+NS = 1_000_000_000
+STUCK_AFTER = int(0.34 * NS)  # [ns] a live sensor shows noise or motion sooner than this
+
+
+class Sample(NamedTuple):
+    """A reading inside a channel's window: latency-corrected stamp [ns] and value."""
+
+    stamp: int
+    value: float
+
+
+@dataclass
+class Counters:
+    """Exact counts since the start of the run."""
+
+    late: int = 0
+    duplicates: int = 0
+    jumps: int = 0
+    invalid: int = 0
+
+
+class Slope(NamedTuple):
+    """A count over the window: mean [raw], rate [raw/s] and their standard deviations."""
+
+    mean: float
+    rate: float
+    rate_sigma: float
+
+
+class Mean(NamedTuple):
+    value: float  # raw
+    sigma: float  # raw
+
+
+@dataclass
+class Window:
+    """The readings of one channel, or of one axis of it, on both sides of the horizon.
+
+    noise: standard deviation of one reading [raw]; latency [ns]; length of the window [ns].
+    """
+
+    noise: float
+    latency: int
+    length: int
+    pending: list[Sample] = field(default_factory=list)  # newer than the horizon, sorted
+    inside: deque[Sample] = field(default_factory=deque)  # within the window, sorted
+    closed: int = -1  # end of the last window [ns]; nothing older is accepted
+    still_since: int = -1  # stamp since which the value has not changed [ns]
+    last: float = inf
+
+    def insert(self, stamp: int, value: float, counters: Counters) -> None:
+        """Sort one reading in; drop it as late or duplicate, and count that."""
+        sample = Sample(stamp - self.latency, value)
+        if sample.stamp <= self.closed:
+            same = self._has(self.inside, sample.stamp)
+            counters.duplicates += same
+            counters.late += not same
+        elif self.pending and sample.stamp <= self.pending[-1].stamp:
+            if self._has(self.pending, sample.stamp):
+                counters.duplicates += 1
+            else:
+                insort(self.pending, sample)
+        else:
+            self.pending.append(sample)
+
+    @staticmethod
+    def _has(samples: list[Sample] | deque[Sample], stamp: int) -> bool:
+        place = bisect_left(samples, stamp, key=lambda sample: sample.stamp)
+        return place < len(samples) and samples[place].stamp == stamp
+
+    def advance(self, end: int) -> None:
+        """Close the window at `end` [ns]: (end − length, end]."""
+        self.closed = end
+        pending, inside = self.pending, self.inside
+        ready = 0
+        while ready < len(pending) and pending[ready].stamp <= end:
+            self._enter(pending[ready])
+            ready += 1
+        del pending[:ready]
+        start = end - self.length
+        while inside and inside[0].stamp <= start:
+            self._leave(inside.popleft())
+
+    def _enter(self, sample: Sample) -> None:
+        if sample.value != self.last:
+            self.last, self.still_since = sample.value, sample.stamp
+        self.inside.append(sample)
+
+    def _leave(self, sample: Sample) -> None:
+        """A reading has left the window."""
+
+    def still_for(self) -> int:
+        """How long the value has not changed at all [ns]."""
+        return self.closed - self.still_since if self.inside else 0
+
+
+class MeanWindow(Window):
+    """Mean of an analogue channel over the window."""
+
+    def mean(self) -> Mean | None:
+        inside = self.inside
+        if not inside:
+            return None
+        count = len(inside)
+        return Mean(sum([sample.value for sample in inside]) / count, self.noise / sqrt(count))
+
+
+@dataclass
+class SlopeWindow(Window):
+    """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
+
+    max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken out by a shift of
+    the baseline, so neither position nor speed shows it.
+    """
+
+    max_rate: float = inf
+    counters: Counters = field(default_factory=Counters)
+    shift: int = 0  # counts added since the first jump
+    origin: tuple[int, int] = (
+        0,
+        0,
+    )  # stamp and count the sums are taken about: keeps the integers short
+    sums: tuple[int, int, int, int] = (0, 0, 0, 0)  # Σt, Σx, Σt², Σtx
+
+    def _enter(self, sample: Sample) -> None:
+        value = int(sample.value) + self.shift
+        if self.inside:
+            before = self.inside[-1]
+            step = value - int(before.value)
+            if abs(step) * NS > self.max_rate * (sample.stamp - before.stamp) + 2 * NS:
+                lost = step - self._expected_step(sample.stamp - before.stamp)
+                self.shift -= lost
+                value -= lost
+                self.counters.jumps += 1
+        else:
+            self.origin = (sample.stamp, value)
+            self.sums = (0, 0, 0, 0)
+        super()._enter(Sample(sample.stamp, value))
+        self._add(sample.stamp, value, 1)
+
+    def _expected_step(self, elapsed: int) -> int:
+        """Counts the window's own slope predicts for a time [ns]."""
+        slope = self.slope()
+        return round(slope.rate * elapsed / NS) if slope else 0
+
+    def _leave(self, sample: Sample) -> None:
+        self._add(sample.stamp, int(sample.value), -1)
+
+    def _add(self, stamp: int, value: int, sign: int) -> None:
+        t, x = stamp - self.origin[0], value - self.origin[1]
+        st, sx, stt, stx = self.sums
+        self.sums = (st + sign * t, sx + sign * x, stt + sign * t * t, stx + sign * t * x)
+
+    def slope(self) -> Slope | None:
+        """None until the readings span half the window: a slope over less is not the window's."""
+        count = len(self.inside)
+        if count < 3 or self.inside[-1].stamp - self.inside[0].stamp < self.length // 2:
+            return None
+        st, sx, stt, stx = self.sums
+        spread = count * stt - st * st  # count · Σ(t − t̄)² [ns²], exact
+        rate = (count * stx - st * sx) / spread * NS
+        moved = abs(self.inside[-1].value - self.inside[0].value)
+        sigma = slope_sigma(self.noise, sqrt(spread / count) / NS, count, moved)
+        return Slope(self.origin[1] + sx / count, rate, sigma)
+
+
+class Measured(NamedTuple):
+    """A physical quantity over the window, SI, with the standard deviation of its noise."""
+
+    value: float
+    sigma: float
+
+
+NOTHING = Measured(float("nan"), 0.0)
+
+
+class Snapshot(NamedTuple):
+    """All channels over one window, calibrated, SI. Quantities of an absent optional sensor are NaN ± 0."""
+
+    evaluated: int  # centre of the window [ns]
+    ready: bool  # every required channel has a value
+    wheel_angle: float  # [rad]
+    wheel_speed: Measured  # [rad/s]
+    carriage_position: float  # [m]
+    carriage_speed: Measured  # [m/s]
+    sinkage: Measured  # z [m]
+    current: Measured  # [A]
+    load: Measured  # W [N]
+    drawbar_pull: Measured  # DP [N]
+    axle_torque: Measured  # torque about the axle by the wrench [N·m]
+    temperature: float  # [°C]
+    stale: int  # CHANNEL_BITS of silent channels
+    stuck: int  # CHANNEL_BITS of channels that stand still while others move
+
+
+class Sync:
+    """The sorted windows of all channels. `push` takes readings, `snapshot` closes the windows for one tick."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.counters = Counters()
+        self.received: dict[str, int] = {}
+        self._horizon = round(settings.rates.horizon * NS)
+        self._length = round(NS / settings.rates.update)
+        self._slopes = {name: self._slope_window(settings.channels[name]) for name in _ENCODERS}
+        self._means = {
+            name: MeanWindow(channel.noise, round(channel.latency * NS), self._length)
+            for name, channel in settings.channels.items()
+            if name not in _ENCODERS
+        }
+        self._wrench = self._wrench_windows()
+        self._stale_after = {
+            name: round(ch.stale_after * NS) for name, ch in settings.channels.items()
+        }
+        if settings.wrench is not None:
+            self._stale_after["wrench"] = round(settings.wrench.stale_after * NS)
+
+    def _slope_window(self, channel: Channel) -> SlopeWindow:
+        return SlopeWindow(
+            channel.noise,
+            round(channel.latency * NS),
+            self._length,
+            max_rate=channel.max_rate,
+            counters=self.counters,
+        )
+
+    def _wrench_windows(self) -> dict[str, MeanWindow]:
+        wrench = self.settings.wrench
+        if wrench is None:
+            return {}
+        latency = round(wrench.latency * NS)
+        noises = {"fx": wrench.force_noise, "fz": wrench.force_noise, "ty": wrench.torque_noise}
+        return {axis: MeanWindow(noise, latency, self._length) for axis, noise in noises.items()}
+
+    def memory(self) -> dict[str, Any]:
+        """Everything that the readings so far have left, by name; `remember` takes it in again."""
+        windows = {**self._slopes, **self._means, **self._wrench}
+        return {"counters": self.counters, "received": self.received, "windows": windows}
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        """Go on from another sync's memory. Raises ValueError where it has other channels."""
+        windows = memory["windows"]
+        for mine in (self._slopes, self._means, self._wrench):
+            if not mine.keys() <= windows.keys():
+                raise ValueError(f"no window for {', '.join(sorted(mine.keys() - windows.keys()))}")
+            mine.update({name: windows[name] for name in mine})
+        self.counters, self.received = memory["counters"], memory["received"]
+        for window in self._slopes.values():
+            window.counters = self.counters
+
+    def continued(self, before: Sync) -> None:
+        """Begin with empty windows where another sync ends: its counters and its encoders' baselines go on."""
+        self.received = before.received
+        self.counters = before.counters
+        for name, window in self._slopes.items():
+            window.counters, window.shift = self.counters, before._slopes[name].shift
+
+    def push(self, reading: Reading) -> None:
+        """Sort one reading in. Non-finite and out-of-range values are counted and go no further."""
+        name, value = reading.channel, reading.value
+        self.received[name] = max(reading.received, self.received.get(name, 0))
+        if name in self._slopes:
+            self._push_count(reading)
+        elif name in self._means:
+            channel = self.settings.channels[name]
+            assert not isinstance(value, tuple)
+            if channel.low <= value <= channel.high:
+                self._means[name].insert(reading.stamp, value, self.counters)
+            else:
+                self.counters.invalid += 1
+        elif name == "wrench" and self._wrench:
+            self._push_wrench(reading)
+
+    def _push_count(self, reading: Reading) -> None:
+        assert isinstance(reading.value, int)
+        self._slopes[reading.channel].insert(reading.stamp, reading.value, self.counters)
+
+    def _push_wrench(self, reading: Reading) -> None:
+        wrench, value = self.settings.wrench, reading.value
+        assert wrench is not None and isinstance(value, tuple)
+        limits = (wrench.max_force,) * 3 + (wrench.max_torque,) * 3
+        if not all(
+            isnan(v) or abs(v) <= limit for v, limit in zip(value, limits, strict=True)
+        ) or isnan(value[2]):
+            self.counters.invalid += 1
+            return
+        repeated = (
+            Counters()
+        )  # the three axes share one stamp: count a late or repeated reading once
+        for axis, component in (("fx", value[0]), ("ty", value[4])):
+            if not isnan(component):  # an axis that is not measured
+                self._wrench[axis].insert(reading.stamp, component, repeated)
+        self._wrench["fz"].insert(reading.stamp, value[2], self.counters)
+
+    def snapshot(self, t: int) -> Snapshot:
+        """Close all windows at t − horizon [ns] and evaluate them at their common centre."""
+        end = t - self._horizon
+        for window in (*self._slopes.values(), *self._means.values(), *self._wrench.values()):
+            window.advance(end)
+        wheel, carriage = (
+            self._slopes["wheel_encoder"].slope(),
+            self._slopes["carriage_encoder"].slope(),
+        )
+        means = {name: window.mean() for name, window in self._means.items()}
+        ready = None not in (wheel, carriage, means["sinkage_pot"], means["motor_shunt"])
+        angle, speed = self._encoder("wheel_encoder", wheel, 1.0)
+        position, travel = self._encoder("carriage_encoder", carriage, self.settings.pulley_radius)
+        temperature = means.get("motor_temperature")
+        return Snapshot(
+            evaluated=end - self._length // 2,
+            ready=ready,
+            wheel_angle=angle,
+            wheel_speed=speed,
+            carriage_position=position,
+            carriage_speed=travel,
+            sinkage=self._analogue("sinkage_pot", means["sinkage_pot"]),
+            current=self._analogue("motor_shunt", means["motor_shunt"]),
+            load=self._axis("fz"),
+            drawbar_pull=self._axis("fx"),
+            axle_torque=self._axis("ty"),
+            temperature=self._analogue("motor_temperature", temperature).value
+            if temperature
+            else float("nan"),
+            stale=self._stale(t),
+            stuck=self._stuck(speed, travel),
+        )
+
+    def _encoder(self, name: str, slope: Slope | None, arm: float) -> tuple[float, Measured]:
+        """Position and speed of an encoder; arm is the pulley radius, or 1 for an angle."""
+        if slope is None:
+            return float("nan"), NOTHING
+        calibration = self.settings.channels[name].calibration
+        scale = calibration.scale.value * arm
+        position = slope.mean * scale + calibration.offset.value * arm
+        return position, Measured(slope.rate * scale, slope.rate_sigma * abs(scale))
+
+    def _analogue(self, name: str, mean: Mean | None) -> Measured:
+        if mean is None:
+            return NOTHING
+        calibration = self.settings.channels[name].calibration
+        scale = calibration.scale.value
+        return Measured(mean.value * scale + calibration.offset.value, mean.sigma * abs(scale))
+
+    def _axis(self, axis: str) -> Measured:
+        wrench = self.settings.wrench
+        mean = self._wrench[axis].mean() if wrench is not None else None
+        if wrench is None or mean is None:
+            return NOTHING
+        calibration = {"fx": wrench.drawbar_pull, "fz": wrench.load, "ty": wrench.torque}[axis]
+        scale = calibration.scale.value
+        return Measured(mean.value * scale + calibration.offset.value, mean.sigma * abs(scale))
+
+    def _stale(self, t: int) -> int:
+        """Bits of channels whose last bytes came longer ago than they may; a channel never heard of counts too."""
+        return sum(
+            CHANNEL_BITS[name]
+            for name, limit in self._stale_after.items()
+            if t - self.received.get(name, -limit) > limit
+        )
+
+    def _stuck(self, wheel: Measured, carriage: Measured) -> int:
+        """Bits of channels whose value does not change at all while the others show motion.
+
+        An encoder is stuck when the other encoder moves and it does not change; a wheel that really stands still
+        while the carriage moves is dragged, which no update survives either. A potentiometer, shunt or wrench is stuck
+        when the wheel turns and not one digit of noise shows, of the wrench on any axis.
+        """
+        turning, travelling = _moves(wheel), _moves(carriage)
+        bits = 0
+        if travelling and self._slopes["wheel_encoder"].still_for() >= STUCK_AFTER:
+            bits |= CHANNEL_BITS["wheel_encoder"]
+        if turning or travelling:
+            for name in ("sinkage_pot", "motor_shunt"):
+                window = self._means[name]
+                if window.noise > 0.0 and window.still_for() >= STUCK_AFTER:
+                    bits |= CHANNEL_BITS[name]
+            if self._wrench and self._wrench_frozen():
+                bits |= CHANNEL_BITS["wrench"]
+        return bits
+
+    def _wrench_frozen(self) -> bool:
+        heard = [window for window in self._wrench.values() if window.inside]
+        return bool(heard) and all(
+            window.noise > 0.0 and window.still_for() >= STUCK_AFTER for window in heard
+        )
+
+
+def _moves(speed: Measured) -> bool:
+    return abs(speed.value) > 4.0 * speed.sigma
+
+
+_ENCODERS = ("wheel_encoder", "carriage_encoder")

@@ -1,0 +1,200 @@
+"""What the wheel is doing: slip, entry angle and the reason, if any, why this window teaches nothing about the soil."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot, isnan
+from typing import NamedTuple
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.messages.readings import REQUIRED
+from gritd.estimator.messages.record import CHANNEL_BITS, Flag, Status
+from gritd.estimator.stages.situation import Situation
+from gritd.estimator.wheel.chain import Added, Chain, Context, Here
+from gritd.estimator.wheel.geometry import (
+    EntryAngle,
+    entry_angle,
+    max_stress_angle,
+    slip,
+    slip_sigma,
+)
+from gritd.estimator.wheel.sync import Measured, Snapshot
+
+BRAKING_SLIP = (
+    -0.05
+)  # the linearised shear displacement changes sign along the contact below about this slip
+STALL_SLIP = 0.95
+SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
+ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
+STEADY = (
+    0.05  # relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
+)
+BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
+REQUIRED_BITS = sum(CHANNEL_BITS[name] for name in REQUIRED)
+
+
+class WheelState(NamedTuple):
+    """One window in the wheel's own terms, SI; `_sigma` is noise, not calibration error."""
+
+    rim_speed: Measured  # rω [m/s]
+    travel_speed: Measured  # v [m/s]
+    slip: Measured  # i [-]
+    sinkage: Measured  # z [m]
+    theta_1: EntryAngle  # with ∂θ₁/∂z
+    theta_m: float  # [rad]
+    torque: Measured  # T at the axle [N·m]
+    load: Measured  # W [N]
+    drawbar_pull: Measured  # [N], NaN ± 0 without the sensor
+    flags: Flag
+    added: Added | None = None  # what wheel and testbed effects add to the closed forms
+    here: Here | None = (
+        None  # the soil under this window from the estimated one; None where it is the same
+    )
+    columns: tuple[
+        tuple[float, float], ...
+    ] = ()  # change of predicted (T, DP) with each uncertain effect parameter
+    situation: Situation | None = None
+    read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
+
+
+def wheel_state(
+    settings: Settings,
+    snapshot: Snapshot,
+    chain: Chain | None = None,
+    context: Context | None = None,
+) -> WheelState:
+    """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain accounted for."""
+    if chain is None or context is None or not chain.acting or not snapshot.ready:
+        return _plain(settings, snapshot)
+    undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
+    true = snapshot._replace(
+        wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
+        carriage_speed=snapshot.carriage_speed._replace(value=undone.travel_speed),
+        sinkage=snapshot.sinkage._replace(value=undone.sinkage),
+        drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
+    )
+    now = _plain(replace(settings, wheel=chain.wheel), true)
+    return now._replace(
+        torque=now.torque._replace(value=undone.torque),
+        load=now.load._replace(value=undone.load),
+        here=undone.here,
+        situation=undone.situation,
+        read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
+    )
+
+
+def _plain(settings: Settings, snapshot: Snapshot) -> WheelState:
+    radius = settings.wheel.radius
+    rim = Measured(snapshot.wheel_speed.value * radius, snapshot.wheel_speed.sigma * radius)
+    travel = snapshot.carriage_speed
+    i = (
+        slip(rim.value, travel.value)
+        if rim.value > 0.0 or travel.value > 0.0
+        else slip(-rim.value, -travel.value)
+    )
+    angle = entry_angle(radius, snapshot.sinkage.value) if snapshot.ready else EntryAngle(0.0, 0.0)
+    load, flags = _load(settings, snapshot)
+    return WheelState(
+        rim_speed=rim,
+        travel_speed=travel,
+        slip=Measured(i.value, slip_sigma(i, rim.sigma, travel.sigma)),
+        sinkage=snapshot.sinkage,
+        theta_1=angle,
+        theta_m=max_stress_angle(settings.wheel.c1, settings.wheel.c2, i.value, angle.value),
+        torque=_torque(settings, snapshot),
+        load=load,
+        drawbar_pull=snapshot.drawbar_pull,
+        flags=flags,
+        read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
+    )
+
+
+def _load(settings: Settings, snapshot: Snapshot) -> tuple[Measured, Flag]:
+    """W measured where there is a sensor and it speaks; the configured load otherwise."""
+    if settings.wrench is not None and not isnan(snapshot.load.value):
+        return snapshot.load, Flag.NONE
+    return Measured(settings.load.nominal.value, 0.0), Flag.LOAD_ASSUMED
+
+
+def _torque(settings: Settings, snapshot: Snapshot) -> Measured:
+    if settings.drive.torque_source == "wrench":
+        return snapshot.axle_torque
+    constant = settings.drive.torque_constant.value
+    return Measured(snapshot.current.value * constant, snapshot.current.sigma * abs(constant))
+
+
+def classify(
+    settings: Settings,
+    snapshot: Snapshot,
+    now: WheelState,
+    before: WheelState | None,
+    required: int = REQUIRED_BITS,
+    started: bool = True,
+) -> Status:
+    """TRACKING, or the first reason that applies why the window is not used.
+
+    required: CHANNEL_BITS; started: whether every required channel has filled a window once.
+    """
+    if snapshot.stale & required or not snapshot.ready or _unread(settings, now):
+        return Status.STALE if started else Status.STARTING
+    if snapshot.stuck:
+        return Status.STUCK
+    return _contact(settings, now) or _travel(settings, now) or _steadiness(now, before)
+
+
+def _unread(settings: Settings, now: WheelState) -> bool:
+    """Whether the wrench, where there is one, sends nothing usable of what is needed of it."""
+    return isnan(now.torque.value) or (
+        settings.wrench is not None and bool(now.flags & Flag.LOAD_ASSUMED)
+    )
+
+
+def _contact(settings: Settings, now: WheelState) -> Status | None:
+    if now.load.value < settings.load.minimum or now.theta_1.value <= 0.0:
+        return Status.IN_AIR
+    return None
+
+
+def _travel(settings: Settings, now: WheelState) -> Status | None:
+    turning, travelling = moves(now.rim_speed), moves(now.travel_speed)
+    if not turning and not travelling:
+        pushing = (
+            BLOCKED_TORQUE * settings.wheel.radius * now.load.value * settings.soil.tan_phi.value
+        )
+        return Status.STALL if abs(now.torque.value) > pushing else Status.STANDSTILL
+    if (turning and now.rim_speed.value < 0.0) or (travelling and now.travel_speed.value < 0.0):
+        return Status.REVERSE
+    if not travelling or now.slip.value > STALL_SLIP:
+        return Status.STALL
+    if now.slip.value < BRAKING_SLIP:
+        return Status.BRAKING
+    return None
+
+
+def _steadiness(now: WheelState, before: WheelState | None) -> Status:
+    if now.slip.sigma > SLIP_SIGMA_MAX:
+        return Status.UNCERTAIN
+    if now.theta_1.d_sinkage * now.sinkage.sigma > ANGLE_SIGMA_MAX * now.theta_1.value:
+        return Status.UNCERTAIN
+    if before is None or not all(
+        _steady(a, b)
+        for a, b in (
+            (now.rim_speed, before.rim_speed),
+            (now.travel_speed, before.travel_speed),
+            (now.load, before.load),
+            (now.sinkage, before.sinkage),
+        )
+    ):
+        return Status.UNSTEADY
+    return Status.TRACKING
+
+
+def moves(speed: Measured) -> bool:
+    """Whether a speed differs from zero by more than its noise explains."""
+    return abs(speed.value) > 4.0 * speed.sigma
+
+
+def _steady(now: Measured, before: Measured) -> bool:
+    return abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * hypot(
+        now.sigma, before.sigma
+    )

@@ -1,0 +1,1 @@
+"""gritd: learns the soil under a rover wheel while the wheel drives."""

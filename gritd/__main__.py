@@ -1,0 +1,8 @@
+"""`python -m gritd`: the command line."""
+
+import sys
+
+from gritd.tools.cli.main import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""From configuration to readers: any sensor on either bus, and one clear line where it cannot work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gritd.drivers.build import build_decoder, build_readers, used_devices
+from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.queue import ReadingQueue
+from gritd.drivers.wire import CanWire, SerialWire
+from gritd.estimator.config.configuration import load
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS
+from tests.drivers.rig import (
+    CAN_SIGNALS,
+    Ticking,
+    can_device,
+    channel,
+    serial_device,
+    wiring,
+    wrench,
+)
+from tests.drivers.test_framing_can import chunk
+
+VALUES = {name: (70_000 if name in ENCODERS else 1.25,) for name in CHANNELS}
+VALUES["wrench"] = (1.0, 2.0, 3.0, 0.5, 0.25, -0.5)
+WRENCH_MESSAGES = {"WrenchForce": slice(0, 3), "WrenchTorque": slice(3, 6)}
+
+
+def build(settings):
+    return build_readers(settings, Ticking(), ReadingQueue())
+
+
+def settings_for(name, device):
+    """One channel on one device."""
+    on_can = device.kind == "can"
+    if name == "wrench":
+        return wiring(
+            [device], [], wrench(device.name, "+".join(WRENCH_MESSAGES) if on_can else "wrench")
+        )
+    return wiring([device], [channel(name, device.name, CAN_SIGNALS[name] if on_can else name)])
+
+
+@pytest.mark.parametrize("name", list(CHANNELS))
+@pytest.mark.parametrize("framing", ["cobs", "ascii"])
+def test_any_sensor_on_a_serial_port_by_configuration_alone(name, framing):
+    device = serial_device(framing=framing)
+    decoder = build_decoder(settings_for(name, device), device)
+    (reading,) = decoder.decode(10**18, SerialWire(device).encode(name, VALUES[name], 5000))
+    assert reading == (10**18, name, VALUES[name] if name == "wrench" else VALUES[name][0], 10**18)
+
+
+@pytest.mark.parametrize("name", list(CHANNELS))
+def test_any_sensor_on_a_can_bus_by_configuration_alone(name):
+    device = can_device()
+    decoder, wire = build_decoder(settings_for(name, device), device), CanWire(device)
+    if name == "wrench":
+        messages = [wire.encode(key, VALUES[name][part]) for key, part in WRENCH_MESSAGES.items()]
+    else:
+        messages = [wire.encode(CAN_SIGNALS[name], VALUES[name], 5000)]
+    (reading,) = [
+        reading for message in messages for reading in decoder.decode(10**18, chunk(message))
+    ]
+    assert reading.channel == name
+    assert reading.value == (VALUES[name] if name == "wrench" else VALUES[name][0])
+
+
+def test_one_reader_for_each_device_in_use():
+    devices = [serial_device(name="a"), can_device(name="b"), serial_device(name="unused")]
+    channels = [channel("wheel_encoder", "a"), channel("sinkage_pot", "b", "SinkagePot.Volts")]
+    settings = wiring(devices, channels, wrench("a"))
+    assert [reader.device for reader in build(settings)] == ["a", "b"]
+    assert [device.name for device in used_devices(settings)] == ["a", "b"]
+
+
+def test_two_devices_may_be_clocked_differently():
+    """On one CAN bus every node has its own clock: a jump of one leaves the other alone."""
+    device = can_device()
+    channels = [
+        channel(name, "bus", CAN_SIGNALS[name]) for name in ("wheel_encoder", "sinkage_pot")
+    ]
+    decoder, wire = build_decoder(wiring([device], channels), device), CanWire(device)
+    for n in range(300):
+        received = 10**18 + n * 10_000_000
+        for key, start in (("WheelEncoder.Count", 0), ("SinkagePot.Volts", 9_000_000)):
+            (reading,) = decoder.decode(received, chunk(wire.encode(key, [1], start + n * 10_000)))
+            assert reading.stamp == received
+
+
+def test_a_device_that_restarts_does_not_turn_the_wheel():
+    device = serial_device()
+    decoder = build_decoder(wiring([device], [channel("wheel_encoder", "encoders")]), device)
+    before, after = SerialWire(device), SerialWire(device)
+    counts = []
+    for n in range(100):
+        counts += decoder.decode(
+            10**18 + n * 10_000_000, before.encode("wheel_encoder", [5000 + n], 10**7 + n * 10_000)
+        )
+    for n in range(100):
+        counts += decoder.decode(
+            10**18 + (200 + n) * 10_000_000, after.encode("wheel_encoder", [n], n * 10_000)
+        )
+    values = [reading.value for reading in counts]
+    assert values == [*range(5000, 5100), *range(5099, 5199)]
+    assert decoder.framing.counts.lost == 0
+
+
+@pytest.mark.parametrize(
+    "settings, expected",
+    [
+        (wiring([serial_device()], [channel("wheel_encoder", "nope")]), "no device 'nope', there are: encoders"),
+        (wiring([can_device()], [channel("wheel_encoder", "bus", "Nope.Count")]), "device bus: no message Nope"),
+        (wiring([can_device()], [channel("wheel_encoder", "bus", "WheelEncoder.Count", bits=16)]), "bits is 16, but"),
+        (wiring([can_device()], [channel("wheel_encoder", "bus", "SinkagePot.Volts")]), "not one unscaled integer"),
+        (wiring([can_device()], [channel("wheel_encoder", "bus", "WrenchForce")]), "not one unscaled integer"),
+        (wiring([can_device()], [channel("sinkage_pot", "bus", "WrenchForce")]), "expected one signal"),
+        (wiring([can_device()], [], wrench("bus", "WrenchTorque+WrenchForce")), "its signals are tx ty tz fx fy fz"),
+        (wiring([can_device()], [], wrench("bus", "WrenchForce")), "expected fx fy fz tx ty tz"),
+        (wiring([serial_device()], [], wrench("encoders", "f+t")), "expected one key"),
+        (wiring([can_device("nope")], [channel("sinkage_pot", "bus", "SinkagePot.Volts")]), "no CAN interface 'nope'"),
+        (wiring([can_device(dbc="/nope.dbc")], [channel("sinkage_pot", "bus", "A.B")]), "cannot read /nope.dbc: No"),
+    ],
+)  # fmt: skip
+def test_wiring_that_cannot_work_is_one_clear_line(settings, expected):
+    with pytest.raises(DeviceSettingsError) as error:
+        build(settings)
+    assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+def test_wrench_messages_without_a_cycle_are_refused():
+    axes = ("fx", "fy", "fz", "tx", "ty", "tz")
+    signals = {
+        f"{'F' if n < 3 else 'T'}.{axis}": {"id": 1 + n // 3, "start": n % 3 * 16, "length": 16}
+        for n, axis in enumerate(axes)
+    }
+    with pytest.raises(
+        DeviceSettingsError, match="F and T make one value, expected a Cycle signal in each"
+    ):
+        build(wiring([can_device(dbc="", signals=signals)], [], wrench("bus", "F+T")))
+
+
+def test_the_delivered_configuration_builds_its_readers():
+    settings = load(Path(__file__).parents[2] / "config" / "testbed.yaml").settings
+    assert [reader.device for reader in build(settings)] == ["encoders", "bus"]

@@ -1,0 +1,70 @@
+"""The daemon says that model and measurement disagree, in which channel and since when; without cause it does not."""
+
+from __future__ import annotations
+
+from gritd.estimator.daemon.disagreement import Watch
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.record import TICK_NAMES, Flag
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.tools.commands.status import summary
+from tests.estimator.filter.test_tracker import RIG, TRUTH
+from tests.linear_plant import THREE_LOADS, readings
+
+SHUNT = RIG.channels["motor_shunt"].calibration.scale.value
+BEGINS, ENDS = 80, 200  # ticks, ten a second
+
+
+def watched(loss: float) -> tuple[Watch, list[tuple[int, str]], list[int]]:
+    """A run whose motor consumes more torque between two ticks; the lines said, with their tick, and all flags."""
+    pipeline, watch = Pipeline(RIG, "plain"), Watch()
+    state, said, flags = pipeline.start(), [], []
+    more = loss / RIG.drive.torque_constant.value / SHUNT
+    for number, (t, batch) in enumerate(readings(RIG, TRUTH, THREE_LOADS, seed=3)):
+        if BEGINS <= number < ENDS:
+            batch = [_more(reading, more) for reading in batch]
+        state, tick = pipeline.step(state, batch, t)
+        flags.append(int(tick[TICK_NAMES.index("flags")]))
+        if line := watch.look(tick):
+            said.append((number, line))
+    return watch, said, flags
+
+
+def _more(reading: Reading, volts: float) -> Reading:
+    if reading.channel != "motor_shunt" or isinstance(reading.value, tuple):
+        return reading
+    return reading._replace(value=reading.value + volts)
+
+
+def test_a_motor_that_suddenly_drags_is_said_with_channel_and_time() -> None:
+    _, said, flags = watched(1.0)
+    assert any(flag & Flag.MISMATCH for flag in flags)
+    number, line = said[0]
+    assert BEGINS < number <= BEGINS + 60  # within 6 s
+    assert (
+        line.startswith("model and measurement disagree since ")
+        and " UTC: " in line
+        and " σ off" in line
+    )
+
+
+def test_an_honest_run_is_never_said_to_disagree() -> None:
+    watch, said, flags = watched(0.0)
+    assert not said and watch.present is None and not any(flag & Flag.MISMATCH for flag in flags)
+
+
+def test_status_names_channel_and_time() -> None:
+    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
+    loop, log = {"ticks": 1}, {"state": "writing", "dropped": 0, "file": "a", "error": ""}
+    report = {
+        "pid": 1,
+        "status": "TRACKING",
+        "flags": ["MISMATCH"],
+        "tick": {},
+        "loop": loop,
+        "log": log,
+    }
+    rest = {"devices": {}, "hanging": "", "real_time": "yes"}
+    assert "  model    disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off" in list(
+        summary({**report, **rest, "disagreement": found})
+    )
+    assert not any("model" in line for line in summary({**report, **rest, "disagreement": None}))

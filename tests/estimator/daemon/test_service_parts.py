@@ -1,0 +1,378 @@
+"""What the service is made of: notifications, pulses, the disk cap, the status socket and those who read it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import pty
+import re
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import termios
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from gritd.estimator.daemon import notify
+from gritd.estimator.daemon.health import Pulse, silent
+from gritd.estimator.daemon.notify import Notifier
+from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.recording import patience
+from gritd.estimator.recording.retention import sweep, trim
+from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.writer import WriterThread
+from gritd.tools.cli.command import CommandError
+from gritd.tools.commands import monitor, status
+
+ROOT = Path(__file__).parents[3]
+REPORT = {
+    "pid": 1,
+    "uptime": 3.0,
+    "healthy": True,
+    "hanging": "",
+    "real_time": "yes",
+    "configuration": "rig.yaml",
+    "status": "STARTING",
+    "flags": [],
+    "channels": {"wheel_encoder": "stale"},
+    "tick": {},
+    "loop": {"ticks": 7, "missed": 2, "lateness": 1e-4, "late_50": 1e-5},
+    "queue": {"received": 5, "processed": 5, "dropped": 0, "queued": 0},
+    "devices": {
+        'a"b': {
+            **dict.fromkeys(
+                ("readings", "frames", "bad", "lost", "errors", "quarantined", "reopened"), 3
+            ),
+            **{"state": "WAITING", "rate": 0.0, "last_error": "cannot open"},
+        }
+    },
+    "log": {
+        "state": "writing",
+        "error": "",
+        "queued": 0,
+        "dropped": 0,
+        "written": 9,
+        "files": 1,
+        "file": "run.mcap",
+    },
+}
+
+
+@pytest.fixture
+def manager(tmp_path):
+    """A service manager's socket, and the environment it gives."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.settimeout(60.0)
+        yield listener, {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "3000000"}
+
+
+def test_messages_reach_the_service_manager(manager):
+    listener, environment = manager
+    notifier = Notifier(environment)
+    assert notifier.interval == 1.0
+    notifier.tell(notify.READY, notify.status("two\nlines"))
+    assert listener.recv(1000) == b"READY=1\nSTATUS=two lines"
+    notifier.tell(notify.reloading())
+    assert re.fullmatch(rb"RELOADING=1\nMONOTONIC_USEC=\d+", listener.recv(1000))
+
+
+def test_a_state_is_told_again_to_a_manager_that_was_behind(manager):
+    """Its socket takes a few datagrams; strokes and status are passed over, a state is not."""
+    listener, environment = manager
+    notifier = Notifier(environment)
+    for _ in range(1000):
+        notifier.tell(notify.WATCHDOG)
+    notifier.tell(notify.READY)
+    taken = drained(listener)
+    assert 0 < len(taken) < 1000 and set(taken) == {b"WATCHDOG=1"}
+    notifier.tell(notify.WATCHDOG)
+    assert drained(listener) == [b"READY=1", b"WATCHDOG=1"]
+
+
+def test_a_state_is_told_again_after_a_want_of_descriptors(manager, monkeypatch):
+    listener, environment = manager
+    notifier = Notifier(environment)
+
+    def none_left(*_):
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(notify.socket, "socket", none_left)
+        notifier.tell(notify.READY)
+        notifier.tell(notify.WATCHDOG)
+    notifier.tell(notify.WATCHDOG)
+    assert drained(listener) == [b"READY=1", b"WATCHDOG=1"]
+
+
+def drained(listener):
+    """All datagrams that wait."""
+    listener.setblocking(False)
+    taken = []
+    with suppress(BlockingIOError):
+        while True:
+            taken.append(listener.recv(1000))
+    return taken
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": "1"},
+        {"NOTIFY_SOCKET": "/nowhere"},
+    ],
+)
+def test_without_a_manager_nothing_is_asked_and_nothing_fails(environment):
+    notifier = Notifier(environment)
+    notifier.tell(notify.READY)
+    assert notifier.interval == 0.0
+
+
+def test_an_abstract_socket_is_understood():
+    name = f"\0gritd-test-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(name)
+        Notifier({"NOTIFY_SOCKET": "@" + name[1:]}).tell(notify.WATCHDOG)
+        assert listener.recv(100) == b"WATCHDOG=1"
+
+
+def test_a_pulse_is_lost_after_its_patience_and_found_again():
+    beats = [0]
+    pulse = Pulse("loop", lambda: beats[0], 3)
+    assert [silent([pulse]) for _ in range(4)] == ["", "", "loop", "loop"]
+    beats[0] += 1
+    assert silent([pulse]) == ""
+
+
+def test_patience_counts_looks_not_the_time_in_which_it_was_held_up(monkeypatch):
+    looks = []
+    monkeypatch.setattr(patience.time, "sleep", looks.append)
+    assert (
+        patience.waited(lambda: False, 1.0) == 0.0
+        and len(looks) == 100
+        and sum(looks) == pytest.approx(1.0)
+    )
+    looks.clear()
+    assert patience.waited(lambda: len(looks) == 25, 1.0) == pytest.approx(0.75)
+    assert patience.waited(lambda: True, 1.0) == 1.0 and patience.waited(lambda: True, 0.0) == 0.0
+
+
+def test_what_a_killed_daemon_had_only_begun_is_swept_away(tmp_path):
+    for name in (".a.mcap.new", "a.mcap", ".gritd.lock", "b.new"):
+        (tmp_path / name).touch()
+    sweep(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".gritd.lock", "a.mcap", "b.new"]
+
+
+def test_a_recording_whose_name_a_power_cut_took_back_gets_it_again(tmp_path):
+    """The folder may reach the medium later than the file: simulated by renaming a recording to its draft."""
+    path = tmp_path / "a.mcap"
+    thread = WriterThread(path, [], "a: 1\n", RunInfo("a"))
+    thread.put([Reading(10**18 + i, "wheel_encoder", i, 10**18 + i) for i in range(10)])
+    thread.stop()
+    path.rename(tmp_path / ".a.mcap.new")
+    assert sweep(tmp_path) == [path]
+    assert read(path).arrays("/raw/wheel_encoder")["count"].tolist() == list(range(10))
+
+
+def test_the_oldest_closed_recordings_go_first(tmp_path):
+    paths = [tmp_path / f"{n}.mcap" for n in range(5)]
+    for age, path in enumerate(paths):
+        path.write_bytes(bytes(1000))
+        os.utime(path, (1000 - age, 1000 - age))  # the last is the oldest
+    (tmp_path / "notes.txt").write_bytes(bytes(10_000))
+    assert trim(tmp_path, 3000, [paths[4]]) == [paths[3], paths[2]]
+    assert trim(tmp_path, 0, [paths[4]]) == [paths[1], paths[0]]
+    assert paths[4].exists() and (tmp_path / "notes.txt").exists()
+    assert trim(tmp_path, math.inf, []) == []
+
+
+@pytest.fixture
+def publisher(tmp_path):
+    publisher = Publisher(tmp_path / "gritd.sock", lambda: REPORT)
+    publisher.start()
+    yield publisher
+    publisher.close()
+    assert not publisher.path.exists()
+
+
+def test_the_socket_is_for_user_and_group_only(publisher):
+    assert stat.S_IMODE(os.stat(publisher.path).st_mode) == 0o660
+
+
+def test_reports_are_lines_of_strict_json_ten_a_second_at_most(publisher):
+    start = time.monotonic()
+    with status.connected(str(publisher.path)) as connection:
+        for _, report in zip(range(4), status.reports(connection), strict=False):
+            assert report == json.loads(json.dumps(REPORT))
+    assert time.monotonic() - start >= 0.3
+    assert line_of({"a": [math.nan, math.inf, 1.5]}) == b'{"a":[null,null,1.5]}\n'
+
+
+def test_a_client_that_does_not_read_is_left_and_others_are_served(publisher, monkeypatch):
+    lines = {"text": "x" * 40_000, **REPORT}
+    monkeypatch.setattr(publisher, "_report", lambda: lines)
+    with status.connected(str(publisher.path)), status.connected(str(publisher.path)) as eager:
+        served = iter(status.reports(eager))
+        while len(publisher._clients) != 1:
+            assert next(served)["pid"] == 1
+        assert next(served)["pid"] == 1 and publisher.alive
+
+
+def test_more_clients_than_there_is_room_for_are_turned_away(publisher):
+    connections = []
+    for _ in range(MAX_CLIENTS):
+        connections.append(status.connected(str(publisher.path)))
+        assert next(status.reports(connections[-1]))["pid"] == 1
+    with status.connected(str(publisher.path)) as late, pytest.raises(CommandError):
+        next(status.reports(late))
+    assert next(status.reports(connections[0]))["pid"] == 1
+    for connection in connections:
+        connection.close()
+
+
+def test_a_socket_that_a_dead_daemon_left_is_replaced_and_a_file_is_not(tmp_path):
+    path = tmp_path / "gritd.sock"
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(path))
+    Publisher(path, lambda: REPORT).close()
+    path.write_text("mine")
+    with pytest.raises(PublishError, match="a file of this name is there"):
+        Publisher(path, lambda: REPORT)
+    with pytest.raises(PublishError, match="longer than 107 bytes"):
+        Publisher(tmp_path / ("x" * 120), lambda: REPORT)
+
+
+@pytest.mark.parametrize("form", [[], ["--json"], ["--prometheus"]])
+def test_status_in_every_form(publisher, capsys, form):
+    assert status.main(["--socket", str(publisher.path), *form]) == 0
+    out = capsys.readouterr().out
+    if form == ["--json"]:
+        assert json.loads(out) == json.loads(json.dumps(REPORT))
+    elif form:
+        assert (
+            "gritd_ticks_missed_total 2\n" in out
+            and 'gritd_device_bad_total{device="a\\"b"} 3' in out
+        )
+        assert all(
+            re.fullmatch(r'#.*|[a-z_]+(\{device=".*"\})? [-+.\de]+', line)
+            for line in out.splitlines()
+        )
+    else:
+        assert "STARTING" in out and "WAITING" in out
+
+
+def test_status_of_a_daemon_that_hangs_is_code_1(publisher, monkeypatch):
+    monkeypatch.setattr(
+        publisher, "_report", lambda: {**REPORT, "healthy": False, "hanging": "loop"}
+    )
+    assert status.main(["--socket", str(publisher.path)]) == 1
+
+
+def test_no_daemon_is_one_line(tmp_path):
+    with pytest.raises(CommandError, match="no daemon answers: no such file or directory"):
+        status.main(["--socket", str(tmp_path / "none")])
+
+
+@pytest.mark.parametrize("line", [b"hello\n", b"[]\n", b"{}\n", b"[" * 5000 + b"\n"])
+def test_what_is_no_daemon_is_one_line(tmp_path, line):
+    path = tmp_path / "other"
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(path))
+        other.listen()
+        connection = status.connected(str(path))
+        other.accept()[0].sendall(line)
+        with connection, pytest.raises(CommandError, match="no gritd"):
+            next(status.reports(connection))
+
+
+def test_the_monitor_shows_channels_devices_and_log(publisher, capsys):
+    assert monitor.main(["--socket", str(publisher.path), "--once"]) == 0
+    out = capsys.readouterr().out
+    for words in ("wheel_encoder stale", "WAITING", "cannot open", "7 ticks, 2 missed", "run.mcap"):
+        assert words in out
+
+
+TICK = {
+    **{key: 12345.678 for _, name, sigma, *_ in monitor.SHOWN for key in (name, sigma)},
+    **{"separability": 1.0, "consistency": 1.0, "updates": 10**6, "resets": 10},
+    **dict.fromkeys(("late", "duplicates", "invalid", "jumps"), 10**5),
+}
+LATE = dict.fromkeys(("late_50", "late_99", "late_999", "late_max"), 0.01234)
+DEVICE = {**REPORT["devices"]['a"b'], "state": "OPEN", "rate": 1000.0, "last_error": ""}
+HEALTHY = {
+    **REPORT,
+    **{
+        "status": "STANDSTILL",
+        "flags": ["NOT_SEPARABLE", "K_ESTIMATED"],
+        "uptime": 1e6,
+        "tick": TICK,
+    },
+    "channels": dict.fromkeys(CHANNEL_BITS, "stale"),
+    "loop": {**REPORT["loop"], **LATE, "ticks": 10**8, "missed": 10**5},
+    "devices": {"encoders": DEVICE, "bus": DEVICE},
+}
+
+
+def test_the_monitor_fits_a_terminal_of_80_by_24_and_tells_of_trouble_first():
+    picture = list(monitor.lines(HEALTHY))
+    assert len(picture) <= 24 and max(map(len, picture)) <= 80
+    log = {
+        **REPORT["log"],
+        "state": "degraded",
+        "error": "run.mcap: cannot write: No space left on device",
+    }
+    sick = list(monitor.lines({**REPORT, "hanging": "loop", "log": log}))
+    assert sick[1:4] == [
+        "! hanging: loop",
+        '! a"b WAITING cannot open',
+        "! log degraded run.mcap: cannot write: No space left on device",
+    ]
+
+
+def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
+    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
+    picture = list(monitor.lines({**HEALTHY, "disagreement": found}))
+    assert picture[1] == "! model disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off"
+    assert len(picture) <= 24 and list(monitor.lines({**HEALTHY, "disagreement": None})) == list(
+        monitor.lines(HEALTHY)
+    )
+
+
+def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
+    """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never wrapped."""
+    master, slave = pty.openpty()
+    termios.tcsetwinsize(slave, (10, 40))
+    command = [sys.executable, "-m", "gritd", "monitor", "--socket", str(publisher.path)]
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # if we ignore it, so does a child
+    child = subprocess.Popen(command, stdout=slave, cwd=ROOT, env={**os.environ, "TERM": "xterm"})
+    signal.signal(signal.SIGINT, before)
+    os.close(slave)
+    seen = ""
+    while seen.count(monitor.HOME) < 3:
+        seen += os.read(master, 4096).decode(errors="replace")
+    child.send_signal(signal.SIGINT)
+    assert child.wait(120) == 130
+    seen += os.read(master, 4096).decode(errors="replace")
+    os.close(master)
+    assert seen.startswith(monitor.OPEN) and seen.endswith(monitor.CLOSE)
+    picture = re.sub(r"\033\[[?\d]*[A-Za-z]", "", seen.split(monitor.HOME)[2]).splitlines()
+    assert (
+        len(picture) == 10
+        and max(map(len, picture)) <= 40
+        and picture[1] == '! a"b WAITING cannot open'
+    )

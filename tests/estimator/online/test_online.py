@@ -1,0 +1,132 @@
+"""An effect that is at work and configured does not move c and tan φ: the filter accounts for it."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config.configuration import load
+from gritd.estimator.config.settings import ConfiguredEffect, Rates, Uncertain
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.messages.record import TICK_NAMES
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.tools.commands.simulate import simulate_run, soil_of
+from gritd.tools.testbed.fingerprints import typical
+from gritd.tools.testbed.plant import schedule
+from gritd.tools.testbed.schedule import motion_of
+
+TESTBED = load(packaged()).settings
+SETTINGS = replace(
+    TESTBED,
+    rates=Rates(tick=10.0, update=10.0),
+    filter=replace(TESTBED.filter, engine="plain"),
+    channels={
+        name: replace(channel, stale_after=1.0) for name, channel in TESTBED.channels.items()
+    },
+    wrench=replace(TESTBED.wrench, stale_after=1.0),
+)
+SOIL = soil_of(SETTINGS, {"cohesion": 750.0, "tan_phi": 0.62, "shear_modulus": 0.0225})
+MOTION = motion_of(schedule(45.0), SETTINGS.wheel.radius, 50.0)
+ACTING = sorted(
+    name for name, effect in EFFECTS.items() if not effect.filter_only and name != "empirical_law"
+)
+
+
+def last_tick(settings, readings):
+    """The last tick of a run in ticks of 0.1 s."""
+    pipeline = Pipeline(settings)
+    state, t, batch, tick = pipeline.start(), readings[0].received + 100_000_000, [], ()
+    for reading in readings:
+        while reading.received > t:
+            state, tick = pipeline.step(state, batch, t)
+            batch, t = [], t + 100_000_000
+        batch.append(reading)
+    return dict(zip(TICK_NAMES, tick, strict=True))
+
+
+def configure(effect, sigma=0.0):
+    """Every parameter at its value; sigma is relative and goes to the strengths."""
+    strengths = {p.name for p in type(effect).parameters() if p.role == "strength"}
+    values = {f.name: float(getattr(effect, f.name)) for f in fields(effect)}
+    return ConfiguredEffect(
+        effect.name,
+        {
+            key: Uncertain(v, sigma * abs(v) if key in strengths else 0.0)
+            for key, v in values.items()
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    return last_tick(SETTINGS, simulate_run(SETTINGS, SOIL, MOTION, (), 1).readings)
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_a_configured_effect_leaves_c_and_tan_phi_where_they_are(name, undisturbed):
+    """Drivetrain and sensor effects are undone: within one σ of the run without the effect. The others within two."""
+    effect = typical(EFFECTS[name])
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
+    known = last_tick(replace(SETTINGS, effects=(*SETTINGS.effects, configure(effect))), readings)
+    for quantity in ("cohesion", "tan_phi"):
+        away = abs(known[quantity] - undisturbed[quantity]) / undisturbed[f"{quantity}_sigma"]
+        assert away < (1.0 if effect.stage in ("drivetrain", "sensor") else 2.0), quantity
+    assert not known["resets"]
+
+
+@pytest.mark.parametrize("name", ["coulomb_friction", "force_crosstalk", "rear_contact"])
+def test_an_effect_that_is_not_configured_is_noticed(name, undisturbed):
+    """Otherwise the test above would prove nothing."""
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (typical(EFFECTS[name]),), 1).readings
+    blind = last_tick(SETTINGS, readings)
+    off = abs(blind["cohesion"] - undisturbed["cohesion"]) / undisturbed["cohesion_sigma"]
+    assert off > 3.0 and blind["resets"]
+
+
+def test_an_uncertain_loss_widens_the_estimate_and_covers_the_error(undisturbed):
+    """Friction known to 30 %, and 30 % wrong: c errs, inside its σ."""
+    effect = typical(EFFECTS["coulomb_friction"])
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
+    wrong = configure(replace(effect, loss=0.7 * effect.loss), sigma=0.3 / 0.7)
+    known = last_tick(replace(SETTINGS, effects=(*SETTINGS.effects, wrong)), readings)
+    assert known["cohesion_sigma"] > 1.3 * undisturbed["cohesion_sigma"]
+    for quantity, truth in (("cohesion", 750.0), ("tan_phi", 0.62)):
+        assert abs(known[quantity] - truth) < 2.5 * known[f"{quantity}_sigma"], quantity
+
+
+def test_an_uncertain_exponent_is_considered():
+    soil = replace(SETTINGS.soil, exponent=Uncertain(1.1, 0.1))
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (), 1).readings
+    loose, tight = last_tick(replace(SETTINGS, soil=soil), readings), last_tick(SETTINGS, readings)
+    assert loose["cohesion_sigma"] > 1.1 * tight["cohesion_sigma"]
+
+
+def test_without_the_true_stresses_c_is_a_third_too_small(undisturbed):
+    bare = last_tick(
+        replace(SETTINGS, effects=()), simulate_run(SETTINGS, SOIL, MOTION, (), 1).readings
+    )
+    assert bare["cohesion"] < 0.75 * 750.0
+    assert undisturbed["cohesion"] == pytest.approx(750.0, rel=0.1)
+    assert undisturbed["tan_phi"] == pytest.approx(0.62, rel=0.03)
+
+
+def test_motion_covers_what_separates():
+    assert len(np.unique(np.round(np.asarray(MOTION.load)))) >= 3
+
+
+def test_a_counter_that_does_not_start_at_nought_is_no_place_on_the_bed():
+    """A run that begins where the one before ended: what acts along the path begins with the run."""
+    effect = typical(EFFECTS["running_in"])
+    readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
+    settings = replace(SETTINGS, effects=(*SETTINGS.effects, configure(effect)))
+    moved = [
+        r._replace(value=r.value + 50_000) if r.channel == "carriage_encoder" else r
+        for r in readings
+    ]
+    first, second = last_tick(settings, readings), last_tick(settings, moved)
+    assert second["carriage_position"] > first["carriage_position"] + 0.5
+    for quantity in ("cohesion", "tan_phi"):
+        assert abs(second[quantity] - first[quantity]) < 1e-3 * first[f"{quantity}_sigma"], quantity

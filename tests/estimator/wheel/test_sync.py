@@ -1,0 +1,181 @@
+"""One snapshot a tick: sorted, complete, calibrated, and the same however the readings travelled."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from math import isnan
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.wheel.sync import NS, Sync
+from tests.rig import SETTINGS, readings_of
+
+MS = 1_000_000
+START = 1_700_000_000 * NS
+
+
+def snapshots(readings, ticks, config=SETTINGS):
+    """Snapshots at ticks 4 ms apart, readings handed over in order of receipt."""
+    sync, waiting, found = Sync(config), sorted(readings, key=lambda r: r.received), []
+    for k in range(ticks):
+        t = START + k * 4 * MS
+        while waiting and waiting[0].received <= t:
+            sync.push(waiting.pop(0))
+        found.append(sync.snapshot(t))
+    return found, sync.counters
+
+
+def test_steady_motion_is_read_back_in_si_units():
+    readings = readings_of(
+        START, seconds=1.0, omega=0.4, speed=0.02, sinkage=0.011, current=1.7, noise=True
+    )
+    found, _ = snapshots(readings, 250)
+    last = found[-1]
+    assert last.ready and not last.stale and not last.stuck
+    assert last.wheel_speed.value == pytest.approx(0.4, abs=5 * last.wheel_speed.sigma)
+    assert last.carriage_speed.value == pytest.approx(0.02, abs=5 * last.carriage_speed.sigma)
+    assert last.sinkage.value == pytest.approx(0.011, abs=5 * last.sinkage.sigma)
+    assert last.current.value == pytest.approx(1.7, abs=5 * last.current.sigma)
+    assert last.wheel_speed.sigma < 0.01 and last.carriage_speed.sigma < 0.002
+
+
+def test_all_channels_describe_the_centre_of_the_window():
+    """Under acceleration the mean position must be the position at `evaluated`, not now."""
+    readings = readings_of(START, seconds=1.0, omega=0.4, speed=0.02)
+    found, _ = snapshots(readings, 250)
+    for snapshot in found[60:]:
+        elapsed = (snapshot.evaluated - START) / NS
+        assert snapshot.wheel_angle == pytest.approx(0.4 * elapsed, abs=3e-4)
+
+
+def test_not_ready_before_a_window_has_filled():
+    found, _ = snapshots(readings_of(START, seconds=0.5), 125)
+    assert not found[10].ready
+    assert found[-1].ready
+
+
+@settings(max_examples=25)
+@given(st.randoms(use_true_random=False))
+def test_readings_late_within_the_horizon_change_nothing(rng):
+    ordered = readings_of(START, seconds=0.6)
+    shuffled = [r._replace(received=r.stamp + rng.randrange(0, 46) * MS) for r in ordered]
+    want, _ = snapshots(ordered, 130)
+    have, counters = snapshots(shuffled, 130)
+    assert [_without_health(s) for s in have] == [_without_health(s) for s in want]
+    assert counters.late == 0
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6))
+def test_duplicates_are_dropped_and_counted(seed):
+    rng = random.Random(seed)
+    ordered = readings_of(START, seconds=0.6)
+    repeated = [r for r in ordered if rng.random() < 0.3]
+    copies = [r._replace(received=r.received + 1 + rng.randrange(0, 40) * MS) for r in repeated]
+    want, _ = snapshots(ordered, 180)
+    have, counters = snapshots(ordered + copies, 180)
+    assert [_without_health(s) for s in have[:140]] == [_without_health(s) for s in want[:140]]
+    assert counters.duplicates == len(copies) and counters.late == 0
+
+
+def test_a_reading_older_than_the_horizon_is_counted_and_ignored():
+    ordered = readings_of(START, seconds=0.6)
+    late = [
+        r._replace(received=r.received + 80 * MS) if index == 400 else r
+        for index, r in enumerate(ordered)
+    ]
+    _, counters = snapshots(late, 160)
+    assert counters.late == 1
+
+
+def test_latency_shifts_a_channel_back_to_when_it_was_sampled():
+    delayed = replace(
+        SETTINGS,
+        channels={
+            **SETTINGS.channels,
+            "wheel_encoder": replace(SETTINGS.channels["wheel_encoder"], latency=0.02),
+        },
+    )
+    readings = [
+        r._replace(stamp=r.stamp + 20 * MS, received=r.received + 20 * MS)
+        if r.channel == "wheel_encoder"
+        else r
+        for r in readings_of(START, seconds=0.8)
+    ]
+    want, _ = snapshots(readings_of(START, seconds=0.8), 180)
+    have, _ = snapshots(readings, 180, delayed)
+    assert [s.wheel_angle for s in have[60:]] == [s.wheel_angle for s in want[60:]]
+
+
+@pytest.mark.parametrize("jump", [-(2**31), -5000, 5000, 123_456, 2**40])
+def test_a_counter_jump_is_rebaselined_without_a_spike(jump):
+    readings = readings_of(START, seconds=1.0, omega=0.4)
+    moved = [
+        r._replace(value=r.value + jump)
+        if r.channel == "wheel_encoder" and r.stamp > START + NS // 2
+        else r
+        for r in readings
+    ]
+    found, counters = snapshots(moved, 250)
+    assert counters.jumps == 1
+    assert all(abs(s.wheel_speed.value - 0.4) < 0.01 for s in found[60:])
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf"), -0.1, 5.1])
+def test_an_impossible_value_goes_no_further(value):
+    readings = readings_of(START, seconds=0.6, sinkage=0.011)
+    bad = Reading(START + 300 * MS + 1, "sinkage_pot", value, START + 300 * MS + 1)
+    found, counters = snapshots([*readings, bad], 150)
+    assert counters.invalid == 1
+    assert all(s.sinkage.value == pytest.approx(0.011, abs=1e-9) for s in found[60:])
+
+
+def test_a_silent_channel_is_stale_within_50_ms_and_back_at_once():
+    silent = [
+        r
+        for r in readings_of(START, seconds=1.0)
+        if r.channel != "sinkage_pot" or not 400 * MS < r.stamp - START < 700 * MS
+    ]
+    found, _ = snapshots(silent, 250)
+    bit = CHANNEL_BITS["sinkage_pot"]
+    stale = [k * 4 for k, s in enumerate(found) if s.stale & bit and k > 5]
+    assert 400 < stale[0] <= 456
+    assert 696 <= stale[-1] <= 704
+
+
+def test_a_stuck_potentiometer_is_flagged_while_the_wheel_turns_and_not_at_rest():
+    bit = CHANNEL_BITS["sinkage_pot"]
+    moving, _ = snapshots(
+        readings_of(START, seconds=1.0, noise=True, frozen=("sinkage_pot", 0.5)), 250
+    )
+    first = next(k * 4 for k, s in enumerate(moving) if s.stuck & bit)
+    assert 500 < first <= 950
+    resting, _ = snapshots(readings_of(START, seconds=1.0, omega=0.0, speed=0.0), 250)
+    assert not any(s.stuck for s in resting)
+
+
+def test_a_stuck_wheel_encoder_is_flagged_while_the_carriage_moves():
+    found, _ = snapshots(
+        readings_of(START, seconds=1.2, noise=True, frozen=("wheel_encoder", 0.5)), 300
+    )
+    first = next(k * 4 for k, s in enumerate(found) if s.stuck & CHANNEL_BITS["wheel_encoder"])
+    assert first <= 950
+
+
+def test_optional_sensors_are_nan_when_absent():
+    found, _ = snapshots(readings_of(START, seconds=0.6), 150)
+    assert (
+        isnan(found[-1].load.value)
+        and isnan(found[-1].drawbar_pull.value)
+        and isnan(found[-1].temperature)
+    )
+
+
+def _without_health(snapshot):
+    """The quantities and not the age of the channels, which depends on when bytes came."""
+    return repr(snapshot._replace(stale=0, stuck=0))

@@ -1,0 +1,94 @@
+"""`gritd diagnose` from the command line: what is wrong is one line and an exit code, before any work is done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.commands import simulate
+from gritd.tools.commands.diagnose import main
+from gritd.tools.diagnose.explain import provenance
+from gritd.tools.diagnose.rig.signals import read_all, signals
+
+SCHEDULE = "segments:\n  - {duration: 3 s, load: 60 N, slip: 0.2, speed: 20 mm/s}\n"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "schedule.yaml").write_text(SCHEDULE)
+    assert (
+        simulate.main(["--schedule", str(folder / "schedule.yaml"), "-o", str(folder / "run.mcap")])
+        == 0
+    )
+    return folder / "run.mcap"
+
+
+def said(*arguments: object) -> tuple[str, int]:
+    with pytest.raises(CommandError) as error:
+        main([str(a) for a in arguments])
+    assert "\n" not in str(error.value)
+    return str(error.value), error.value.code
+
+
+def test_a_run_given_twice_is_refused(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(run.read_bytes())
+    line, code = said(run, copy, "--config", packaged())
+    assert (
+        line == f"{copy}: found the same recording as {run}; expected each run once"
+        and code == USAGE
+    )
+
+
+def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
+    before = run.read_bytes()
+    for option in ("--json", "--report", "--apply"):
+        line, code = said(run, "--config", packaged(), option, run)
+        assert "is read by this command" in line and code == USAGE
+        line, code = said(run, "--config", packaged(), option, tmp_path)
+        assert "found a folder" in line and code == USAGE
+        line, code = said(run, "--config", packaged(), option, tmp_path / "no" / "x")
+        assert "found no folder" in line and code == USAGE
+    assert run.read_bytes() == before
+
+
+def test_what_cannot_be_read_is_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "text.mcap").write_text("none")
+    for name, code in (("nowhere.mcap", USAGE), (".", DAMAGED), ("text.mcap", DAMAGED)):
+        path = tmp_path / name
+        line, found = said(path, "--config", packaged())
+        assert str(path) in line and found == code
+
+
+def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: Path) -> None:
+    empty, cut = tmp_path / "empty.mcap", tmp_path / "cut.mcap"
+    RunWriter(empty, (), "a: 1\n", RunInfo()).close()
+    cut.write_bytes(run.read_bytes()[:2000])
+    line, code = said(empty, "--config", packaged())
+    assert line.startswith(f"{empty}: found no readings") and code == DAMAGED
+    line, code = said(cut, "--config", packaged())
+    assert line.startswith(f"{cut}: found no readings") and "(" in line and code == DAMAGED
+    settings = config.load(packaged()).settings
+    with pytest.raises(
+        CommandError, match="found no readings of wheel_encoder; expected both encoders"
+    ):
+        signals(read_all([empty])[0], settings, 10.0)
+
+
+def test_another_testbed_than_the_recorded_one_is_said(run: Path) -> None:
+    """The wrong file after --config makes a mismatch that no physics explains."""
+    text = packaged().read_text(encoding="utf-8")
+    other = config.loads(
+        text.replace("radius: 72 mm", "radius: 80 mm", 1), "other.yaml", packaged().parent
+    ).settings
+    recordings = read_all([run])
+    assert provenance.remarks(recordings, config.load(packaged()).settings) == []
+    assert provenance.remarks(recordings, other) == [
+        "run.mcap was recorded with wheel.radius 0.072 (configuration: 0.08)."
+    ]

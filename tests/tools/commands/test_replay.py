@@ -1,0 +1,211 @@
+"""`gritd replay`: the same bits again, or a new answer with a new configuration."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config.configuration import load
+from gritd.estimator.daemon.daemon import TICK_TOPIC, TOPICS
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli import main as cli
+from gritd.tools.cli.command import CommandError
+from gritd.tools.commands import replay
+from tests.linear_plant import readings
+
+ROOT = Path(__file__).parents[3]
+TRUTH = (720.0, 0.62, 0.025)
+SCHEDULE = [(3.0, 50.0, 0.2), (3.0, 90.0, 0.4)]
+
+
+@pytest.fixture(scope="module")
+def configuration():
+    return load(packaged())
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory, configuration):
+    """A run logged as the daemon logs it: the readings a tick consumed, then the tick."""
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    pipeline = Pipeline(configuration.settings)
+    state = pipeline.start()
+    writer = RunWriter(path, TOPICS, configuration.text, RunInfo(name="test"))
+    sent = 0
+    for _, batch in readings(configuration.settings, TRUTH, SCHEDULE, seed=4, rate=250):
+        for stamp, group in groupby(batch, key=lambda reading: reading.stamp):
+            consumed = list(group)
+            state, tick = pipeline.step(state, consumed, stamp)
+            for reading in consumed:
+                writer.reading(reading)
+            writer.message(TICK_TOPIC.name, stamp, tick)
+            sent += 1
+            if sent % 50 == 0:
+                writer.flush()
+    writer.close()
+    return path
+
+
+def test_a_replay_is_identical_bit_for_bit(recorded, capsys):
+    for _ in range(3):
+        assert replay.main([str(recorded), "--verify"]) == 0
+    assert "identical bit for bit" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("seed", ["0", "1", "4242"])
+def test_a_replay_does_not_depend_on_hash_order(recorded, seed):
+    environment = {**os.environ, "PYTHONHASHSEED": seed}
+    done = subprocess.run(
+        [sys.executable, "-m", "gritd", "replay", str(recorded), "--verify"],
+        cwd=ROOT, env=environment, capture_output=True, text=True, timeout=6000,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "identical bit for bit" in done.stdout
+
+
+def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
+    """One reading changed by a hair is found, with tick and field."""
+    changed = tmp_path / "changed.mcap"
+    recording = read(recorded)
+    writer = RunWriter(changed, TOPICS, configuration.text, recording.run)
+    touched = False
+    for topic, log_time, values in recording.messages():
+        if (
+            topic == "/raw/motor_shunt"
+            and not touched
+            and log_time > recording.arrays("/tick")["stamp"][40]
+        ):
+            values, touched = (values[0], values[1] + 1e-12), True
+        writer.message(topic, log_time, values)
+    writer.close()
+    assert replay.main([str(changed), "--verify"]) == 1
+    assert "ticks differ" in (said := capsys.readouterr().out) and "current: logged" in said
+
+
+def test_a_new_configuration_recomputes_from_the_raw_readings(recorded, tmp_path, capsys):
+    text = packaged().read_text().replace("value: 2.0 N*m/A", "value: 2.2 N*m/A")
+    other = tmp_path / "other.yaml"
+    other.write_text(text)
+    out = tmp_path / "out.mcap"
+    assert replay.main([str(recorded), "--config", str(other), "-o", str(out)]) == 0
+    old, new = read(recorded).arrays("/tick"), read(out).arrays("/tick")
+    assert new["torque"][-1] == pytest.approx(1.1 * old["torque"][-1])
+    assert new["cohesion"][-1] != old["cohesion"][-1]
+    assert replay.main([str(out), "--verify"]) == 0
+    capsys.readouterr()
+
+
+def test_a_cut_recording_is_replayed_and_said_to_be_damaged(recorded, tmp_path, capsys):
+    cut = tmp_path / "cut.mcap"
+    whole = recorded.read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    assert replay.main([str(cut), "--verify"]) == 3
+    captured = capsys.readouterr()
+    assert "identical bit for bit" in captured.out and "cut.mcap" in captured.err
+
+
+def test_raw_readings_alone_are_enough(recorded, tmp_path, capsys, configuration):
+    raw = tmp_path / "raw.mcap"
+    writer = RunWriter(raw, (), configuration.text, RunInfo())
+    for topic, log_time, values in read(recorded).messages():
+        if topic.startswith("/raw/"):
+            writer.message(topic, log_time, values)
+    writer.close()
+    assert replay.main([str(raw), "--engine", "plain"]) == 0
+    assert "tan φ" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["missing.mcap"], "missing.mcap"),
+        (["--verify", "--engine", "plain", "RECORDED"], "--verify"),
+        (["RECORDED", "--config", "nowhere.yaml"], "nowhere.yaml"),
+    ],
+)
+def test_bad_input_is_one_line(recorded, arguments, words):
+    arguments = [str(recorded) if a == "RECORDED" else a for a in arguments]
+    done = subprocess.run(
+        [sys.executable, "-m", "gritd", "replay", *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode == 2
+    assert words in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_file_that_is_no_recording_is_damaged_input(tmp_path):
+    text = tmp_path / "notes.mcap"
+    text.write_text("not a recording")
+    with pytest.raises(CommandError, match=r"notes\.mcap"):
+        replay.main([str(text)])
+
+
+@pytest.mark.parametrize("output", ["the input", "nowhere/x.mcap", "taken.mcap", "its folder"])
+def test_an_output_that_cannot_be_made_is_refused_before_the_replay(
+    recorded, tmp_path, output, capsys
+):
+    (tmp_path / "taken.mcap").write_bytes(b"mine")
+    before = recorded.read_bytes()
+    target = {"the input": recorded, "its folder": recorded.parent}.get(output, tmp_path / output)
+    assert cli.main(["replay", str(recorded), "-o", str(target)]) == 2
+    said = capsys.readouterr()
+    assert (
+        said.out == ""
+        and said.err.count("\n") == 1
+        and str(target) in said.err
+        and "expected" in said.err
+    )
+    assert recorded.read_bytes() == before and (tmp_path / "taken.mcap").read_bytes() == b"mine"
+
+
+def test_missing_is_usage_and_no_recording_is_damage_wherever_it_stands(recorded, tmp_path, capsys):
+    (tmp_path / "photo.png").write_bytes(b"\x89PNG" + bytes(500))
+    for name, code in (("none.mcap", 2), (".", 3), ("photo.png", 3)):
+        for files in ([tmp_path / name], [recorded, tmp_path / name]):
+            assert cli.main(["replay", *map(str, files), "--engine", "plain"]) == code
+            said = capsys.readouterr().err
+            assert said.startswith(f"gritd: {tmp_path / name}") and said.count("\n") == 1
+
+
+def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, configuration):
+    other = configuration.text.replace("range: [0.1 V, 4.9 V]", "range: [4.8 V, 4.9 V]", 1)
+    (tmp_path / "other.yaml").write_text(other, encoding="utf-8")
+    for output in ([], ["-o", str(tmp_path / "out.mcap")]):
+        assert (
+            cli.main(["replay", str(recorded), "--config", str(tmp_path / "other.yaml"), *output])
+            == 0
+        )
+        said = capsys.readouterr()
+        count = read(recorded).counts["/raw/sinkage_pot"]
+        assert "STARTING 100%" in said.out
+        reason = f"{count} of {count} readings of sinkage_pot are invalid, outside 4.8 … 4.9 V"
+        assert said.err == f"{recorded}: never ready: {reason}\n"
+
+
+def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, configuration):
+    writer = RunWriter(tmp_path / "slow.mcap", (), configuration.text, RunInfo())
+    recording, kept = read(recorded), {"wheel_encoder": 25, "carriage_encoder": 1, "sinkage_pot": 1}
+    for channel, step in kept.items():
+        rows = recording.arrays(f"/raw/{channel}")[::step]
+        for stamp, value in zip(
+            rows["stamp"].tolist(), rows[rows.dtype.names[-1]].tolist(), strict=True
+        ):
+            writer.reading(Reading(stamp, channel, value, stamp))
+    writer.close()
+    assert cli.main(["replay", str(tmp_path / "slow.mcap"), "--engine", "plain"]) == 0
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert (
+        "wheel_encoder has 60 readings, never three over half a window of 100 ms; motor_shunt has no readings"
+        in said
+    )

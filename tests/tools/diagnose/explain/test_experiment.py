@@ -1,0 +1,52 @@
+"""The next experiment: feasible, sensible for the verdict, its gain bounded and less where the soil takes it up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import EXPERIMENTS
+from gritd.tools.diagnose.explain.experiment import MOST
+from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.proof.ours.unlisted import CableDrag
+from tests.tools.diagnose.campaigns import diagnosed, plan
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def proposed(found: Diagnosis) -> str:
+    following = found.next_experiment
+    assert following is not None and following.action == EXPERIMENTS[following.key]
+    assert 0.0 < following.expected_gain_nats <= MOST
+    assert 0.5 < following.expected_probability <= 1.0
+    return following.key
+
+
+@pytest.mark.slow
+def test_rivals_are_told_apart_by_what_they_do_differently() -> None:
+    """Without reversal a constant loss and one that differs by direction are the same; driving back tells."""
+    found = diagnosed(plan(), (make("coulomb_friction", {"loss": 0.25}),))
+    group = {h.effect for h in found.accepted} | set(found.accepted[0].indistinguishable_from)
+    assert "asymmetric_friction" in group
+    assert proposed(found) in ("reversal", "lifted_spin")
+    assert set(found.next_experiment.separates) <= group  # type: ignore[union-attr]
+
+
+def test_what_is_insufficient_is_made_sufficient() -> None:
+    """One short noisy run at one load: what would show most of what it cannot."""
+    found = diagnosed(plan(loads=(60.0,), seconds=6.0, wrench=False, noise=20.0, standstill=False))
+    assert found.verdict == "insufficient"
+    assert proposed(found)
+
+
+@pytest.mark.slow
+def test_a_stranger_is_followed_up_where_it_lives() -> None:
+    found = diagnosed(plan(), (CableDrag(size=8.0),))
+    assert found.verdict == "unlisted" and proposed(found)

@@ -1,0 +1,133 @@
+"""Where the misfit lives: change points where something starts or stops, none where it drifts, words with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.explain import changes
+from gritd.tools.diagnose.explain.locate import bare, locate
+from gritd.tools.diagnose.explain.result import Location
+from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.search.search import Model, Search
+from gritd.tools.proof.ours.cases import draw, record
+from tests.tools.diagnose.campaigns import plan
+
+PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def searched(rig: WheelRig) -> tuple[Search, Model]:
+    prepared = prepare(rig, np.random.default_rng(0))
+    return Search(prepared.problem, prepared.generics, prepared.draws), Model(
+        prepared.base, (), 0.0
+    )
+
+
+def explained(search: Search, base: Model, effect: Effect) -> Model:
+    """The fit with an effect, from where it is."""
+    free = free_of((type(effect),))
+    at = [
+        (getattr(effect, f.parameter.name) - f.parameter.centre) / f.parameter.sigma for f in free
+    ]
+    return Model(
+        search.problem.descend((type(effect),), free, base.fitted.u, np.array(at)),
+        (effect.name,),
+        0.0,
+    )
+
+
+@cache
+def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Location, ...]:
+    """Places of the misfit that one effect makes; `repeated`: the same drive in every run, each another pass."""
+    drawn = plan(loads=(70.0,) * 4 if repeated else (40.0, 70.0, 100.0), seed=3)
+    if repeated:
+        first = drawn.motions[0]
+        again = (
+            replace(first, time=np.asarray(first.time) + 40.0 * n, pass_number=1.0 + n)
+            for n in range(4)
+        )
+        drawn = replace(drawn, motions=tuple(again))
+    effect = make(name, parameters)
+    search, base = searched(WheelRig(record(drawn, (effect,)), drawn.settings))
+    alone = bare(search, explained(search, base, effect))
+    return locate(search, alone, alone.fitted.predicted)
+
+
+def test_a_patch_is_given_from_where_to_where() -> None:
+    first = located("soil_patch", **PATCH)[0]
+    assert first.covariate == "position"
+    assert first.changes == pytest.approx((0.15, 0.25), abs=0.015)
+    assert (
+        "along the bed" in first.where
+        and "than the model" in first.where
+        and "% of its misfit" in first.where
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("motor_heating", {"fall": 0.4, "duration": 20.0}),
+        ("slip_sinkage", {"growth": 0.15}),
+        ("viscous_friction", {"damping": 0.3}),
+    ],
+)
+def test_what_drifts_or_curves_has_no_change_points(
+    name: str, parameters: dict[str, float]
+) -> None:
+    places = located(name, **parameters)
+    assert places and not [
+        p for p in places if p.changes and p.covariate in ("position", "time", "slip")
+    ]
+
+
+def test_passes_differ_from_the_second_on() -> None:
+    places = [
+        p
+        for p in located("multipass", repeated=True, stiffening=0.6, passes=0.5)
+        if p.covariate == "run"
+    ]
+    assert {p.channel for p in places} >= {"torque", "sinkage"}
+    assert all(p.changes and p.changes[0] == 2.0 for p in places)
+    assert "from run2 to run4" in places[0].where
+
+
+@pytest.mark.slow
+def test_noise_alone_has_no_change_points() -> None:
+    """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a change point."""
+    settings = config.load(packaged()).settings
+    alarms = 0
+    for seed in range(40):
+        drawn = draw(settings, np.random.default_rng(seed))
+        alarms += bool(changes.find(*searched(WheelRig(record(drawn, ()), drawn.settings))))
+    assert alarms <= 2
+
+
+def test_a_covariate_with_no_place_for_a_step_is_left_out() -> None:
+    """All but a few values at the start of the bed: whatever the place, too few lie beyond it."""
+    position = np.concatenate([np.linspace(0.0, 1e-3, 400), np.linspace(0.01, 1.0, 6)])
+    run = SimpleNamespace(time=np.arange(position.size), covariates={"position": position})
+    stack: Any = SimpleNamespace(
+        rig=SimpleNamespace(runs=[run]), run=np.zeros(position.size, dtype=int), time=run.time,
+        covariate=lambda name: run.covariates[name],
+    )  # fmt: skip
+    everything = np.ones(position.size, dtype=bool)
+    assert all(places.size for _, places, _ in changes._steps(stack, everything, everything))

@@ -1,0 +1,42 @@
+"""Signatures: the derivative of what is measured by a strength, also where the full strength would run away."""
+
+from typing import Any
+
+import numpy as np
+
+from gritd.estimator.effects.motor_heating import MotorHeating
+from gritd.tools.diagnose.fit.signatures import signature, strengths
+
+SHAPE = {"duration": 100.0}
+
+
+class Bench:
+    """Ten values of about 1 that grow with the strength, and past `limit` without bound, as a motor that runs away."""
+
+    size, measured = 10, np.linspace(0.5, 1.5, 10)
+
+    def __init__(self, limit: float) -> None:
+        self.limit = limit
+
+    def predict(self, _: Any, effects: tuple[MotorHeating, ...]) -> Any:
+        strength = sum(getattr(effect, strengths(MotorHeating)[0].name) for effect in effects)
+        return self.measured * (1.0 + strength if strength < self.limit else np.exp(1e9 * strength))
+
+
+def of_bench(limit: float) -> Any:
+    bench: Any = Bench(limit)
+    return signature(bench, np.zeros(0), bench.predict(None, ()), MotorHeating, SHAPE)
+
+
+def test_a_signature_is_the_change_by_the_expected_size() -> None:
+    expected = strengths(MotorHeating)[0].sigma * Bench.measured
+    np.testing.assert_allclose(of_bench(np.inf).columns[:, 0], expected)
+
+
+def test_one_that_runs_away_is_taken_from_a_smaller_step() -> None:
+    sigma = strengths(MotorHeating)[0].sigma
+    np.testing.assert_allclose(of_bench(0.5 * sigma).columns[:, 0], sigma * Bench.measured)
+
+
+def test_one_that_runs_away_however_weak_is_none() -> None:
+    assert of_bench(0.0) is None

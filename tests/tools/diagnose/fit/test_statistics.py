@@ -1,0 +1,115 @@
+"""The statistics that everything rests on: noise colour, whitening, evidence, held-out density."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from gritd.tools.diagnose.explain.result import plain
+from gritd.tools.diagnose.fit.evidence import SCALES, Base, log_bayes
+from gritd.tools.diagnose.noise.colour import (
+    Colour,
+    coloured,
+    restricted,
+    saturated_mean,
+    whiten_unit,
+)
+from gritd.tools.diagnose.screen.screen import tail_quantile
+
+GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
+
+
+def test_whitening_leaves_independent_unit_noise() -> None:
+    """With a run boundary and a gap inside a run."""
+    gaps = GAPS.copy()
+    gaps[300] = 1.5
+    colour = Colour(1.0, 2.0, 0.5, 0.3)
+    noise = coloured(gaps, 400, colour, np.random.default_rng(0))
+    white = whiten_unit(noise, gaps, [colour])[0][0]
+    assert np.var(white) == pytest.approx(1.0, abs=0.02)
+    lagged = [np.mean(white[k:] * white[:-k]) for k in (1, 2, 5, 20)]
+    np.testing.assert_allclose(lagged, 0.0, atol=0.02)
+
+
+def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
+    colour = Colour(1.0, 2.0, 0.5, 0.3)
+    gaps = GAPS[:50]
+    root = whiten_unit(np.eye(50), gaps, [colour])[0][0]
+    time = np.cumsum(np.where(np.isfinite(gaps), gaps, 0.0))
+    apart = np.abs(time[:, None] - time)
+    covariance = 0.5 * np.exp(-apart / 2.0) + 0.3 * np.exp(-apart / 0.15) + 0.2 * np.eye(50)
+    np.testing.assert_allclose(root @ covariance @ root.T, np.eye(50), atol=1e-9)
+
+
+def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:
+    """Restricted likelihood: a large misfit inside the saturated mean does not count as noise."""
+    rng = np.random.default_rng(2)
+    columns = np.column_stack([np.cos(np.pi * k * np.arange(600) / 600) for k in range(30)])
+    noise = coloured(GAPS, 1, Colour(0.2, 0.5, 0.5), rng)[:, 0]
+    misfit = columns @ rng.normal(0.0, 3.0, 30)
+    whitened, log_det = whiten_unit(
+        np.column_stack((columns, noise + misfit)), GAPS, [Colour(1.0, 0.5, 0.5)]
+    )
+    _, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, 600)
+    assert np.sqrt(variance[0]) == pytest.approx(0.2, rel=0.15)
+
+
+def test_rounding_is_no_direction_of_the_saturated_mean() -> None:
+    """What an effect does not change comes out of a solver as 1e-12: scaled to unit size it would take noise away."""
+    rng = np.random.default_rng(7)
+    residual, effects, sure = (
+        rng.standard_normal(400),
+        rng.standard_normal((400, 3)),
+        rng.standard_normal((400, 2)),
+    )
+    held = effects @ [1.0, 2.0, 3.0]
+    cells = np.repeat([0, 1, -1, -1], 100)
+    alone = saturated_mean(residual, effects, sure, cells)
+    beside = saturated_mean(
+        residual, np.column_stack((1e-9 * rng.standard_normal((400, 50)), effects)), sure, cells
+    )
+    assert alone.shape == beside.shape == (400, 7)
+    np.testing.assert_allclose(beside @ beside.T, alone @ alone.T, atol=1e-9)
+    np.testing.assert_allclose(alone @ (alone.T @ held), held, atol=1e-9)
+
+
+def test_log_bayes_is_the_integral() -> None:
+    """One strength: the closed form against quadrature of likelihood times prior."""
+    a, b = np.array([[2.0]]), np.array([3.0])
+
+    def integrand(x: float, scale: float) -> float:
+        return float(np.exp(b[0] * x - 0.5 * a[0, 0] * x * x) * norm.pdf(x, 0.0, scale))
+
+    two_sided = np.mean([quad(integrand, -40, 40, args=(s,), points=[0.0, 1.5])[0] for s in SCALES])
+    one_sided = np.mean(
+        [2.0 * quad(integrand, 0, 40, args=(s,), points=[0.1, 1.5])[0] for s in SCALES]
+    )
+    assert log_bayes(a, b, (0,)) == pytest.approx(np.log(two_sided), rel=1e-6)
+    assert log_bayes(a, b, (1,)) == pytest.approx(np.log(one_sided), rel=1e-6)
+
+
+def test_strain_against_the_prior_is_evidence() -> None:
+    """An effect that a constant of the base model absorbs: the residual is noise, the strained prior names it."""
+    rng = np.random.default_rng(3)
+    direction = rng.standard_normal(400)
+    direction /= np.linalg.norm(direction)
+    jacobian = 100.0 * direction[:, None]  # the constant moves the data by 100 σ per prior σ
+    residual = rng.standard_normal(400) * 0.01
+    strained = Base(jacobian, residual, np.array([5.0]))  # pulled five prior σ off
+    relaxed = Base(jacobian, residual, np.array([0.0]))
+    column = 300.0 * direction[:, None]
+    assert log_bayes(*strained.projected(column), (0,)) > 5.0
+    assert log_bayes(*relaxed.projected(column), (0,)) < 0.0
+
+
+def test_tail_quantile_of_an_exponential() -> None:
+    values = np.random.default_rng(4).exponential(1.0, 4000)
+    assert tail_quantile(values, 0.01) == pytest.approx(np.log(100.0), rel=0.1)
+
+
+def test_json_has_no_nan() -> None:
+    assert plain({"a": [float("nan"), np.float64(1.5), (np.int64(2), True, None, "x")]}) == {
+        "a": [None, 1.5, [2, True, None, "x"]]
+    }

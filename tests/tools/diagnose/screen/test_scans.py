@@ -1,0 +1,137 @@
+"""Waves and steps without a name: found where they are, paid for by how many are tried, and no part of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain import law
+from gritd.tools.diagnose.explain.locate import locate
+from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.noise import lines
+from gritd.tools.diagnose.noise.colour import Colour, coloured
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen.scans import candidates
+from gritd.tools.diagnose.screen.screen import Screen, tail_chance
+from gritd.tools.diagnose.search.search import Model, Search, rescreen
+from gritd.tools.proof.ours.cases import record
+from gritd.tools.proof.ours.unlisted import NextDoor, RailJoint
+from tests.tools.diagnose.campaigns import plan
+
+RUNS, LENGTH, STEP = 3, 250, 0.1
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def stack() -> Any:
+    """One channel, three runs of 25 s with pauses of unlike length, 20 mm/s along the bed."""
+    run = np.repeat(np.arange(RUNS), LENGTH)
+    own = np.tile(np.arange(LENGTH) * STEP, RUNS)
+    known = {"speed": np.full(run.size, 0.02), "time": own + 61.7 * run, "position": 0.02 * own}
+    rig = SimpleNamespace(channels=("pull",), runs=[None] * RUNS)
+    return SimpleNamespace(
+        rig=rig, run=run, time=known["time"], size=run.size, gaps=np.where(own == 0.0, np.inf, STEP),
+        covariate=known.__getitem__, of=lambda channel: np.ones(run.size, bool),
+    )  # fmt: skip
+
+
+def standing(made: Any, values: Array) -> Array:
+    """Columns beyond the long waves of the bed, which are always there."""
+    none, nowhere = np.zeros((made.size, 0)), np.full(made.size, -1)
+    always = lines._long(made, "pull").shape[1]
+    return lines.standing(made, values, np.ones((made.size, 1)), none, nowhere)[:, always:]
+
+
+def test_noise_of_any_colour_holds_no_line() -> None:
+    """One channel in a hundred at each axis may; slow noise must not lose its slow part to lines."""
+    made, rng = stack(), np.random.default_rng(1)
+    for colour in (Colour(1.0, 1.0, 0.0), Colour(1.0, 0.5, 0.7, 0.2), Colour(1.0, 4.0, 0.95, 0.04)):
+        noise = coloured(made.gaps, 25, colour, rng)
+        taken = [standing(made, noise[:, k]).shape[1] for k in range(25)]
+        assert np.count_nonzero(taken) <= 2
+
+
+def test_a_line_is_no_noise() -> None:
+    """Less than a third of slow noise in power, with another phase in every run: it stands out, and where it is."""
+    made, rng = stack(), np.random.default_rng(2)
+    noise = coloured(made.gaps, 1, Colour(1.0, 0.5, 0.7, 0.2), rng)[:, 0]
+    line = 0.75 * np.sin(2.0 * np.pi * made.time / 1.3 + 2.0 * made.run)
+    found = standing(made, noise + line)
+    assert found.shape[1] > 0
+    left = line - found @ np.linalg.lstsq(found, line, rcond=None)[0]
+    assert np.var(left) < 0.1 * np.var(line)
+
+
+def test_the_chance_of_a_value_goes_on_beyond_the_count() -> None:
+    nulls = -np.log((np.arange(300) + 0.5) / 300)
+    assert tail_chance(nulls, 1.0) == pytest.approx(np.exp(-1.0), rel=0.02)
+    assert tail_chance(nulls, 7.0) == pytest.approx(np.exp(-7.0), rel=0.2)
+    assert tail_chance(nulls, 50.0) == pytest.approx(
+        0.1 / 301
+    )  # so far out nothing is known of the tail
+
+
+@cache
+def screened(effect: type[Effect] | None, size: float) -> tuple[Search, Model, Screen]:
+    drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
+    rig = WheelRig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)
+    prepared = prepare(rig, np.random.default_rng(0))
+    search, model = (
+        Search(prepared.problem, prepared.generics, prepared.draws),
+        Model(prepared.base, (), 0.0),
+    )
+    search.models.append(model)
+    return search, model, rescreen(search, model)
+
+
+def test_a_machine_next_door_is_heard_with_its_period() -> None:
+    search, model, found = screened(NextDoor, 0.3)
+    assert found.alarmed and found.largest[0] == "drawbar_pull~time wave"
+    place = locate(search, model)[0]
+    assert (place.channel, place.covariate) == ("drawbar_pull", "time")
+    assert "oscillates with a period of 1.70 s, ± 0.29 N" in place.where
+
+
+def test_a_joint_of_the_rails_is_found_where_it_is() -> None:
+    """And the law holds it, so that held-out runs are predicted and the soil need not bend to it."""
+    search, model, found = screened(RailJoint, 2.0)
+    assert (
+        found.alarmed
+        and max(found.evidence, key=found.evidence.__getitem__) == "drawbar_pull~position step"
+    )
+    places = locate(search, model)
+    assert places[0].changes == pytest.approx((0.2,), abs=0.01)
+    said = law.find(search, model, places)
+    assert (
+        said is not None
+        and "drawbar_pull −2" in said.law.expression
+        and "along the bed" in said.law.expression
+    )
+    own = search.problem.stack.of("drawbar_pull")
+    error = (search.problem.stack.measured - said.held.predicted)[own]
+    assert (
+        np.std(error)
+        < 1.2
+        * search.problem.noise.colours[
+            search.problem.stack.rig.channels.index("drawbar_pull")
+        ].sigma
+    )
+
+
+def test_what_was_tried_is_paid_for() -> None:
+    """Of noise alone no wave or step has evidence that would bear its share among all that were tried."""
+    search, model, found = screened(None, 0.0)
+    assert not found.alarmed
+    assert not candidates(search.scans, search.problem, model.fitted)
+    assert all(found.evidence[family.name] < 2.0 for family in search.scans)

@@ -1,0 +1,81 @@
+"""The plant shares no physics with what it judges, and the proof none with the diagnosis: by imports, and when run."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[4]
+PROOF = ROOT / "tools" / "proof"
+REAL = PROOF / "real"  # judged by channels that were kept back, not by a plant
+FILES = sorted(path for path in PROOF.rglob("*.py") if REAL not in path.parents)
+# The formats of a recording, and the configuration's default text; nothing that computes with soil.
+ALLOWED = {
+    "config",
+    "gritd.estimator.messages.readings",
+    "gritd.estimator.recording.run",
+    "gritd.tools.cli.command",
+    "gritd.tools.cli.progress",
+    "gritd.tools.cli.workers",
+}
+JUDGED = (
+    "gritd.estimator.effects",
+    "gritd.estimator.model.forward",
+    "gritd.estimator.model.balance",
+    "gritd.estimator.terramechanics",
+    "gritd.tools.diagnose",
+)
+
+
+def imported(path: Path) -> set[str]:
+    """Modules that a file imports, anywhere in it, `from a import b` counted as both a and a.b."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Call) and getattr(
+            node.func, "attr", getattr(node.func, "id", "")
+        ) in (
+            "import_module",
+            "__import__",
+        ):
+            pytest.fail(f"{path}: imports by name")
+    return found
+
+
+def ours(module: str) -> bool:
+    return module.split(".")[0] in ("estimator", "drivers", "tools", "config", "tests")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PROOF)))
+def test_no_file_imports_what_it_judges(path: Path) -> None:
+    for module in filter(ours, imported(path)):
+        if module == "tools" or (
+            module.startswith("gritd.tools.proof")
+            and not module.startswith("gritd.tools.proof.real")
+        ):
+            continue
+        assert any(module == name or module.startswith(name + ".") for name in ALLOWED), module
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "gritd.tools.proof.blind.plant.respond",
+        "gritd.tools.proof.blind.plant.sensors",
+        "gritd.tools.proof.blind.command",
+    ],
+)
+def test_nothing_judged_is_loaded_by_way_of_others(module: str) -> None:
+    code = f"import sys, {module}; print('\\n'.join(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    loaded = done.stdout.split()
+    assert module in loaded
+    assert not [name for name in loaded if name.startswith(JUDGED)]

@@ -1,0 +1,279 @@
+"""The report says what was found, is well-formed, needs nothing from outside, and lets nothing from outside in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from gritd.tools.diagnose.explain.result import Hypothesis, Quantity
+from gritd.tools.report import diagnosis, hypotheses
+from gritd.tools.report.html import escape, tag
+from tests.tools.report import cases
+
+Element = ElementTree.Element
+
+
+def parsed(page: str) -> Element:
+    """The document as XML, which is stricter than HTML."""
+    return ElementTree.fromstring(page.removeprefix("<!DOCTYPE html>"))
+
+
+def words(page: str) -> str:
+    return " ".join(" ".join(parsed(page).find("body").itertext()).split())  # type: ignore[union-attr]
+
+
+@pytest.fixture(scope="module", params=cases.ALL)
+def page(request: pytest.FixtureRequest) -> str:
+    return diagnosis.render(cases.ALL[request.param]())
+
+
+def test_page_is_well_formed_and_has_one_title(page: str) -> None:
+    root = parsed(page)
+    assert root.get("lang") == "en" and len(list(root.iter("h1"))) == 1
+    levels = [int(e.tag[1]) for e in root.iter() if re.fullmatch("h[1-6]", e.tag)]
+    assert levels[0] == 1 and set(levels[1:]) <= {2}
+    names = [heading.text for heading in root.iter("h2")]
+    assert len(names) == len(set(names))
+
+
+def test_page_needs_nothing_from_outside(page: str) -> None:
+    root = parsed(page)
+    assert not {e.tag for e in root.iter()} & {
+        "script",
+        "link",
+        "img",
+        "iframe",
+        "object",
+        "form",
+        "base",
+    }
+    assert not [
+        a
+        for e in root.iter()
+        for a in e.attrib
+        if a in ("src", "href", "action") or a.startswith("on")
+    ]
+    style = "".join(e.text or "" for e in root.iter("style"))
+    assert "url(" not in style and "@import" not in style and "@font-face" not in style
+    policy = next(e.get("content") for e in root.iter("meta") if e.get("http-equiv"))
+    assert policy is not None and policy.startswith("default-src 'none'")
+
+
+def test_every_picture_has_words_and_every_table_its_headings(page: str) -> None:
+    root = parsed(page)
+    pictures = [e for e in root.iter("svg") if e.get("class") == "plot"]
+    assert pictures
+    for picture in pictures:
+        assert (
+            picture.get("role") == "img"
+            and picture[0].tag == "title"
+            and len(picture[0].text or "") > 20
+        )
+    assert all(figure.find("figcaption") is not None for figure in root.iter("figure"))
+    for table in root.iter("table"):
+        columns = table.findall("thead/tr/th")
+        assert columns and all(th.get("scope") == "col" for th in columns)
+        assert all(
+            len(row) == len(columns) and row[0].get("scope") == "row"
+            for row in table.findall("tbody/tr")
+        )
+
+
+def test_numbers_of_pictures_are_finite(page: str) -> None:
+    for path in re.findall(r' (?:d|x|y|x1|x2|y1|y2|cx|cy|width|height)="([^"]*)"', page):
+        assert "nan" not in path and "inf" not in path
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        ("consistent", ("Consistent", "0.8 nats", "1020 ± 60 Pa", "p 0.41")),
+        (
+            "explained",
+            (
+                "Explained: Coulomb friction or current offset",
+                "its like 98 %",
+                "213 nats",
+                "0.11 → 0.013 N·m",
+                "noise 0.012 N·m",
+            ),
+        ),
+        (
+            "several",
+            (
+                "Explained: Coulomb friction or current offset and soil patch",
+                "cohesion change",
+                "simulated with these 2 effects",
+                "5 more runs",
+            ),
+        ),
+        (
+            "unlisted",
+            (
+                "Not in the list",
+                "0.40 N·m · i²",
+                "slip 10.0 … 60.0 %",
+                "speed 20.0 … 20.0 mm/s",
+                "88 %",
+                "0.02 N·m remain above the noise floor",
+            ),
+        ),
+        (
+            "insufficient",
+            (
+                "Not decided",
+                "Every third of a run is predicted by a fit to the rest",
+                "Repeat at a lighter and a heavier load",
+                "8.0 nats",
+            ),
+        ),
+    ],
+)
+def test_verdict_comes_first_with_its_numbers(case: str, expected: tuple[str, ...]) -> None:
+    found = cases.ALL[case]()
+    said = words(diagnosis.render(found))
+    assert all(text in said for text in expected), said
+    assert said.index(" ".join(found.summary.split())) < said.index("Simulation against recording")
+
+
+def test_explained_says_everything_it_was_given() -> None:
+    said = words(diagnosis.render(cases.explained()))
+    for text in (
+        "loss 0.1310 ± 0.0060 N·m",  # parameter with unit
+        "1710 ± 60 Pa",  # soil without
+        "cohesion c by +2.3 σ from what was known",  # strain
+        "0.0630 mm",  # sinkage in millimetres
+        "4.2 → 1.1",  # innovations
+        "Torque rises late in the runs. 12.4 s",  # where it starts
+        "Not told apart by these recordings; together 98 %",
+        "Stand still for some seconds with the drive powered. It would tell Coulomb friction and current offset apart",
+        "2 other effects tried, each below 1 %",
+        "1" * 64,
+        "gritd diagnose run1.mcap run2.mcap --config testbed.yaml",
+        "radius: 72 mm",
+        "numpy 1.26.4",
+        "torque scale 0.0040 ± 0.0015",  # a calibration constant that strayed
+    ):
+        assert text in said, text
+    assert "sinkage offset" not in said  # it stayed within its uncertainty
+
+
+def test_without_an_explanation_no_second_simulation_is_drawn() -> None:
+    plain, explained = (parsed(diagnosis.render(f())) for f in (cases.consistent, cases.explained))
+    drawn = [[e.get("class") for e in root.iter("path")] for root in (plain, explained)]
+    assert "line after" not in drawn[0] and "line after" in drawn[1]
+
+
+def test_text_from_outside_stays_text() -> None:
+    found = cases.hostile()
+    page = diagnosis.render(found)
+    assert "<script>alert" not in page and "<img" not in page
+    assert not set(page) & {"\x00", "\udcff", "\u202e"}
+    assert "<script>alert(1)</script>" in unescape(page)
+    page.encode("utf-8")
+
+
+def test_writes_utf8(tmp_path: Path) -> None:
+    diagnosis.write(cases.hostile(), tmp_path / "r.html")
+    assert "±" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_page_stays_small() -> None:
+    assert len(diagnosis.render(cases.several())) < 600_000
+
+
+def test_attributes_are_escaped() -> None:
+    assert tag("p", "a<b", tag("b", "&"), title='"><script>') == (
+        '<p title="&quot;&gt;&lt;script&gt;">a&lt;b<b>&amp;</b></p>'
+    )
+    assert escape("a\x1b[31m") == "a\ufffd[31m"
+
+
+def hypothesis(name: str, probability: float, *near: str, accepted: bool = False) -> Hypothesis:
+    return Hypothesis(name, probability, 1.0, {"x": Quantity(1.0, 0.1)}, near, accepted)
+
+
+def test_groups_join_what_cannot_be_told_apart_in_either_direction() -> None:
+    of = [
+        hypothesis("a", 0.5, "c"),
+        hypothesis("b", 0.3),
+        hypothesis("c", 0.1),
+        hypothesis("d", 0.1, "c", "unknown"),
+    ]
+    assert [[h.effect for h in group] for group in hypotheses.together(of)] == [
+        ["a", "c", "d"],
+        ["b"],
+    ]
+
+
+def test_accepted_effect_leads_whatever_its_probability() -> None:
+    of = [hypothesis("a", 0.5), hypothesis("b", 0.004, accepted=True)]
+    page = str(hypotheses.groups(of))
+    assert page.index(">b<") < page.index(">a<") and "<summary>" not in page
+
+
+def test_redo_takes_whatever_it_finds() -> None:
+    found = replace(
+        cases.consistent(),
+        redo={"files": {"a.mcap": {"sha256": "f" * 64}}, "settings": {"level": 0.01}},
+    )
+    said = words(diagnosis.render(found))
+    assert "a.mcap " + "f" * 64 in said and "level 0.01" in said
+    found = replace(found, redo={"files": {"my run.mcap": "e" * 64}, "seed": 3})
+    said = words(diagnosis.render(found))
+    assert "gritd diagnose --redo report.html" in said and "my run.mcap " + "e" * 64 in said
+
+
+def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
+    found = cases.explained()
+    scatter = replace(
+        found.scatters[0],
+        covariate="run",
+        covariate_unit="-",
+        x=[float(r) for r in found.scatters[0].run],
+    )
+    everywhere = replace(scatter, covariate="constant", x=[1.0] * len(scatter.x))
+    page = diagnosis.render(replace(found, scatters=(scatter, everywhere)))
+    pictures = [e for e in parsed(page).iter("svg") if "against run" in (e[0].text or "")]
+    assert len(pictures) == 2  # without and with, not drawn again for the constant
+    labels = [t.text for t in pictures[0].iter("text")]
+    assert all(run in labels for run in ("40 N", "120 N"))
+    means = [p for p in pictures[0].iter("path") if p.get("class") == "line mean"]
+    assert len(means) == len(cases.LOADS)
+
+
+def test_change_points_are_drawn_and_named() -> None:
+    """A line where the misfit starts; of runs between the two, with the name of the first beyond."""
+    found = cases.explained()
+    place = replace(found.location[1], changes=(0.3,))
+    page = parsed(diagnosis.render(replace(found, location=(place,))))
+    lines = [line for line in page.iter("line") if line.get("class") == "change"]
+    assert len(lines) == 2  # without and with
+    runs = replace(place, covariate="run", changes=(3.0,))
+    scatter = replace(
+        found.scatters[0], covariate="run", x=[float(r) for r in found.scatters[0].run]
+    )
+    page = parsed(diagnosis.render(replace(found, location=(runs,), scatters=(scatter,))))
+    assert "70 N" in [" ".join(td.itertext()) for td in page.iter("td")]
+    line = next(line for line in page.iter("line") if line.get("class") == "change")
+    labels = {
+        t.text: float(t.get("x") or 0) for t in page.iter("text") if t.text in ("55 N", "70 N")
+    }
+    assert labels["55 N"] < float(line.get("x1") or 0) < labels["70 N"]
+
+
+def test_keys_of_effects_and_channels_are_said_in_words() -> None:
+    found = replace(cases.explained(), summary="coulomb_friction explains drawbar_pull")
+    assert "Coulomb friction explains drawbar pull" in words(diagnosis.render(found))
+
+
+def test_one_error_where_nothing_was_explained() -> None:
+    same = replace(cases.consistent().fit, after=cases.consistent().fit.before)
+    root = parsed(diagnosis.render(replace(cases.consistent(), fit=same)))
+    heads = [[th.text for th in table.findall("thead/tr/th")] for table in root.iter("table")]
+    assert ["channel", "error", "noise floor", "error ÷ floor"] in heads

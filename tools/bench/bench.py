@@ -1,0 +1,329 @@
+"""`gritd bench`: what a tick, a replay, a force, a filter update and a message cost on this machine.
+
+Everything is measured in one run on one seeded, simulated recording. Times are processor time, so that what other
+programs take meanwhile is not counted; they still slow the caches, so the ratios are what to compare between runs.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import platform
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.filter.tracker import ENGINES, Tracker
+from gritd.estimator.offline.batch import estimates
+from gritd.estimator.offline.playback import played
+from gritd.estimator.offline.snapshots import played as played_arrays
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording.run import RAW_TOPICS, RunInfo, RunWriter
+from gritd.estimator.recording.salvage import read
+from gritd.estimator.terramechanics import linear, original, scalar
+from gritd.tools.bench import forward as forward_bench
+from gritd.tools.cli.command import DONE, Parser
+from gritd.tools.cli.progress import Progress
+from gritd.tools.commands.simulate import Run, simulate_run, soil_of
+from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+
+SEED = 2005
+RIM_SPEED = 0.02  # [m/s]
+LEVELS = [(load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6)]
+ENGINE_NAMES = tuple(ENGINES)
+
+Figures = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much of everything; the defaults take about half a minute."""
+
+    seconds: float = 60.0  # of recording
+    ticks: int = 5000
+    repeats: int = 7
+    samples: int = 2000  # forces in a batch
+    simulated: float = 60.0  # [s] for the forward model
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is measured on."""
+
+    sizes: Sizes
+    configuration: config.Configuration
+    run: Run
+    path: Path  # of its recording
+
+    def repeated(self, run: Callable[[], object]) -> list[float]:
+        """Processor time of each repetition [s]."""
+        return [_timed(run) for _ in range(self.sizes.repeats)]
+
+
+def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
+    """All figures by section, SI: times in s, speeds as multiples of real time."""
+    sections = {
+        "tick": tick,
+        "replay": replay,
+        "forces": forces,
+        "update": update,
+        "recording": recording,
+        "forward_model": forward_model,
+    }
+    with Progress("measuring", len(sections) + 1) as progress:
+        subject = _subject(sizes, folder)
+        progress.advance()
+        figures = {}
+        for name, section in sections.items():
+            figures[name] = section(subject)
+            progress.advance()
+    return figures
+
+
+def _subject(sizes: Sizes, folder: Path) -> Subject:
+    """The packaged testbed over three loads and five slips."""
+    configuration = config.load(packaged())
+    settings = configuration.settings
+    each = sizes.seconds / len(LEVELS)
+    schedule = Schedule(
+        tuple(Segment(each, load, slip, RIM_SPEED) for load, slip in LEVELS), min(0.5, each / 4.0)
+    )
+    motion = motion_of(schedule, settings.wheel.radius, settings.rates.tick)
+    run = simulate_run(settings, soil_of(settings), motion, (), SEED)
+    subject = Subject(sizes, configuration, run, folder / "bench.mcap")
+    _write(subject, subject.path)
+    return subject
+
+
+# ---- sections ------------------------------------------------------------------------------------------------------
+
+
+def tick(subject: Subject) -> Figures:
+    """Cost of one tick of the live loop, with the heap frozen as the daemon has it."""
+    settings = subject.configuration.settings
+    pipeline = Pipeline(settings)
+    ticks = list(played(read(subject.path), settings.rates.tick))[: subject.sizes.ticks]
+    state, spent = pipeline.start(), []
+    gc.collect()
+    gc.freeze()
+    try:
+        for each in ticks:
+            start = process_time()
+            state, _ = pipeline.step(state, each.readings, each.stamp)
+            spent.append(process_time() - start)
+    finally:
+        gc.unfreeze()
+    middle, most = np.quantile(spent, (0.5, 0.99)).tolist()
+    return {"median": middle, "at_99_percent": most, "share_of_budget": most * settings.rates.tick}
+
+
+def replay(subject: Subject) -> Figures:
+    """From the file to the estimates of every window, as multiples of real time; engines take turns."""
+
+    def run(engine: str) -> None:
+        estimates(subject.configuration.settings, read(subject.path), engine)
+
+    spent: dict[str, list[float]] = {engine: [] for engine in ENGINE_NAMES}
+    for _ in range(subject.sizes.repeats):
+        for engine, times in spent.items():
+            times.append(_timed(partial(run, engine)))
+    seconds = subject.sizes.seconds
+    return {
+        f"{engine}_speed": seconds / statistics.median(times) for engine, times in spent.items()
+    } | {f"{engine}_best": seconds / min(times) for engine, times in spent.items()}
+
+
+def forces(subject: Subject) -> Figures:
+    """Closed forms (20)-(22) against quadrature of (8)-(10): one sample, gradients included, and one of a batch."""
+    settings, samples = subject.configuration.settings, subject.sizes.samples
+    wheel, ground = settings.wheel, soil_of(settings)
+    rng = np.random.default_rng(SEED)
+    theta_1, slip = rng.uniform(0.2, 1.0, samples), rng.uniform(0.05, 0.8, samples)
+    known = (float(ground.cohesion), float(ground.tan_phi), float(ground.shear_modulus))
+    some = list(zip(theta_1[:200].tolist(), slip[:200].tolist(), strict=True))
+
+    def per_call(run: Callable[[float, float], object]) -> float:
+        return statistics.median(subject.repeated(lambda: [run(*at) for at in some])) / len(some)
+
+    def per_sample(run: Callable[[], object]) -> float:
+        return statistics.median(subject.repeated(run)) / samples
+
+    closed = per_call(lambda t, i: scalar.predict(wheel, *known, t, i, 70.0))
+    quadrature = per_call(lambda t, i: original.forces(wheel, ground, t, i))
+    closed_batch = per_sample(
+        lambda: linear.forces_under_load(wheel, *known, theta_1, slip, 70.0, maths=linear.ARRAYS)
+    )
+    quadrature_batch = per_sample(lambda: original.forces(wheel, ground, theta_1, slip))
+    return {
+        "closed_form": closed,
+        "quadrature": quadrature,
+        "ratio": quadrature / closed,
+        "closed_form_in_batch": closed_batch,
+        "quadrature_in_batch": quadrature_batch,
+        "ratio_in_batch": quadrature_batch / closed_batch,
+    }
+
+
+def update(subject: Subject) -> Figures:
+    """One measurement of torque and drawbar pull applied by each engine."""
+    settings = subject.configuration.settings
+    tracker = Tracker(settings)
+    whole = played_arrays(read(subject.path), settings.rates.tick)
+    state = tracker.start()
+    for snapshot in snapshots(
+        settings, whole, np.arange(25, 101, 25)
+    ):  # into the first steady stretch
+        state, account = tracker.step(state, snapshot)
+    estimate, measurement = state.estimate, tracker.measurement
+    offered = measurement.linearise(account.now, measurement.predict(estimate, account.now))
+
+    def cost(engine: str) -> float:
+        apply = ENGINES[engine](measurement.variances).update
+        return (
+            statistics.median(
+                subject.repeated(lambda: [apply(estimate, offered, False) for _ in range(200)])
+            )
+            / 200
+        )
+
+    costs = {engine: cost(engine) for engine in ENGINE_NAMES}
+    return {
+        **costs,
+        "ratio": costs["filterpy"] / costs["plain"],
+        "nuisances": len(measurement.variances),
+    }
+
+
+def recording(subject: Subject) -> Figures:
+    """Cost of a message: written, read and checked, read as arrays, and read one by one."""
+    count = len(subject.run.readings)
+    copies = iter(range(subject.sizes.repeats))
+    written = subject.repeated(
+        lambda: _write(subject, subject.path.with_suffix(f".{next(copies)}.mcap"))
+    )
+    arrays = subject.repeated(
+        lambda: [read(subject.path).arrays(topic.name) for topic in RAW_TOPICS]
+    )
+    singly = subject.repeated(lambda: sum(1 for _ in read(subject.path).messages()))
+    times = {"write": written, "read_as_arrays": arrays, "read_one_by_one": singly}
+    return {name: statistics.median(spent) / count for name, spent in times.items()} | {
+        "bytes": subject.path.stat().st_size / count
+    }
+
+
+def forward_model(subject: Subject) -> Figures:
+    """The simulator, and its vertical balance against a scalar root finder on adaptive quadrature."""
+    simulated = subject.sizes.simulated
+    balance = forward_bench.balance_speed(subject.sizes.samples, SEED)
+    return {
+        "speed": forward_bench.simulated_seconds_per_second(simulated),
+        "speed_with_six_effects": forward_bench.simulated_seconds_per_second(
+            simulated, forward_bench.ONE_OF_EACH
+        ),
+        "balance": balance.vectorised,
+        "balance_by_brentq": balance.scalar,
+        "balance_ratio": balance.ratio,
+    }
+
+
+def _write(subject: Subject, path: Path) -> None:
+    writer = RunWriter(path, (), subject.configuration.text, RunInfo())
+    for reading in subject.run.readings:
+        writer.reading(reading)
+    writer.close()
+
+
+def _timed(run: Callable[[], object]) -> float:
+    start = process_time()
+    run()
+    return process_time() - start
+
+
+# ---- command -------------------------------------------------------------------------------------------------------
+
+
+def main(argv: Sequence[str]) -> int:
+    """Measure and print. Exit 0."""
+    parser = Parser(
+        prog="gritd bench",
+        description="What everything costs on this machine; about half a minute.",
+    )
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
+    arguments = parser.parse_args(argv)
+    with TemporaryDirectory(prefix="gritd-bench-") as folder:
+        figures = measure(Sizes(), Path(folder))
+    if arguments.json:
+        print(json.dumps({"machine": machine(), **figures}, indent=2))
+    else:
+        print(report(figures))
+    return DONE
+
+
+def machine() -> dict[str, str | int | float]:
+    """What this was measured on, and how busy it was."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count() or 0,
+        "load_average": round(os.getloadavg()[0], 2),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def _processor() -> str:
+    """The model by /proc/cpuinfo; the architecture where there is none."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    return next(
+        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
+        platform.machine(),
+    )
+
+
+def report(figures: dict[str, Figures]) -> str:
+    """One line a figure, in units for people."""
+    on, t, r, f = machine(), figures["tick"], figures["replay"], figures["forces"]
+    u, m, w = figures["update"], figures["recording"], figures["forward_model"]
+    return "\n".join(
+        [
+            f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, {on['system']}, "
+            f"Python {on['python']}, numpy {on['numpy']}",
+            f"tick       {_µs(t['median'])} at 50 %, {_µs(t['at_99_percent'])} at 99 %: "
+            f"{t['share_of_budget']:.1%} of its period",
+            *(
+                f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to estimates, "
+                f"best {r[f'{name}_best']:.0f}"
+                for name in ENGINE_NAMES
+            ),
+            f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
+            f"ratio {f['ratio']:.1f}",
+            f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])}, "
+            f"quadrature {_µs(f['quadrature_in_batch'])}: "
+            f"ratio {f['ratio_in_batch']:.1f}",
+            f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: ratio {u['ratio']:.1f} "
+            f"({u['nuisances']:.0f} nuisances)",
+            f"recording  a message: write {_µs(m['write'])}, read as arrays {_µs(m['read_as_arrays'])}, "
+            f"one by one {_µs(m['read_one_by_one'])}, {m['bytes']:.0f} bytes",
+            f"simulator  {w['speed']:.0f} times real time, with six effects {w['speed_with_six_effects']:.0f}",
+            f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature {_µs(w['balance_by_brentq'])}: "
+            f"ratio {w['balance_ratio']:.0f}",
+            "processor time, medians where not said otherwise",
+        ]
+    )
+
+
+def _µs(seconds: float) -> str:
+    return f"{seconds * 1e6:.3g} µs"

@@ -1,0 +1,168 @@
+"""`gritd`: one table of commands, each a module of tools with `main(argv)`, imported when it is asked for."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from gritd.drivers.errors import DeviceError, DeviceSettingsError
+from gritd.estimator.config.yamltree import ConfigError
+from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
+
+# command -> (module, what it does)
+COMMANDS = {
+    "demo": (
+        "gritd.tools.commands.demo",
+        "the daemon against the simulated testbed on real wires, with verdict and figure",
+    ),
+    "run": (
+        "gritd.tools.commands.run",
+        "the daemon: sensors in, c and tan φ out, everything logged",
+    ),
+    "status": (
+        "gritd.tools.commands.status",
+        "one report of the running daemon, for people or scripts",
+    ),
+    "monitor": ("gritd.tools.commands.monitor", "the running daemon in a terminal"),
+    "simulate": (
+        "gritd.tools.commands.simulate",
+        "the forward model alone: a schedule in, a recording out",
+    ),
+    "compare": (
+        "gritd.tools.commands.compare",
+        "the forward simulation drawn over recordings, with the residual",
+    ),
+    "replay": ("gritd.tools.commands.replay", "the on-line filter over recordings"),
+    "diagnose": (
+        "gritd.tools.commands.diagnose",
+        "where model and recordings differ, and which physics was left out",
+    ),
+    "check-config": (
+        "gritd.tools.commands.check_config",
+        "check a configuration and show what it implies",
+    ),
+    "recover": ("gritd.tools.commands.recover", "salvage an unclosed or damaged recording"),
+    "import": ("gritd.tools.commands.import_rig", "other rigs' public data to recordings"),
+    "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
+    "prove": (
+        "gritd.tools.proof.blind.command",
+        "blind trials of diagnose against an independent plant",
+    ),
+    "bench": (
+        "gritd.tools.bench.bench",
+        "what a tick, a replay, a force, an update and a message cost here",
+    ),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
+    _speak_as_the_terminal_does()
+    _calculate_alike_everywhere()
+    parser = _parser()
+    given = sys.argv[1:] if argv is None else argv
+    if not given:
+        parser.error("expected a command")
+    arguments = parser.parse_args(given)
+    return guarded(
+        lambda: importlib.import_module(COMMANDS[arguments.command][0]).main(arguments.arguments)
+    )
+
+
+def guarded(command: Callable[[], int | None]) -> int:
+    """The exit code of a command, whatever it raises."""
+    try:
+        code = int(command() or DONE)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        return _leave_pipe()
+    except Exception as error:
+        return _fail(error)
+
+
+def _speak_as_the_terminal_does() -> None:
+    """A terminal that knows no Greek gets a question mark, and a closed one nothing: no command fails for it, least of
+    all the daemon."""
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 - or a recording takes its place
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _calculate_alike_everywhere() -> None:
+    """One thread for linear algebra: sums in another order end in other digits; commands have their own `--jobs`."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
+
+
+def _parser() -> argparse.ArgumentParser:
+    listing = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in COMMANDS.items())
+    parser = Parser(
+        prog="gritd",
+        usage="gritd [--help] [--version] COMMAND …",
+        description="Learns the soil under a rover wheel while the wheel drives.",
+        epilog=f"commands:\n{listing}\n\n`gritd COMMAND --help` explains one.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version")
+    parser.add_argument(
+        "command", choices=COMMANDS, metavar="COMMAND", help="one of the commands below"
+    )
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    return parser
+
+
+class _Version(argparse.Action):
+    """Say the version and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"gritd {version()}")
+        parser.exit()
+
+
+def version() -> str:
+    """The installed version."""
+    from importlib import metadata  # only for whoever asks: every command would wait for it
+
+    try:
+        return metadata.version("gritd")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def _fail(error: Exception) -> int:
+    """One line for the user, and the exit code."""
+    if os.environ.get("GRITD_TRACEBACK"):
+        raise error
+    print(f"gritd: {_one_line(error)}", file=sys.stderr)
+    if isinstance(error, CommandError):
+        return error.code
+    return USAGE if isinstance(error, ConfigError | DeviceSettingsError) else FAILED
+
+
+def _one_line(error: Exception) -> str:
+    """The message of a known error; an unexpected one says so, and how to see more."""
+    text = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror.lower()}"
+    if isinstance(error, CommandError | ConfigError | DeviceError | DeviceSettingsError | OSError):
+        return text
+    return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
+
+
+def _leave_pipe() -> int:
+    """The reader of our output has gone: say nothing, not even when Python flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

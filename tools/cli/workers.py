@@ -1,0 +1,64 @@
+"""Where many independent pieces of work are done: local processes, or a dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
+from multiprocessing import active_children, get_context
+from typing import Any
+
+from gritd.tools.cli.command import FAILED, USAGE, CommandError
+
+
+@contextmanager
+def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
+    """Where work is done, and by how many at a time. Raises CommandError where the cluster cannot be had."""
+    if scheduler is None:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers: they run side by side
+        with _processes(jobs) as pool:
+            yield pool, jobs
+        return
+    with _cluster(scheduler) as client:
+        yield client.get_executor(pure=False), max(len(client.nthreads()), 1)
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[Executor]:
+    """Workers in process groups of their own: when we are stopped, what they started stops with them."""
+    ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    try:
+        with ProcessPoolExecutor(
+            jobs, get_context("spawn"), initializer=os.setpgid, initargs=(0, 0)
+        ) as pool:
+            try:
+                yield pool
+            except BaseException:
+                for pid in (worker.pid for worker in active_children() if worker.pid):
+                    with suppress(ProcessLookupError):
+                        os.killpg(pid, signal.SIGTERM)
+                raise
+    finally:
+        signal.signal(signal.SIGTERM, ended)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Any]:
+    try:
+        from distributed import Client
+    except ImportError:
+        message = "--scheduler needs dask.distributed; expected it installed: pip install 'gritd[cluster]'"
+        raise CommandError(message, USAGE) from None
+    try:
+        client: Any = Client(address, timeout="5s")
+    except (OSError, ValueError, TimeoutError):
+        raise CommandError(
+            f"--scheduler {address}: found no scheduler; expected one that answers", FAILED
+        ) from None
+    try:
+        yield client
+    finally:
+        client.close()

@@ -1,0 +1,147 @@
+"""`gritd compare`: the forward simulation drawn over recordings, channel by channel, with the residual below."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
+from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.tools.diagnose.noise import colour as noise
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.report import comparison, sheet
+from gritd.tools.report.comparison import Comparison
+
+RATE = 10.0  # [Hz] of the grid on which they are compared
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print the errors, draw what was asked for. Raises ConfigError or CommandError."""
+    arguments = _parser().parse_args(argv)
+    configuration = config.load(arguments.config)
+    found = compare(
+        arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv]
+    )
+    try:
+        if arguments.report:
+            arguments.report.write_text(comparison.render(found), encoding="utf-8")
+        if arguments.png:
+            sheet.draw(arguments.png, found)
+    except OSError as error:
+        raise CommandError(
+            f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
+        ) from None
+    print(comparison.printed(found))
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd compare",
+        description="Draw the forward simulation over recordings, with the residual.",
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
+    parser.add_argument(
+        "--config", required=True, metavar="F", help="the testbed, its soil and its effects"
+    )
+    parser.add_argument(
+        "--fit",
+        action="store_true",
+        help="fit the soil and the calibration within their uncertainty too",
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="OUT.html", help="a page that needs nothing else"
+    )
+    parser.add_argument("--png", type=Path, metavar="OUT.png", help="the same on one sheet")
+    return parser
+
+
+def compare(
+    paths: Sequence[Path],
+    configuration: Configuration,
+    *,
+    fitted: bool,
+    command: Sequence[str] = (),
+) -> Comparison:
+    """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing can be compared."""
+    settings = configuration.settings
+    rig = WheelRig([signals(recording, settings, RATE) for recording in read_all(paths)], settings)
+    stack = Stack(rig)
+    if stack.size == 0:
+        raise CommandError(
+            f"{paths[0]}: found no sample where the wheel drives under load; expected some seconds",
+            FAILED,
+        )
+    configured = np.zeros(len(rig.constants))
+    if fitted:
+        prepared = prepare(rig, np.random.default_rng(0))
+        fit, sizes = prepared.base, prepared.problem.noise
+    else:
+        fit, sizes = None, noise.first_guess(stack, stack.predict(configured))
+    sigma = {c: colour.sigma for c, colour in zip(rig.channels, sizes.colours, strict=True)}
+    return Comparison(
+        settings.testbed,
+        _traces(rig, _names(rig, paths), (configured, fit.u if fit else configured), sigma),
+        _soil(rig, fit) if fit else None,
+        tuple(effect.name for effect in rig.baseline),
+        tuple(rig.caveats),
+        _redo(paths, configuration, command),
+    )
+
+
+def _names(rig: WheelRig, paths: Sequence[Path]) -> list[str]:
+    """Of the runs; with the file's where two runs have the same."""
+    names = [run.name for run in rig.runs]
+    return [
+        n if names.count(n) == 1 else f"{n} ({path.name})"
+        for n, path in zip(names, paths, strict=True)
+    ]
+
+
+def _traces(
+    rig: WheelRig, names: Sequence[str], constants: tuple[Array, Array], sigma: dict[str, float]
+) -> tuple[Trace, ...]:
+    before, after = (rig.predict(u, ()) for u in constants)
+    return tuple(
+        Trace(
+            names[at], channel, rig.units[channel], (run.time - run.time[0]).tolist(), run.measured[channel].tolist(),
+            before[at][channel].tolist(), after[at][channel].tolist(), run.used[channel].astype(int).tolist(),
+            sigma[channel],
+        )
+        for channel in rig.channels
+        for at, run in enumerate(rig.runs)
+    )  # fmt: skip
+
+
+def _soil(rig: WheelRig, fit: Fitted) -> SoilFit:
+    spread = np.sqrt(np.diag(fit.covariance()))
+    known = [
+        (k, float(u), float(s))
+        for k, u, s in zip(rig.constants, fit.u, spread, strict=False)
+        if k.soil
+    ]
+    prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k, _, _ in known}
+    found = {k.name: Quantity(k.of(u), k.spread(u, s), k.unit) for k, u, s in known}
+    return SoilFit(prior, found, found, {k.name: u for k, u, _ in known})
+
+
+def _redo(
+    paths: Sequence[Path], configuration: Configuration, command: Sequence[str]
+) -> dict[str, object]:
+    return {
+        "command": shlex.join(command),
+        "files": [{"file": path.name, "sha256": sha256(path)} for path in paths],
+        "grid": f"{RATE:g} Hz",
+        "configuration": configuration.text,
+    }

@@ -1,0 +1,296 @@
+"""`gritd demo`: the daemon against the simulated testbed, as a user would run it, and a verdict on what it found."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
+from queue import Empty, Queue
+from threading import Thread
+from typing import IO, get_args
+
+from gritd.estimator.daemon.daemon import TOPICS
+from gritd.estimator.daemon.ending import Ending
+from gritd.estimator.recording.salvage import Recording, read
+from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, number, whole
+from gritd.tools.commands import demo_verdict as verdict
+from gritd.tools.report import figure
+from gritd.tools.testbed.plant import PlantKind
+from gritd.tools.testbed.testbed import NAME, PLAYED, SHORTEST
+from gritd.tools.testbed.wires import CanKind
+
+READY = 60.0  # [s] the longest that testbed or daemon may take to start
+STOP = 20.0  # [s] the longest a child may take to end
+DEVICES = 2  # of the packaged testbed
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0 if every target is met, 1 with the reason if not. Raises CommandError where a process fails."""
+    arguments = _parser().parse_args(argv)
+    folder = Path(arguments.output or Path("runs") / time.strftime("demo-%Y%m%d-%H%M%S"))
+    folder.mkdir(parents=True, exist_ok=True)
+    with interruptible() as stop:
+        last_words = run(folder, arguments, stop)
+    return conclude(folder, arguments.plant, last_words)
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="gritd demo", description="Run the daemon against the simulated testbed on real wires."
+    )
+    parser.add_argument(
+        "--seconds",
+        type=number(low=SHORTEST),
+        default=60.0,
+        metavar="S",
+        help="length of the run, default 60",
+    )
+    parser.add_argument(
+        "--output", metavar="DIR", help="folder of the run; default runs/demo-DATE-TIME"
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
+    parser.add_argument(
+        "--plant",
+        choices=get_args(PlantKind),
+        default="original",
+        help="Eqs. 1-10 (default), or the closed forms",
+    )
+    parser.add_argument(
+        "--can",
+        choices=get_args(CanKind),
+        default="auto",
+        help="slcan where the computer has no multicast",
+    )
+    return parser
+
+
+# --- the run --------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def interruptible() -> Iterator[Ending]:
+    """What SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is lost."""
+    stop = Ending()
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def run(folder: Path, arguments: Namespace, stop: Ending) -> list[str]:
+    """Testbed and daemon side by side for the given time; the daemon's closing lines."""
+    told = [
+        "--seconds",
+        str(arguments.seconds),
+        "--seed",
+        str(arguments.seed),
+        "--plant",
+        arguments.plant,
+    ]
+    told += ["--folder", str(folder), "--can", arguments.can, "--wait"]
+    with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
+        config = _after(testbed.wait_for("configuration ", READY))
+        print(
+            f"{arguments.plant} plant, seed {arguments.seed}, {arguments.seconds:g} s; everything in {folder}"
+        )
+        with Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "demo") as daemon:
+            _wait_for_devices(daemon)
+            testbed.tell("play")
+            _follow(daemon, testbed, arguments.seconds)
+            return daemon.stop()
+
+
+def _after(line: str) -> str:
+    return line.split(" ", 1)[1]
+
+
+def _wait_for_devices(daemon: Child) -> None:
+    for _ in range(DEVICES):
+        daemon.wait_for("device ", READY)
+
+
+def _follow(daemon: Child, testbed: Child, seconds: float) -> None:
+    """Show the daemon's status until the time is over."""
+    start = time.monotonic()
+    with live_line() as show:
+        while (elapsed := time.monotonic() - start) < seconds:
+            testbed.check()
+            line = daemon.line(min(0.2, seconds - elapsed))
+            if line and " slip " in line:
+                show(f"{elapsed:4.0f} s {_short(line)}")
+
+
+def _short(line: str) -> str:
+    """Of the daemon's status line what fits into 80 columns: status, slip, load, c and tan φ."""
+    parts = [
+        re.search(p, line)
+        for p in (r"^\S+", r"slip +\S+", r"W +\S+ N", r"c +\d+ ± +\d+ Pa", r"tan φ \S+ ± \S+")
+    ]
+    status, *rest = (part.group() if part else "" for part in parts)
+    return " ".join((f"{status:10}", *rest))
+
+
+@contextmanager
+def live_line() -> Iterator[Callable[[str], None]]:
+    """A line that is rewritten on a terminal; plain lines elsewhere."""
+    if not sys.stdout.isatty():
+        yield lambda text: print(text, flush=True)
+        return
+    yield lambda text: print(
+        f"\r\033[K{text[: os.get_terminal_size().columns - 1]}", end="", flush=True
+    )
+    print()
+
+
+class Child:
+    """A Python module run as a process of its own, and what it says. Leaving the block ends it, whatever happened.
+
+    While `stop` is set, waiting for it raises KeyboardInterrupt.
+    """
+
+    def __init__(self, stop: Ending, name: str, module: str, *arguments: str) -> None:
+        self._stop, self._name = stop, name
+        self._lines: Queue[str] = Queue()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            start_new_session=True,  # Ctrl-C reaches us alone: we stop them in order
+        )
+        assert self._process.stdout is not None
+        self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)
+        self._listener.start()
+        self._said: list[str] = []
+
+    def _listen(self, stream: IO[str]) -> None:
+        for line in stream:
+            self._lines.put(line.rstrip())
+
+    def __enter__(self) -> Child:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        with (
+            suppress(CommandError) if kind else nullcontext()
+        ):  # what went wrong first is what is told
+            self.stop()
+
+    def tell(self, line: str) -> None:
+        """Write a line to its standard input. Raises CommandError if it has ended."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise CommandError(f"the {self._name} ended early") from None
+
+    def line(self, timeout: float) -> str | None:
+        """Its next line, or None. Raises as `check` does."""
+        self.check()
+        try:
+            self._said.append(self._lines.get(timeout=max(timeout, 0.0)))
+        except Empty:
+            return None
+        return self._said[-1]
+
+    def check(self) -> None:
+        """Raises CommandError, with its last line, if it has ended; KeyboardInterrupt if we are to stop."""
+        if self._stop.is_set():
+            raise KeyboardInterrupt
+        if self._process.poll() is not None and self._lines.empty():
+            last = self._said[-1] if self._said else "said nothing"
+            raise CommandError(
+                f"the {self._name} ended early (exit {self._process.returncode}): {last}"
+            )
+
+    def wait_for(self, beginning: str, timeout: float) -> str:
+        """The next line that begins so. Raises CommandError."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            line = self.line(0.1)
+            if line and line.startswith(beginning):
+                return line
+        raise CommandError(
+            f"the {self._name} did not say {beginning.strip()!r} within {timeout:g} s"
+        )
+
+    def stop(self) -> list[str]:
+        """SIGTERM, then the lines it still says. Raises CommandError if it does not end."""
+        before = len(self._said)
+        self._process.terminate()
+        try:
+            self._process.wait(STOP)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise CommandError(
+                f"the {self._name} did not end within {STOP:g} s of SIGTERM"
+            ) from None
+        self._listener.join(STOP)  # to the end of what it said
+        while not self._lines.empty():
+            self._said.append(self._lines.get())
+        return self._said[before:]
+
+
+# --- the verdict ----------------------------------------------------------------------------------------------------
+
+
+def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
+    """Read the recording back, print what it shows, draw it, verify its replay."""
+    recording = _recording(folder)
+    ticks, loop = recording.arrays("/tick"), recording.arrays("/loop")
+    soil = json.loads((folder / f"{NAME}.truth.json").read_text(encoding="utf-8"))["soil"]
+    found = verdict.judge(ticks, soil, plant)
+    table = [*verdict.table(found), *verdict.without_correction(recording, soil)]
+    print("\n".join([*table, "", *verdict.punctuality(loop), *_counters(folder, last_words)]))
+    picture = folder / "demo.png"
+    figure.draw(picture, ticks, verdict.headline(found, plant, ticks), soil)
+    print(f"log {recording.path}\nfigure {picture}", flush=True)
+    missed = [*verdict.reasons(found), *_replay(recording.path)]
+    for reason in missed:
+        print(f"target missed: {reason}", file=sys.stderr)
+    if not missed:
+        print(verdict.praise(found))
+    return FAILED if missed else DONE
+
+
+def _recording(folder: Path) -> Recording:
+    newest = max(folder.glob("demo-*.mcap"), key=lambda path: path.stat().st_mtime)
+    return read(newest, TOPICS)
+
+
+def _counters(folder: Path, last_words: Sequence[str]) -> list[str]:
+    """The daemon's own account, and the testbed's."""
+    account = [
+        line for line in last_words if line.startswith(("queue:", "device ", "loop:", "log "))
+    ]
+    played = folder / PLAYED
+    if played.exists():
+        p = json.loads(played.read_text(encoding="utf-8"))
+        lost = ", ".join(f"{name} {count}" for name, count in p["lost"].items())
+        account.append(
+            f"testbed: {p['readings']} readings sent, late by {p['late_half'] * 1e3:.2f} ms (50 %),"
+            f" {p['late_most'] * 1e3:.2f} ms (99 %), {p['late_worst'] * 1e3:.2f} ms (max); nobody took: {lost}"
+        )
+    return account
+
+
+def _replay(path: Path) -> list[str]:
+    """Run `gritd replay --verify`; reasons why it failed."""
+    command = [sys.executable, "-m", "gritd", "replay", str(path), "--verify"]
+    code = subprocess.run(command, check=False).returncode
+    return [] if code == 0 else [f"replay of {path} is not identical (exit {code})"]

@@ -1,0 +1,289 @@
+"""`gritd diagnose`: recordings and a configuration in; verdict, JSON, report and the improved configuration out."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import io
+import json
+import math
+import os
+import shlex
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.configuration import ConfigError
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.recording.run import RecordingError, versions
+from gritd.estimator.recording.salvage import Recording
+from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
+from gritd.tools.commands import diagnose_campaigns as campaigns
+from gritd.tools.commands import diagnose_redo as redo
+from gritd.tools.diagnose.explain import provenance
+from gritd.tools.diagnose.explain.apply import applied
+from gritd.tools.diagnose.explain.innovations import with_innovations
+from gritd.tools.diagnose.explain.result import Diagnosis, NextExperiment
+from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.rig.drive import RATE as DRIVE_RATE
+from gritd.tools.diagnose.rig.drive import DriveRig
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.signals import distinct, drive_series, is_drive, read_all, signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+
+RATES = (
+    (400.0, 10.0),
+    (1200.0, 5.0),
+    (float("inf"), 2.5),
+)  # all runs together up to so long [s]: grid [Hz]
+FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole.
+
+    With --redo, 1 if it comes out otherwise.
+    """
+    arguments = _parser().parse_args(argv)
+    for path in (arguments.json, arguments.report, arguments.apply):
+        if path is not None:
+            _check_output(path, [*arguments.files, *([arguments.redo] if arguments.redo else [])])
+    if arguments.redo is not None:
+        return _again(arguments)
+    if arguments.campaigns is not None:
+        return _many(arguments)
+    if not arguments.files or arguments.config is None:
+        raise CommandError(
+            "diagnose: expected recordings and --config F, or --redo FILE, or --campaigns DIR",
+            USAGE,
+        )
+    configuration, seed = config.load(arguments.config), arguments.seed or 0
+    named = [*map(str, arguments.files), "--config", str(arguments.config), "--seed", str(seed)]
+    command = shlex.join(["gritd", "diagnose", *named])
+    found, damage = of_files(arguments.files, configuration, seed, _said, arguments.jobs, command)
+    _write(arguments, found, configuration)
+    print(text(found))
+    return DAMAGED if damage else DONE
+
+
+def _again(arguments: argparse.Namespace) -> int:
+    """The diagnosis of a JSON or a report once more, on the same files."""
+    if arguments.files or arguments.config is not None or arguments.seed is not None:
+        raise CommandError(
+            "diagnose --redo: expected no recordings, --config or --seed: they are in the file",
+            USAGE,
+        )
+    then = redo.read(arguments.redo)
+    redo.check(then)
+    configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
+    found, _ = of_files(
+        list(then.files), configuration, then.seed, _said, arguments.jobs, then.command
+    )
+    _write(arguments, found, configuration)
+    differs = list(redo.differences(then, redo.Record.of(found)))
+    print(text(found))
+    for line in redo.changed_versions(then):
+        print(f"note: computed with {line}")
+    print(f"redone: {'; '.join(differs) or f'the same as in {arguments.redo}'}")
+    return FAILED if differs else DONE
+
+
+def _many(arguments: argparse.Namespace) -> int:
+    """Every campaign of a folder; 1 if one of them could not be diagnosed."""
+    if arguments.files or arguments.config is not None:
+        raise CommandError(
+            "diagnose --campaigns: expected no recordings or --config: they are in its folders",
+            USAGE,
+        )
+    every = campaigns.found(arguments.campaigns)
+    failed = False
+    for campaign, said in campaigns.diagnosed(every, _one, arguments.jobs, arguments.scheduler):
+        print(f"{campaign.folder.name}: {said}", flush=True)
+        failed |= not campaign.done
+    print(
+        f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: {campaigns.RESULT} in each"
+    )
+    return FAILED if failed else DONE
+
+
+def _one(campaign: campaigns.Campaign) -> str:
+    """Verdict and summary of one campaign, or the one line of what was wrong with it."""
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            main(campaign.arguments())
+    except (CommandError, ConfigError, RecordingError) as error:
+        return f"not diagnosed: {error}"
+    found = json.loads(campaign.result.read_text(encoding="utf-8"))
+    return f"{found['verdict']}. {found['summary']}"
+
+
+def _check_output(path: Path, inputs: Sequence[Path]) -> None:
+    """Before the work is done. Raises CommandError."""
+    if not path.parent.is_dir():
+        raise CommandError(
+            f"{path}: found no folder {path.parent}; expected one to write into", USAGE
+        )
+    if path.is_dir():
+        raise CommandError(f"{path}: found a folder; expected the name of a file to write", USAGE)
+    if any(path.resolve() == given.resolve() for given in inputs):
+        raise CommandError(
+            f"{path}: is read by this command; expected another name to write to", USAGE
+        )
+
+
+def _write(
+    arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration
+) -> None:
+    try:
+        if arguments.json is not None:
+            written = json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n"
+            arguments.json.write_text(written, encoding="utf-8")
+        if arguments.report is not None:
+            importlib.import_module("gritd.tools.report.diagnosis").write(found, arguments.report)
+        if arguments.apply is not None:
+            arguments.apply.write_text(applied(configuration, found), encoding="utf-8")
+    except OSError as error:
+        raise CommandError(
+            f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
+        ) from None
+
+
+def of_files(
+    files: Sequence[Path],
+    configuration: config.Configuration,
+    seed: int,
+    step: object = None,
+    jobs: int = 1,
+    command: str = "",
+) -> tuple[Diagnosis, list[str]]:
+    """The diagnosis, and what was damaged in the files. Raises CommandError."""
+    recordings, hashes = read_all(files), distinct(files)
+    rig, rate = _rig(recordings, configuration.settings)
+    if not rig.channels:
+        raise CommandError(
+            f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
+        )
+    needed = {
+        **({"command": command} if command else {}),
+        "files": hashes,
+        "configuration": configuration.text,
+        "grid_hz": rate,
+        "versions": versions(),
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
+        found = with_innovations(found, configuration, recordings, soil=isinstance(rig, WheelRig))
+    damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
+    said = [
+        *provenance.remarks(recordings, configuration.settings),
+        *(f"Damaged: {line}" for line in damage),
+    ]
+    return replace(found, caveats=(*found.caveats, *said)), damage
+
+
+def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:
+    """The adapter that fits the recordings, and its grid [Hz]."""
+    if is_drive(recordings):
+        series = [drive_series(r, settings) for r in recordings]
+        return DriveRig(
+            series, [r.run.name or r.path.stem for r in recordings], settings
+        ), DRIVE_RATE
+    coarse = [signals(r, settings, FIRST) for r in recordings]
+    length = sum(float(s.time[-1]) for s in coarse)
+    rate = next(hertz for limit, hertz in RATES if length <= limit)
+    in_time = sorted(zip(recordings, coarse, strict=True), key=lambda pair: pair[1].start)
+    return WheelRig([signals(r, settings, rate) for r, _ in in_time], settings), rate
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd diagnose",
+        description="Find where model and recordings differ, name the physics left out, model it, show the fit.",
+    )
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
+    parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
+    parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
+    parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
+    parser.add_argument(
+        "--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found"
+    )
+    parser.add_argument(
+        "--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report"
+    )
+    parser.add_argument(
+        "--campaigns",
+        type=Path,
+        metavar="DIR",
+        help="each folder in DIR: its *.mcap and its *.yaml",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="tcp://…",
+        help="with --campaigns: a dask scheduler whose workers see DIR",
+    )
+    parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
+    parser.add_argument(
+        "--jobs",
+        type=whole(1, 1024),
+        default=os.cpu_count() or 1,
+        help="processes, or campaigns at once; default: one a core",
+    )
+    return parser
+
+
+def _said(what: str) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\033[K{what} …", end="", file=sys.stderr, flush=True)
+
+
+def _foreseen(following: NextExperiment) -> str:
+    gain = following.expected_gain_nats
+    return f" (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ""
+
+
+def text(found: Diagnosis) -> str:
+    """The verdict for a person."""
+    lines = [f"verdict: {found.verdict}", found.summary]
+    for place in found.location[:4]:
+        lines.append(f"  where: {place.where} (p {place.p:.2g})")
+    for h in found.hypotheses[:4]:
+        values = ", ".join(
+            f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in h.parameters.items()
+        )
+        alike = f"; like {', '.join(h.indistinguishable_from)}" if h.indistinguishable_from else ""
+        lines.append(
+            f"  {'*' if h.accepted else ' '} {h.effect} {h.probability:.2f}: {values}{alike}"
+        )
+    if found.law is not None:
+        lines.append(f"  law: {found.law.expression} (takes {found.law.share:.0%})")
+    if found.soil is not None:
+        for name in ("c", "tan_phi"):
+            before, after = found.soil.before[name], found.soil.after[name]
+            lines.append(
+                f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
+                f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
+            )
+        if strained := found.soil.strained():
+            lines.append(f"  {strained}")
+    for channel, unit in found.fit.unit.items():
+        lines.append(
+            f"  held-out {channel}: {found.fit.before[channel]:.3g} before, {found.fit.after[channel]:.3g} after, "
+            f"noise {found.fit.noise_floor[channel]:.2g} {unit}"
+        )
+    if found.fit.innovation_before and found.fit.innovation_after:
+        pairs = found.fit.innovation_before.items()
+        said = ", ".join(
+            f"{n} {v:.2g} before, {found.fit.innovation_after.get(n, v):.2g} after"
+            for n, v in pairs
+        )
+        lines.append(f"  on-line filter, innovation over its sigma: {said}")
+    elif found.fit.innovation_note:
+        lines.append(f"  on-line filter: {found.fit.innovation_note}")
+    if found.next_experiment is not None:
+        lines.append(f"  next: {found.next_experiment.action}{_foreseen(found.next_experiment)}")
+    return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])

@@ -1,0 +1,90 @@
+"""`gritd diagnose --campaigns DIR`: every campaign in a folder, side by side on local processes or on a cluster.
+
+A campaign is a folder in DIR with recordings (*.mcap) and one configuration (*.yaml). Its result and its report are
+written beside them; like `make`, a campaign whose result is newer than its files is not diagnosed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.cli.progress import Progress
+from gritd.tools.cli.workers import workers
+
+RESULT, REPORT = "diagnosis.json", "diagnosis.html"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Files of one campaign. On a cluster the workers must see them under the same path."""
+
+    folder: Path
+    files: tuple[Path, ...]
+    configuration: Path
+
+    @property
+    def result(self) -> Path:
+        return self.folder / RESULT
+
+    @property
+    def done(self) -> bool:
+        try:
+            when = self.result.stat().st_mtime
+        except FileNotFoundError:
+            return False
+        return all(path.stat().st_mtime < when for path in (*self.files, self.configuration))
+
+    def arguments(self) -> list[str]:
+        """What `gritd diagnose` is given for this campaign alone."""
+        named = [*map(str, self.files), "--config", str(self.configuration)]
+        return [
+            *named,
+            "--json",
+            str(self.result),
+            "--report",
+            str(self.folder / REPORT),
+            "--jobs",
+            "1",
+        ]
+
+
+def found(folder: Path) -> list[Campaign]:
+    """The campaigns of a folder, by name. Raises CommandError where there is none, or one without a configuration."""
+    if not folder.is_dir():
+        raise CommandError(
+            f"--campaigns {folder}: found no folder; expected one that holds a folder a campaign",
+            USAGE,
+        )
+    campaigns = [
+        _campaign(each.resolve()) for each in sorted(folder.iterdir()) if any(each.glob("*.mcap"))
+    ]
+    if not campaigns:
+        raise CommandError(
+            f"--campaigns {folder}: found no folder with recordings (*.mcap) in it", USAGE
+        )
+    return campaigns
+
+
+def _campaign(folder: Path) -> Campaign:
+    configurations = sorted(folder.glob("*.yaml"))
+    if len(configurations) != 1:
+        raise CommandError(
+            f"{folder}: found {len(configurations)} files *.yaml; expected its configuration", USAGE
+        )
+    return Campaign(folder, tuple(sorted(folder.glob("*.mcap"))), configurations[0])
+
+
+def diagnosed(
+    campaigns: list[Campaign], work: Callable[[Campaign], str], jobs: int, scheduler: str | None
+) -> Iterator[tuple[Campaign, str]]:
+    """Each campaign that is not done, with what `work` said of it, as they come."""
+    left = [campaign for campaign in campaigns if not campaign.done]
+    with workers(jobs, scheduler) as (executor, _), Progress("campaigns", len(left)) as progress:
+        futures = {executor.submit(work, campaign): campaign for campaign in left}
+        for future in as_completed(futures):
+            progress.advance()
+            yield futures[future], future.result()

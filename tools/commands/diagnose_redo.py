@@ -1,0 +1,129 @@
+"""A diagnosis done again: from its JSON or its report, on the same files by their hash, and compared."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gritd.estimator.recording.run import versions
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.diagnose.explain.result import Diagnosis, plain
+from gritd.tools.diagnose.rig.signals import sha256
+
+EMBEDDED = "redo"  # id of the element of a report that holds what is needed
+ELEMENT = re.compile(rf'<pre id="{EMBEDDED}"[^>]*>(.*?)</pre>', re.DOTALL)
+MOST_BYTES = 1 << 30
+ALIKE = 0.02  # difference of a probability that other versions of the libraries may make
+
+
+@dataclass(frozen=True)
+class Record:
+    """What was diagnosed, with what, and what was found."""
+
+    files: Mapping[Path, str]  # with their SHA-256
+    configuration: str
+    seed: int
+    command: str
+    versions: Mapping[str, str]
+    verdict: str
+    accepted: tuple[str, ...]
+    probability: Mapping[str, float]
+
+    @classmethod
+    def of(cls, found: Diagnosis) -> Record:
+        return cls.parsed(json.loads(as_json(found)), Path())
+
+    @classmethod
+    def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
+        """Of the JSON; files that are not found under their name are looked for in a folder. Raises KeyError, …"""
+        redo, hypotheses = document["redo"], document["hypotheses"]
+        named = {Path(name): str(value) for name, value in redo["files"].items()}
+        return cls(
+            {name if name.exists() else folder / name: value for name, value in named.items()},
+            str(redo["configuration"]),
+            int(redo["seed"]),
+            str(redo.get("command", "")),
+            {str(k): str(v) for k, v in redo["versions"].items()},
+            str(document["verdict"]),
+            tuple(str(h["effect"]) for h in hypotheses if h["accepted"]),
+            {str(h["effect"]): float(h["probability"]) for h in hypotheses},
+        )
+
+
+def as_json(found: Diagnosis) -> str:
+    """What a report holds of the JSON, so that it is enough to do the diagnosis again."""
+    kept = [
+        {"effect": h.effect, "probability": h.probability, "accepted": h.accepted}
+        for h in found.hypotheses
+    ]
+    return json.dumps(
+        plain({"verdict": found.verdict, "hypotheses": kept, "redo": found.redo}),
+        ensure_ascii=False,
+    )
+
+
+def read(path: Path) -> Record:
+    """Raises CommandError where it is neither the JSON nor the report of a diagnosis."""
+    try:
+        with path.open(encoding="utf-8") as stream:
+            text = stream.read(MOST_BYTES)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "no text"
+        raise CommandError(
+            f"{path}: found {reason.lower()}; expected a diagnosis to redo", USAGE
+        ) from None
+    embedded = ELEMENT.search(text)
+    try:
+        return Record.parsed(
+            json.loads(html.unescape(embedded[1]) if embedded else text), path.parent
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        expected = "the JSON or the report that gritd diagnose wrote"
+        raise CommandError(f"{path}: found no diagnosis; expected {expected}", USAGE) from None
+
+
+def check(record: Record) -> None:
+    """Raises CommandError for the first file that is missing or not the one that was diagnosed."""
+    for path, expected in record.files.items():
+        if not path.is_file():
+            raise CommandError(
+                f"{path}: found no such file; expected the recording that was diagnosed", USAGE
+            )
+        found = sha256(path)
+        if found != expected:
+            raise CommandError(
+                f"{path}: found SHA-256 {found[:16]}…; expected {expected[:16]}…, as diagnosed",
+                DAMAGED,
+            )
+
+
+def changed_versions(record: Record) -> list[str]:
+    """What computes otherwise than then, in words."""
+    now = versions()
+    names = [
+        name for name in {**record.versions, **now} if record.versions.get(name) != now.get(name)
+    ]
+    return [
+        f"{name} {now.get(name, 'absent')}, then {record.versions.get(name, 'absent')}"
+        for name in names
+    ]
+
+
+def differences(then: Record, now: Record) -> Iterator[str]:
+    """Of verdict, accepted effects and probabilities, in words."""
+    if then.verdict != now.verdict:
+        yield f"verdict {now.verdict}, then {then.verdict}"
+    if set(then.accepted) != set(now.accepted):
+        yield f"accepted {_names(now.accepted)}, then {_names(then.accepted)}"
+    for name, before in then.probability.items():
+        if abs(now.probability.get(name, 0.0) - before) > ALIKE:
+            yield f"{name} {now.probability.get(name, 0.0):.2f} probable, then {before:.2f}"
+
+
+def _names(effects: Sequence[str]) -> str:
+    return ", ".join(effects) or "no effect"

@@ -1,0 +1,52 @@
+"""`gritd import RIG PATH… -o OUTDIR`: other rigs' public data to recordings and the configuration that fits them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gritd.estimator.recording.run import RecordingError
+from gritd.tools.cli.command import DONE, Parser
+from gritd.tools.cli.files import unwritten
+from gritd.tools.importers.registry import rigs
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Exit code 0. Raises CommandError where a file is not what the importer expects or cannot be written."""
+    args = _parser().parse_args(argv)
+    try:
+        written = rigs()[args.rig].run(args, lambda line: print(line, flush=True))
+    except RecordingError as error:
+        raise unwritten(error) from None
+    for path in written:
+        print(path)
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd import",
+        description="Other rigs' public data to recordings; see docs/importing.md.",
+    )
+    commands = parser.add_subparsers(dest="rig", metavar="RIG", required=True)
+    for name, rig in rigs().items():
+        command = commands.add_parser(name, help=rig.SUMMARY, description=rig.SUMMARY)
+        command.add_argument(
+            "paths", nargs="+", type=Path, metavar="PATH", help="files, or folders to search"
+        )
+        command.add_argument(
+            "-o",
+            "--output",
+            type=Path,
+            required=True,
+            metavar="OUTDIR",
+            help="folder to write into",
+        )
+        rig.add_arguments(command)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of all that a damaged or unclosed one still holds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError
+from gritd.estimator.recording.run import RECOVERED, sealed
+from gritd.estimator.recording.salvage import Recording, read
+from gritd.tools.cli.command import DAMAGED, DONE, Parser
+from gritd.tools.cli.files import unread, unwritten, vacant
+
+LIBRARY = "gritd recover"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit code: 0 nothing lost, 3 saved in part. Raises CommandError."""
+    parser = Parser(prog="gritd recover", description=__doc__)
+    parser.add_argument("file", type=Path, help="the recording; it is not changed")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="default: FILE with .recovered before its suffix"
+    )
+    arguments = parser.parse_args(argv)
+    source: Path = arguments.file
+    target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
+    try:
+        recording = read(source, topics=())
+    except RecordingError as error:
+        raise unread(source, error) from None
+    try:
+        recover(recording, vacant(target))
+    except RecordingError as error:
+        raise unwritten(error) from None
+    for line in recording.damage:
+        print(f"{source}: {line}", file=sys.stderr)
+    print(f"{target}: {summary(recording)}")
+    return DONE if recording.saved and not recording.attachments else DAMAGED
+
+
+def recover(recording: Recording, target: Path) -> None:
+    """Write every intact message, in file order, and every intact metadata record to a new file.
+
+    Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises RecordingError where
+    the file cannot be written; it is then removed.
+    """
+    file = McapFile(target, library=LIBRARY)
+    with file.beginning():
+        for source in recording.sources.values():
+            file.define(source.schema, source.channel)
+        for name, entries in recording.metadata.items():
+            if name != RECOVERED:
+                file.add_metadata(
+                    name, sealed(name, entries) if name.startswith("gritd.") else entries
+                )
+        file.add_metadata(RECOVERED, sealed(RECOVERED, _note(recording)))
+        for chunk in recording.chunks():
+            file.add_chunk(*chunk.records())
+        file.close()
+
+
+def summary(recording: Recording) -> str:
+    """One line: what was saved, and what is known to be lost."""
+    saved = f"saved {recording.counts.total()} messages of {len(recording.counts)} topics"
+    if recording.complete:
+        return f"{saved}; the recording was complete"
+    ending = "closed" if recording.closed else "not closed"
+    if recording.saved:
+        return f"{saved}; it was {ending}, nothing in it is lost"
+    count = f"{recording.lost}" if recording.counted else f"{recording.lost} or more"
+    return f"{saved}; it was {ending}, {count} messages are lost"
+
+
+def _note(recording: Recording) -> dict[str, str]:
+    """What is not in the new file, with what an earlier recovery noted."""
+    earlier = recording.recovered
+    damage = [line for line in (earlier.get("damage", ""), *recording.damage) if line]
+    lost = recording.lost + int(earlier.get("lost", "0"))
+    return {"from": recording.path.name, "lost": str(lost), "damage": "\n".join(damage)}

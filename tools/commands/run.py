@@ -1,0 +1,116 @@
+"""`gritd run`: the daemon on the configured devices."""
+
+from __future__ import annotations
+
+import os
+from argparse import Namespace
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
+from gritd.estimator.daemon.lock import LockError, locked
+from gritd.tools.cli.command import FAILED, CommandError, Parser, number, whole
+
+if TYPE_CHECKING:
+    from gritd.estimator.recording.run import RunInfo
+
+SOCKET = "gritd.sock"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the configuration."""
+    arguments = _parser().parse_args(argv)
+    try:
+        with ExitStack() as held:
+            return _run(arguments, held)
+    except LockError as error:
+        raise CommandError(error, FAILED) from None
+
+
+def _run(arguments: Namespace, held: ExitStack) -> int:
+    """Lock the log folder and serve. A folder that is there is locked before the rest of the program is loaded, which
+    takes half a second: whoever is refused need not wait for it."""
+    named = _folder_named(arguments)
+    early = named if named and named.is_dir() else None
+    if early:
+        held.enter_context(locked(early))
+    from gritd.estimator.config.configuration import load
+    from gritd.tools.service.serve import serve
+
+    configuration = load(arguments.config)
+    folder = Path(arguments.directory or configuration.settings.logging.directory)
+    if folder != early:
+        held.enter_context(locked(folder))
+    run = _run_info(configuration.run, arguments)
+    return serve(
+        configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status
+    )
+
+
+def _folder_named(arguments: Namespace) -> Path | None:
+    """Where logs go by the command line, or by the configuration as it is written; None where neither says so."""
+    if arguments.directory:
+        return Path(arguments.directory)
+    tree = compose(read_text(Path(arguments.config)), arguments.config)
+    logging = tree.items.get("logging") if isinstance(tree, Mapping) else None
+    directory = logging.items.get("directory") if isinstance(logging, Mapping) else None
+    return Path(directory.text) if isinstance(directory, Scalar) and directory.text else None
+
+
+def _socket_path(folder: Path, given: str | None) -> Path:
+    """The given path; under a service manager its runtime directory, otherwise beside the logs."""
+    return Path(given) if given else Path(os.environ.get("RUNTIME_DIRECTORY", folder)) / SOCKET
+
+
+def _run_info(run: RunInfo, arguments: object) -> RunInfo:
+    """The configuration's run section, with what the command line says instead."""
+    given = {
+        "name": getattr(arguments, "name", None),
+        "nominal_load": getattr(arguments, "load", None),
+        "pass_number": getattr(arguments, "passes", None),
+        "start_position": getattr(arguments, "start", None),
+        "notes": getattr(arguments, "notes", None),
+    }
+    return replace(run, **{key: value for key, value in given.items() if value is not None})
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="gritd run",
+        description="Run the daemon until SIGTERM or Ctrl-C; SIGHUP reads calibration, noise and soil again.",
+    )
+    parser.add_argument(
+        "--config", required=True, metavar="F", help="configuration, see config/testbed.yaml"
+    )
+    parser.add_argument(
+        "--directory", metavar="DIR", help="where logs go (default: logging.directory)"
+    )
+    parser.add_argument(
+        "--socket", metavar="PATH", help=f"status socket (default: {SOCKET} beside the logs)"
+    )
+    parser.add_argument("--name", help="name of the run")
+    parser.add_argument(
+        "--load", type=number(above=0.0), metavar="N", help="nominal load of the run [N]"
+    )
+    parser.add_argument(
+        "--pass",
+        dest="passes",
+        type=whole(1, 1000),
+        metavar="K",
+        help="how often the wheel went here, this run included",
+    )
+    parser.add_argument(
+        "--start", type=number(), metavar="M", help="starting position on the bed [m]"
+    )
+    parser.add_argument("--notes", help="free text kept with the run")
+    parser.add_argument(
+        "--status",
+        type=number(low=0.0),
+        default=1.0,
+        metavar="S",
+        help="seconds between status lines, 0 for none",
+    )
+    return parser

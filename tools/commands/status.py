@@ -1,0 +1,200 @@
+"""`gritd status`: one report of the running daemon, for people, for scripts (--json) or for Prometheus."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import time
+from argparse import Namespace
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser
+from gritd.tools.commands.run import SOCKET
+
+PLACES = (Path("/run/gritd") / SOCKET, Path("runs") / SOCKET)
+PATIENCE = 10.0  # [s] with a daemon, or a computer, that is held up
+MAX_LINE = 1 << 20  # [bytes] of a report
+
+Report = dict[str, Any]
+
+# metric -> (type, help, path in the report)
+METRICS = {
+    "gritd_ticks_total": ("counter", "ticks of the loop", "loop.ticks"),
+    "gritd_ticks_missed_total": ("counter", "ticks missed", "loop.missed"),
+    "gritd_tick_lateness_seconds": ("gauge", "lateness of the last tick", "loop.lateness"),
+    "gritd_readings_total": ("counter", "readings received by the queue", "queue.received"),
+    "gritd_readings_dropped_total": ("counter", "readings the queue dropped", "queue.dropped"),
+    "gritd_log_written_total": ("counter", "messages written", "log.written"),
+    "gritd_log_dropped_total": ("counter", "messages the log dropped", "log.dropped"),
+    "gritd_log_queued": ("gauge", "messages waiting for the disk", "log.queued"),
+    "gritd_healthy": ("gauge", "1 while no thread hangs", "healthy"),
+    "gritd_cohesion_pascals": ("gauge", "cohesion c", "tick.cohesion"),
+    "gritd_cohesion_sigma_pascals": ("gauge", "its standard deviation", "tick.cohesion_sigma"),
+    "gritd_tan_phi": ("gauge", "tangent of the internal friction angle", "tick.tan_phi"),
+    "gritd_tan_phi_sigma": ("gauge", "its standard deviation", "tick.tan_phi_sigma"),
+    "gritd_filter_updates_total": ("counter", "filter updates applied", "tick.updates"),
+    "gritd_filter_consistency": (
+        "gauge",
+        "mean normalised innovation squared, 1 when honest",
+        "tick.consistency",
+    ),
+    "gritd_model_disagrees_sigmas": (
+        "gauge",
+        "size of the innovations while model and measurement disagree",
+        "disagreement.sigmas",
+    ),
+    "gritd_filter_resets_total": ("counter", "covariance resets", "tick.resets"),
+    "gritd_late_total": ("counter", "readings older than the horizon", "tick.late"),
+    "gritd_duplicates_total": ("counter", "readings that came twice", "tick.duplicates"),
+    "gritd_jumps_total": ("counter", "encoder jumps", "tick.jumps"),
+    "gritd_invalid_total": ("counter", "readings out of range", "tick.invalid"),
+}
+PER_DEVICE = ("readings", "frames", "bad", "lost", "errors", "quarantined", "reopened")
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0 where a healthy daemon answers, 1 where none does or one of its threads hangs."""
+    arguments = _parser().parse_args(argv)
+    with connected(arguments.socket) as connection:
+        report = next(reports(connection))
+    print(_text(arguments, report), flush=True)
+    return DONE if report["healthy"] else FAILED
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="gritd status", description="One report of the running daemon.")
+    add_socket(parser)
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument(
+        "--json", action="store_true", help="everything, as one JSON object in SI units"
+    )
+    form.add_argument(
+        "--prometheus", action="store_true", help="counters and estimates in Prometheus text form"
+    )
+    return parser
+
+
+def add_socket(parser: Parser) -> None:
+    """The option that says where the daemon is."""
+    places = ", then ".join(map(str, PLACES))
+    parser.add_argument(
+        "--socket", metavar="PATH", help=f"the daemon's status socket (default: {places})"
+    )
+
+
+def _text(arguments: Namespace, report: Report) -> str:
+    if arguments.json:
+        return json.dumps(report, indent=2, ensure_ascii=False)
+    return "\n".join(prometheus(report)) if arguments.prometheus else "\n".join(summary(report))
+
+
+# --- the socket -----------------------------------------------------------------------------------------------------
+
+
+def connected(given: str | None) -> socket.socket:
+    """A connection to the daemon. Raises CommandError."""
+    path = Path(given) if given else next((place for place in PLACES if place.exists()), PLACES[-1])
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    connection.settimeout(PATIENCE)
+    try:
+        connection.connect(os.fsencode(path))
+    except OSError as error:
+        connection.close()
+        raise CommandError(
+            f"{path}: no daemon answers: {(error.strerror or str(error)).lower()}"
+        ) from None
+    return connection
+
+
+def reports(connection: socket.socket) -> Iterator[Report]:
+    """The reports as they come. Raises CommandError where the daemon ends or is silent."""
+    waiting = b""
+    while True:
+        line, found, rest = waiting.partition(b"\n")
+        if found:
+            waiting = rest
+            yield _parsed(line)
+        else:
+            waiting += _more(connection, MAX_LINE - len(waiting))
+
+
+def _more(connection: socket.socket, room: int) -> bytes:
+    try:
+        data = connection.recv(min(1 << 16, room))
+    except OSError as error:
+        raise CommandError(f"the daemon is silent: {str(error).lower()}") from None
+    if not data:
+        raise CommandError("the daemon has ended")
+    return data
+
+
+def _parsed(line: bytes) -> Report:
+    try:
+        report = json.loads(line)
+    except (ValueError, RecursionError):
+        report = None
+    if (
+        not isinstance(report, dict)
+        or not {"healthy", "status", "tick", "loop", "log", "devices"} <= report.keys()
+    ):
+        raise CommandError("what answers on this socket is no gritd")
+    return report
+
+
+# --- the forms ------------------------------------------------------------------------------------------------------
+
+
+def looked_up(report: Report, path: str) -> Any:
+    """A value of the report by its dotted path; None where there is none."""
+    value: Any = report
+    for key in path.split("."):
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
+
+
+def prometheus(report: Report) -> Iterator[str]:
+    """Text exposition format 0.0.4."""
+    for name, (kind, text, path) in METRICS.items():
+        value = looked_up(report, path)
+        if value is not None:
+            yield from (f"# HELP {name} {text}", f"# TYPE {name} {kind}", f"{name} {_value(value)}")
+    for counter in PER_DEVICE:
+        name = f"gritd_device_{counter}_total"
+        yield from (f"# HELP {name} {counter} of a device", f"# TYPE {name} counter")
+        for device, stats in report["devices"].items():
+            yield f'{name}{{device="{_label(device)}"}} {_value(stats[counter])}'
+
+
+def _value(value: float) -> str:
+    """The shortest digits that read back as the same number."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def _label(text: str) -> str:
+    return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
+
+
+def disagreement(found: Mapping[str, Any]) -> str:
+    """Channel, time and size of a disagreement between model and measurement, in words."""
+    since = time.strftime("%H:%M:%S", time.gmtime(found["since"]))
+    return f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, {found['sigmas']:.1f} σ off"
+
+
+def summary(report: Report) -> Iterator[str]:
+    """A few lines for people."""
+    tick, loop, log = report["tick"], report["loop"], report["log"]
+    yield f"gritd {report['pid']}: {report['status']} {' '.join(report['flags'])}".rstrip()
+    if tick:
+        yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
+        yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
+    if found := report.get("disagreement"):
+        yield f"  model    {disagreement(found)}"
+    yield f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: {report['real_time']}"
+    for name, stats in report["devices"].items():
+        yield f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, {stats['lost']} lost"
+    yield f"  log      {log['state']}, {log['dropped']} dropped, {log['file']} {log['error']}".rstrip()
+    if report["hanging"]:
+        yield f"  hanging  {report['hanging']}"

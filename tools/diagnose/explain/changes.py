@@ -1,0 +1,334 @@
+"""Change points: where along the bed, a run, the runs or a condition a misfit starts or stops.
+
+A channel's misfit is taken apart by forward selection: steps and windows (the same offset between two places) along
+every covariate compete with smooth functions of the same covariates, all of them of one size or in proportion to the
+channel, each weighed by its log Bayes factor with a uniform prior over its places. What drifts or curves is taken by a
+smooth function and gives no change point. A step counts when its evidence exceeds what the largest step of 99 % of the
+surrogates has, over all channels and covariates together. Source: binary segmentation (Scott and Knott 1974, Biometrics
+30, 507-512) with the null by simulation, since the noise is coloured and the soil was fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice, pairwise
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.scores import WIDE, Beside, Scores, alone
+from gritd.tools.diagnose.fit import functions as generic
+from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.screen.screen import tail_quantile
+from gritd.tools.diagnose.search.search import Model, Search
+
+ALONG = ("position", "time", "slip", "run")
+CURVES = (
+    "load",
+    "speed",
+    "sinkage",
+    "heat",
+    "elapsed",
+)  # along which a misfit may curve; not tried for a start
+PLACES = 32  # tried along a covariate
+WIDTHS = (
+    0.015,
+    0.05,
+)  # of a change, relative to the whole stretch: a wheel is on both sides of it for a while
+WAVES = 12  # cosines of a smooth function; their size falls with the square of their number, as a kink's does
+FEW = 8  # values on either side of a change
+LEVELS, HELD = (
+    8,
+    0.015,
+)  # least number of levels of a covariate, and share of the values that makes one
+LEVEL = 0.01  # chance of any change point by noise alone
+LEAST = 3.0  # [nats]
+ROUNDS = 6
+MOSTLY = 0.5  # of a channel's misfit that offsets of the runs must take before one looks for changes between runs
+NEARLY, FEW_RUNS = 0.93, 2  # of that, what so few steps between runs must take
+WORTH = 0.1  # of the evidence of the first part: a later change that gains less is detail
+
+Changes = dict[tuple[str, str], tuple[float, ...]]  # channel and covariate -> places in order
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps of one width along one covariate: column k of `own` rises from 0 to 1 at places[k]."""
+
+    covariate: str
+    places: Array
+    own: slice
+
+
+@dataclass(frozen=True)
+class Part:
+    """A step from places[0], or a window between two places; its evidence [nats]."""
+
+    evidence: float
+    steps: Steps
+    places: tuple[int, ...]
+
+    def direction(self, size: int) -> Array:
+        """Its combination of the columns (size, 1)."""
+        out = np.zeros((size, 1))
+        for place, sign in zip(self.places, (1.0, -1.0), strict=False):
+            out[self.steps.own.start + place] = sign
+        return out
+
+
+NONE = Part(-np.inf, Steps("", np.zeros(0), slice(0, 0)), ())
+
+
+@dataclass(frozen=True)
+class Board:
+    """Everything that competes for one channel's misfit."""
+
+    channel: str
+    scores: Scores
+    steps: tuple[Steps, ...]
+    smooth: tuple[slice, ...]
+
+
+def find(search: Search, model: Model) -> Changes:
+    """Change points of every channel; empty where there are none. Of runs, halfway between their numbers."""
+    beside, channels = Beside(search, model), search.problem.stack.rig.channels
+    boards = [board for channel in channels if (board := _board(search, model, beside, channel))]
+    if not boards:
+        return {}
+    nulls = np.max([largest for board in boards for largest in _nulls(board)], axis=0)
+    threshold = max(tail_quantile(nulls, LEVEL), LEAST)
+    found: Changes = {}
+    for board in boards:
+        runs = _between_runs(board, threshold)
+        for part in (*runs, *_taken_apart(board, runs, threshold)):
+            key = (board.channel, part.steps.covariate)
+            places = [float(part.steps.places[i]) for i in part.places]
+            found[key] = tuple(sorted({*found.get(key, ()), *places}))
+    return found
+
+
+# ---- what competes -------------------------------------------------------------------------------------------------
+
+
+def values(stack: Stack, name: str) -> Array | None:
+    """A covariate (N,); of runs, their number in order of time from 1; elapsed: time since the run began."""
+    if name == "run":
+        began = [float(run.time[0]) for run in stack.rig.runs]
+        number = np.empty(len(began))
+        number[np.argsort(began, kind="stable")] = np.arange(1, len(began) + 1)
+        return np.asarray(number[stack.run])
+    if name == "elapsed":
+        return np.asarray(stack.time - np.array([run.time[0] for run in stack.rig.runs])[stack.run])
+    return stack.covariate(name) if name in stack.rig.runs[0].covariates else None
+
+
+def columns(stack: Stack, channel: str, covariate: str, places: Sequence[float]) -> Array:
+    """Steps (N, m) of the channel at known change points, of the expected size of a misfit."""
+    along, own = values(stack, covariate), stack.of(channel)
+    assert along is not None
+    moving = own & (stack.covariate("speed") > 0.0)
+    size = generic.SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    rise = _rise(along, np.array(places), WIDTHS[0] * float(np.ptp(along[moving])))
+    return np.where(moving[:, None], size * rise, 0.0)
+
+
+def _board(search: Search, model: Model, beside: Beside, channel: str) -> Board | None:
+    """None where nothing varies along which the channel could change."""
+    stack = search.problem.stack
+    own = stack.of(channel)
+    moving = stack.covariate("speed")[own] > 0.0
+    if not moving.any():
+        return None
+    size = generic.SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    forms = [
+        np.where(moving, size, 0.0)[:, None],
+        np.where(moving, generic.SIZE * model.fitted.predicted[own], 0.0)[:, None],
+    ]
+    blocks = [
+        (name, places, form * block)
+        for name, places, block in _steps(stack, own, moving)
+        for form in forms
+    ]
+    if not blocks:
+        return None
+    curves = [form * block for block in _curves(stack, own, moving) for form in forms]
+    joined = [*(block for _, _, block in blocks), *curves, *_generics(search, channel, own)]
+    spans = [
+        slice(a, b)
+        for a, b in pairwise(np.cumsum([0, *(block.shape[1] for block in joined)]).tolist())
+    ]
+    steps = [
+        Steps(name, places, span) for (name, places, _), span in zip(blocks, spans, strict=False)
+    ]
+    weighed = beside.scores(np.column_stack(joined), own)
+    return Board(channel, weighed, tuple(steps), tuple(spans[len(steps) :]))
+
+
+def _along(
+    stack: Stack, names: Sequence[str], own: Bools, moving: Bools
+) -> Iterator[tuple[str, Array]]:
+    """Covariates (n,) of a channel's values that vary while the wheel moves."""
+    for name in names:
+        along = values(stack, name)
+        if (
+            along is not None
+            and np.ptp(along[own][moving]) > generic.LEVELS * np.abs(along[own]).max()
+        ):
+            yield name, along[own]
+
+
+def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array, Array]]:
+    """Covariate, places, and steps there (n, places) from 0 to 1."""
+    for name, along in _along(stack, ALONG, own, moving):
+        if name == "run":
+            places = np.arange(along.min(), along.max()) + 0.5
+            yield name, places, (along[:, None] > places).astype(float)
+            continue
+        if _swept(along[moving]):
+            low, high = np.quantile(along[moving], (0.01, 0.99))
+            places = _distinct(np.linspace(low, high, PLACES + 2)[1:-1], along[moving])
+            if name == "time":
+                inside = [(r.time[0] < places) & (places < r.time[-1]) for r in stack.rig.runs]
+                places = places[np.any(inside, axis=0)]
+            if places.size:
+                span = float(np.ptp(along[moving]))
+                yield from ((name, places, _rise(along, places, width * span)) for width in WIDTHS)
+
+
+def _swept(along: Array) -> bool:
+    """Whether a covariate was driven through rather than held at a few levels, between which nothing can be placed."""
+    count, _ = np.histogram(along, PLACES)
+    return bool(np.sum(count >= HELD * along.size) >= LEVELS)
+
+
+def _rise(along: Array, places: Array, width: float) -> Array:
+    """(n, m) from 0 to 1 at each place."""
+    return np.asarray(0.5 * (1.0 + np.tanh((along[:, None] - places) / width)))
+
+
+def _distinct(places: Array, along: Array) -> Array:
+    """Of several places with nothing between them the middle one."""
+    beyond = np.searchsorted(np.sort(along), places, side="right")
+    kept = [
+        np.flatnonzero(beyond == count)
+        for count in np.unique(beyond)
+        if FEW <= count <= along.size - FEW
+    ]
+    return np.array([places[same].mean() for same in kept])
+
+
+def _curves(stack: Stack, own: Bools, moving: Bools) -> Iterator[Array]:
+    """Smooth functions along each covariate (n, WAVES)."""
+    number = np.arange(1, WAVES + 1)
+    for name, along in _along(stack, (*ALONG, *CURVES), own, moving):
+        if name != "run":
+            share = (along - along[moving].min()) / np.ptp(along[moving])
+            yield np.cos(np.pi * number * share[:, None]) / number**2
+
+
+def _generics(search: Search, channel: str, own: Bools) -> Iterator[Array]:
+    """The functions in which misfits without a name are looked for."""
+    for signature in search.generics:
+        if signature.name.partition("~")[0] == channel and not signature.name.endswith("~run"):
+            yield signature.columns[own]
+
+
+# ---- taking it apart -----------------------------------------------------------------------------------------------
+
+
+def _nulls(board: Board) -> Iterator[Array]:
+    """Largest evidence of a step or window along each covariate in every surrogate (draws,)."""
+    for steps in board.steps:
+        for evidence, _ in _weighed(board.scores, steps, slice(1, None)):
+            yield evidence.max(axis=0)
+
+
+def _weighed(
+    of: Scores, steps: Steps, which: slice
+) -> Iterator[tuple[Array, Sequence[tuple[int, ...]]]]:
+    """Evidence (candidates, draws) of all steps, then of all windows, and their places."""
+    a, b = of.a[steps.own, steps.own], of.b[steps.own, which]
+    count = len(a)
+    price = np.log(
+        4.0 * len(ALONG) * len(WIDTHS)
+    )  # of the choice of step or window, form, covariate and width
+    yield alone(np.diag(a), b) - np.log(count) - price, [(i,) for i in range(count)]
+    if count > 1:
+        i, j = np.triu_indices(count, 1)
+        inside = np.diag(a)[i] + np.diag(a)[j] - 2.0 * a[i, j]
+        yield (
+            alone(inside, b[i] - b[j]) - np.log(len(i)) - price,
+            list(zip(i.tolist(), j.tolist(), strict=True)),
+        )
+
+
+def _taken_apart(board: Board, runs: Sequence[Part], threshold: float) -> Iterator[Part]:
+    """Steps inside runs that stand beside what steps between runs and smooth functions take, the largest first."""
+    left, first = board.scores, max((part.evidence for part in runs), default=0.0)
+    for part in runs:
+        left = left.without(part.direction(len(left.a)))
+    for _ in range(ROUNDS):
+        part = max(
+            (_best(left, s) for s in board.steps if s.covariate != "run"),
+            key=lambda p: p.evidence,
+            default=NONE,
+        )
+        curves = [_evidence(left, block) for block in board.smooth]
+        curve = max(curves, default=-np.inf)
+        first = first or max(part.evidence, curve)
+        if max(part.evidence, curve) < max(threshold, WORTH * first):
+            return
+        if curve >= part.evidence:
+            left = left.without_columns(board.smooth[int(np.argmax(curves))])
+        else:
+            left = left.without(part.direction(len(left.a)))
+            yield part
+
+
+def _between_runs(board: Board, threshold: float) -> list[Part]:
+    """A few steps between runs that do nearly all that an offset of every run could: drift needs one at every run."""
+    runs = [steps for steps in board.steps if steps.covariate == "run"]
+    if not runs:
+        return []
+    everything = slice(0, len(board.scores.a))
+    offsets = max(_nats(board.scores, steps.own) for steps in runs)
+    if offsets < MOSTLY * _nats(board.scores, everything):
+        return []
+    left, found = board.scores, list[Part]()
+    while len(found) < min(FEW_RUNS, len(runs[0].places) - 1):
+        part = max((_best(left, steps, windows=False) for steps in runs), key=lambda p: p.evidence)
+        if part.evidence < threshold:
+            return []
+        found.append(part)
+        taken = np.column_stack([p.direction(len(left.a)) for p in found])
+        if _nats(_turned(board.scores, taken), slice(0, len(found))) >= NEARLY * offsets:
+            return found
+        left = left.without(part.direction(len(left.a)))
+    return []
+
+
+def _turned(of: Scores, directions: Array) -> Scores:
+    """Of combinations of the columns."""
+    return Scores(directions.T @ of.a @ directions, directions.T @ of.b)
+
+
+def _nats(of: Scores, own: slice) -> float:
+    """Log likelihood that a block gains."""
+    a, b = of.a[own, own], of.b[own, 0]
+    return float(0.5 * b @ np.linalg.solve(a + np.eye(b.size) / WIDE**2, b))
+
+
+def _evidence(left: Scores, block: slice) -> float:
+    return float(
+        log_bayes(left.a[block, block], left.b[block, 0], (0,) * (block.stop - block.start))
+    )
+
+
+def _best(left: Scores, steps: Steps, windows: bool = True) -> Part:
+    found = []
+    for evidence, places in islice(_weighed(left, steps, slice(0, 1)), None if windows else 1):
+        at = int(np.argmax(evidence[:, 0]))
+        found.append(Part(float(evidence[at, 0]), steps, places[at]))
+    return max(found, key=lambda part: part.evidence)

@@ -1,0 +1,238 @@
+"""What to do next: from a feasible menu, the least effort that decides, else what decides most.
+
+Between rivals, a driven experiment is foreseen: each rival, at its fit, is simulated under the proposed motion; the
+expected gain is half the squared distance of their predictions in units of noise (the Kullback-Leibler divergence of
+two equal Gaussians), for what the uncertainty of the soil leaves of it. Where the recordings were insufficient, what is
+foreseen are the effects that they could not have shown, each at its expected size; where the physics is not in the
+list, the condition along which the misfit lives is stepped. An instrument's reading is worth half the squared parameter
+over a fifth of its expected size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import EXPERIMENTS, Effect
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.result import NextExperiment
+from gritd.tools.diagnose.rig.proposals import driving
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.search.search import Model, Search
+from gritd.tools.diagnose.verdict.decide import Decision
+
+DRIVEN = (  # by effort
+    "standstill",
+    "reversal",
+    "slip_step",
+    "speed_step",
+    "shifted_start",
+    "second_pass",
+    "load_step",
+    "lifted_spin",
+)
+ALONG = {  # the covariate along which a misfit lives -> what shows its shape
+    "slip": "slip_step", "speed": "speed_step", "acceleration": "speed_step", "load": "load_step",
+    "sinkage": "load_step", "position": "shifted_start", "time": "long_run", "heat": "long_run", "run": "second_pass",
+    "direction": "reversal", "velocity": "reversal", "wheel_angle": "lifted_spin", "constant": "lifted_spin",
+}  # fmt: skip
+INSTRUMENT = 0.2  # of an expected size: what tape, level or clamp meter can tell
+MODELLED = 0.02  # of a channel's size: no rival predicts an experiment better than this
+EVERY = 10  # foreseen values that count as one: neighbours share their noise
+ENOUGH, MOST = 10.0, 50.0  # [nats] that decide; more than MOST are said as MOST
+RIVALS = 4
+WORTH = 1.0  # [nats] from which on two are said to be told apart
+STEP = 0.1  # [σ] of a constant, for differences
+
+
+def next_experiment(search: Search, decision: Decision) -> NextExperiment | None:
+    """None where model and recordings agree, or one explanation stands alone."""
+    if decision.verdict == "insufficient":
+        return _most_shown(_unseen_shown(search))
+    if decision.verdict == "unlisted":
+        return _shape_of_misfit(search)
+    rivals = _rivals(search, decision)
+    return _between(search, rivals) if len(rivals) > 1 else None
+
+
+def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
+    """What tells most rivals from the first; of equals the least effort."""
+    gains = {key: _told_apart(search, rivals, key) for key in DRIVEN} | _measured(rivals)
+    settled = {key: sum(gain >= ENOUGH for gain in each) for key, each in gains.items()}
+    key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
+    told = [m for m, gain in zip(rivals[1:], gains[key], strict=True) if gain >= WORTH]
+    names = tuple(
+        dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
+    )
+    return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(names)
+
+
+def _most_shown(gains: Mapping[str, float]) -> NextExperiment | None:
+    key = max(gains, key=lambda k: gains[k], default="")
+    return _foretold(key, gains[key]) if key and gains[key] > 0.0 else None
+
+
+def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExperiment:
+    return NextExperiment(
+        key, EXPERIMENTS[key], separates, gain, float(1.0 / (1.0 + np.exp(-gain)))
+    )
+
+
+def _by_hand(names: Sequence[str]) -> NextExperiment | None:
+    """What the rivals' own files name, where nothing is foreseen to tell."""
+    for name in names:
+        for other, key in EFFECTS[name].confusable_with.items():
+            if other in names:
+                return NextExperiment(
+                    key, EXPERIMENTS[key], tuple(names), float("nan"), float("nan")
+                )
+    return None
+
+
+# ---- rivals --------------------------------------------------------------------------------------------------------
+
+
+def _rivals(search: Search, decision: Decision) -> list[Model]:
+    best, groups = decision.best, decision.groups.values()
+    same = [m for m in search.models if len(m.names) == len(best.names)]
+    close = [m for m in same if any(set(m.names) - set(best.names) <= set(g) for g in groups)]
+    return sorted(close, key=lambda m: -m.evidence)[:RIVALS] if best.names else []
+
+
+def _common(rivals: list[Model]) -> set[str]:
+    return set.intersection(*(set(m.names) for m in rivals))
+
+
+def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
+    """Expected gain between the first and every other rival [nats]."""
+    rig = search.problem.stack.rig
+    first, *others = rivals
+    if not isinstance(rig, WheelRig):
+        return [0.0] * len(others)
+    here, slopes = _foreseen(search, key, first.fitted.u, first.fitted.acting)
+    seen = [_values(rig.foresee(key, m.fitted.u, m.fitted.acting)) for m in others]
+    return [_gain(search, key, here, values - _values(here), slopes) for values in seen]
+
+
+def _measured(rivals: list[Model]) -> dict[str, list[float]]:
+    """What instruments that the rivals' own files name would tell between the first and every other."""
+    first, *others = rivals
+    keys = {
+        k
+        for m in rivals
+        for n in m.names
+        for k in EFFECTS[n].confusable_with.values()
+        if k not in DRIVEN
+    }
+    return {key: [_read(first, other, key) for other in others] for key in sorted(keys)}
+
+
+def _read(one: Model, other: Model, key: str) -> float:
+    """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell these two."""
+    gain = 0.0
+    for model, rival in ((one, other), (other, one)):
+        for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
+            tells = any(EFFECTS[f.name].confusable_with.get(name) == key for name in rival.names)
+            if tells and f.parameter.role == "strength":
+                gain = max(gain, min(0.5 * float(x / INSTRUMENT) ** 2, MOST))
+    return gain
+
+
+# ---- insufficient, and not in the list -----------------------------------------------------------------------------
+
+
+def _unseen_shown(search: Search) -> dict[str, float]:
+    """Of every driven experiment the median gain over effects that these recordings could not show [nats]."""
+    rig, base = search.problem.stack.rig, search.models[0]
+    if not isinstance(rig, WheelRig):
+        return {}
+    unseen = [_expected(rig.effects[name]) for name in _not_shown(search)]
+    out = {}
+    for key in DRIVEN if unseen else ():
+        here, slopes = _foreseen(search, key, base.fitted.u, ())
+        changes = [
+            _values(rig.foresee(key, base.fitted.u, (effect,))) - _values(here) for effect in unseen
+        ]
+        out[key] = float(
+            np.median([_gain(search, key, here, change, slopes) for change in changes])
+        )
+    return out
+
+
+def _not_shown(search: Search) -> list[str]:
+    """Effects whose signature, at their expected size, is below the alarm."""
+    base, found = search.models[0].fitted.base(), search.screens[()]
+    size = {
+        name: float(np.trace(base.projected(w.columns)[0]))
+        for name, w in found.best.items()
+        if "~" not in name
+    }
+    return [name for name, squared in size.items() if 0.5 * squared < found.threshold]
+
+
+def _expected(effect: type[Effect]) -> Effect:
+    """The effect at its expected size."""
+    sizes = {p.name: p.off + p.sigma for p in effect.parameters() if p.role == "strength"}
+    return effect(
+        **{
+            p.name: float(np.clip(sizes[p.name], p.low, p.high))
+            for p in effect.parameters()
+            if p.name in sizes
+        }
+    )
+
+
+def _shape_of_misfit(search: Search) -> NextExperiment | None:
+    """A step of the condition along which the misfit lives; the gain is its evidence so far, for as much again."""
+    evidence = {name: e for name, e in search.screens[()].evidence.items() if "~" in name}
+    if not evidence:
+        return None
+    name = max(evidence, key=lambda n: evidence[n])
+    key = ALONG.get(name.partition("~")[2].partition("·")[0].partition(" ")[0], "slip_step")
+    gain = float(np.clip(evidence[name] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
+    return _foretold(key, gain)
+
+
+# ---- what is foreseen ----------------------------------------------------------------------------------------------
+
+Foreseen = Mapping[str, Array]
+
+
+def _foreseen(
+    search: Search, key: str, u: Array, effects: Sequence[Effect]
+) -> tuple[Foreseen, Array]:
+    """Channels under an experiment, and their change (values, q) for one σ of each soil constant as fitted so far."""
+    rig = search.problem.stack.rig
+    assert isinstance(rig, WheelRig)
+    here = rig.foresee(key, u, effects)
+    sigma = np.sqrt(np.diag(search.models[0].fitted.covariance()))
+    slopes = []
+    for i, known in enumerate(rig.constants):
+        if known.soil:
+            moved = u.copy()
+            moved[i] += STEP
+            slopes.append(
+                (_values(rig.foresee(key, moved, effects)) - _values(here)) / STEP * sigma[i]
+            )
+    return here, np.column_stack(slopes)
+
+
+def _values(foreseen: Foreseen) -> Array:
+    return np.concatenate([np.asarray(values)[::EVERY] for values in foreseen.values()])
+
+
+def _gain(search: Search, key: str, here: Foreseen, change: Array, slopes: Array) -> float:
+    """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST [nats]."""
+    stack = search.problem.stack
+    sigma = []
+    for channel, colour in zip(here, search.problem.noise.colours, strict=True):
+        usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
+        counts = driving(key) | (channel == "torque")
+        sigma.append(np.where(counts, np.hypot(colour.sigma, MODELLED * usual), np.inf)[::EVERY])
+    scale = np.concatenate(sigma)
+    ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
+    pulled = soil.T @ ready
+    taken = pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)
+    return float(np.clip(0.5 * (ready @ ready - taken), 0.0, MOST))

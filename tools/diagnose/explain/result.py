@@ -1,0 +1,237 @@
+"""What a diagnosis found: the JSON of `gritd diagnose`, and the evidence a report draws. Plain values, SI inside.
+
+Arrays are lists of floats of one length n per trace; `to_json` gives the whole tree as JSON types, NaN as null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A value, its standard deviation and unit. For a parameter, the unit is the one it is stated in (SI)."""
+
+    value: float
+    sigma: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Test:
+    """The alarm: is there a mismatch at all? Its threshold is a quantile of nulls simulated from the data's own noise.
+
+    name:      what was largest: "omnibus", "strain", or the name of an effect whose signature stood out.
+    statistic: its evidence [nats] beyond what noise shows, and the threshold it had to pass.
+    p:         share of the nulls that exceed it, (1 + exceeded)/(1 + nulls).
+    level:     the false-alarm rate at which the threshold was set.
+    """
+
+    name: str
+    statistic: float
+    threshold: float
+    p: float
+    level: float
+    nulls: int
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the misfit lives. `share` is the part of the channel's explainable misfit that the covariate takes.
+
+    p is by surrogates, q after false-discovery control over all pairs that were tried.
+    changes: values of the covariate at which the misfit starts or stops; of runs, the number (from 1) of the first
+    beyond.
+    """
+
+    channel: str
+    covariate: str
+    share: float
+    p: float
+    q: float
+    where: str
+    changes: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One effect, fitted jointly with the soil to all channels, scored on runs and conditions it was not fitted to."""
+
+    effect: str
+    probability: float
+    heldout_gain_nats: float
+    parameters: Mapping[str, Quantity]
+    indistinguishable_from: tuple[str, ...] = ()
+    accepted: bool = False
+    sentence: str = ""  # the effect in plain words
+    score_nats: float = 0.0  # of its signature, before the nonlinear fit
+    separated_by: Mapping[str, str] = field(
+        default_factory=dict
+    )  # rival -> what would tell them apart, in words
+
+
+SOIL = {  # in words
+    "c": "cohesion c",
+    "tan_phi": "tan φ",
+    "k": "shear modulus k",
+    "n": "sinkage exponent n",
+    "K": "sinkage modulus K",
+}
+STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
+
+
+@dataclass(frozen=True)
+class SoilFit:
+    """c [Pa], tan_phi, k [m], n, K [Pa/mⁿ]: known before, fitted without and with the accepted effects.
+
+    strain: (before − prior)/σ of each, at the fit without the effect.
+    """
+
+    prior: Mapping[str, Quantity]
+    before: Mapping[str, Quantity]
+    after: Mapping[str, Quantity]
+    strain: Mapping[str, float]
+
+    def strained(self) -> str:
+        """In words, which parameters the fit without an effect moved far from what was known; empty if none."""
+        far = [(k, s) for k, s in self.strain.items() if math.isfinite(s) and abs(s) >= STRAINED]
+        moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
+        together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
+        return f"Without an effect the fit moves {together} from what was known." if moved else ""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Root mean square errors in the channel's unit, on data held out: predicted by a fit to the other runs.
+
+    innovation: root mean square of the on-line filter's normalised innovations, None where there are none; the note
+    says why, or why after is as before.
+    """
+
+    unit: Mapping[str, str]
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    noise_floor: Mapping[str, float]
+    innovation_before: Mapping[str, float] | None = None
+    innovation_after: Mapping[str, float] | None = None
+    innovation_note: str = ""
+
+
+@dataclass(frozen=True)
+class Law:
+    """An empirical expression for what no listed effect explains, in the channel's unit, valid inside `domain`."""
+
+    channel: str
+    expression: str
+    domain: Mapping[str, tuple[float, float]]
+    share: float  # of the explainable misfit
+    parameters: Mapping[
+        str, Quantity
+    ]  # of effect `empirical_law`, where it can be put into a configuration
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """expected_probability: that of what is true, of two as likely now, after the expected gain. NaN: not foreseen."""
+
+    key: str  # of gritd.estimator.effects.base.EXPERIMENTS
+    action: str
+    separates: tuple[str, ...]
+    expected_gain_nats: float
+    expected_probability: float = math.nan
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One channel of one run on the analysis grid, each list (n,). Predictions are for the run held out.
+
+    used: 1 where the soil fit used the sample, 0 where it did not (standstill, lifted, unsteady).
+    """
+
+    run: str
+    channel: str
+    unit: str
+    time: list[float]
+    measured: list[float]
+    before: list[float]
+    after: list[float]
+    used: list[int]
+    sigma: float  # noise of one grid value
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Residual (measured − predicted) against a covariate where the misfit lives; lists (n,)."""
+
+    channel: str
+    covariate: str
+    unit: str
+    covariate_unit: str
+    x: list[float]
+    before: list[float]
+    after: list[float]
+    run: list[int]
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything `gritd diagnose` found."""
+
+    verdict: Verdict
+    summary: str  # one or two sentences with numbers
+    test: Test
+    location: tuple[Location, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    soil: SoilFit | None  # None for a rig without soil
+    fit: Fit
+    law: Law | None
+    next_experiment: NextExperiment | None
+    caveats: tuple[str, ...]
+    remaining: str  # what remains above the noise floor after the best explanation, in words
+    nuisance: Mapping[
+        str, Quantity
+    ]  # calibration constants that floated, fitted with the accepted effects
+    noise: Mapping[
+        str, Mapping[str, float]
+    ]  # channel -> sigma of a grid value, correlation time [s], configured sigma
+    baseline: tuple[str, ...]  # effects the configuration already held
+    traces: tuple[Trace, ...]
+    scatters: tuple[Scatter, ...]
+    redo: Mapping[
+        str, Any
+    ]  # files with their SHA-256, configuration text, seed, versions, settings of the engine
+
+    @property
+    def accepted(self) -> tuple[Hypothesis, ...]:
+        return tuple(h for h in self.hypotheses if h.accepted)
+
+    def to_json(self) -> dict[str, Any]:
+        """The contract of docs/diagnosis.md; more keys than those promised may appear."""
+        whole = asdict(self)
+        soil, fit = whole.pop("soil"), whole.pop("fit")
+        whole["soil"] = soil and {**soil, "strain_words": self.soil.strained() if self.soil else ""}
+        whole["fit"] = {
+            "heldout": {"before": fit["before"], "after": fit["after"]},
+            "noise_floor": fit["noise_floor"],
+            "unit": fit["unit"],
+            "innovation": {key: fit[f"innovation_{key}"] for key in ("before", "after", "note")},
+        }
+        return plain(whole)  # type: ignore[no-any-return]
+
+
+def plain(value: Any) -> Any:
+    """The same tree in JSON types; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | str) or value is None:
+        return value
+    number = value.item() if hasattr(value, "item") else value
+    return None if isinstance(number, float) and not math.isfinite(number) else number

@@ -1,0 +1,330 @@
+"""A place of the misfit as a sentence that a testbed engineer reads, with numbers in the units of the report.
+
+The residuals are those that the report draws: recorded less predicted with the value's own run held out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain import changes
+from gritd.tools.diagnose.noise import lines
+from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.report.words import (
+    covariate_shown,
+    fixed,
+    listed,
+    name_of,
+    number,
+    percent,
+    shown,
+    spaced,
+)
+
+AT = {  # a value of a covariate, in words
+    "slip": "{} slip", "speed": "{} speed", "velocity": "{}", "load": "{} load", "sinkage": "{} sinkage",
+    "position": "{} along the bed", "time": "{} from the start", "heat": "∫I² dt of {}", "acceleration": "{}",
+}  # fmt: skip
+LOW, MIDDLE, HIGH = (
+    (0.0, 0.15),
+    (0.4, 0.6),
+    (0.85, 1.0),
+)  # quantiles of a covariate between which means are taken
+STANDS_OUT = 0.25  # of the difference between the ends: a middle that far outside them is said
+ALIKE = 0.15  # of a mean: two that are closer are called the same
+NAMED = 6  # runs that are all named; of more, the MOST that are farthest off
+MOST = 3
+SHOWS = 0.6  # of the squares of the runs' means
+WINDOW = 2  # change points between which something is another
+TIMES = {1: "once", 2: "twice"}
+
+
+def sentence(
+    stack: Stack, residual: Array, channel: str, family: str, places: Sequence[float], share: float
+) -> str:
+    """What a channel (residual (N,) of the stack) does along a family of covariates; places: its change points."""
+    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+    own = own if own.any() else stack.of(channel)
+    say = _sizes(stack, channel)
+    covariate = family.split("·")[0]
+    if covariate == "run":
+        said = _runs(stack, residual, own, places, say)
+    elif covariate == "constant":
+        said = _everywhere(residual, own, stack.of(channel) & ~own, say)
+    elif covariate == "wheel_angle":
+        said = _turn(stack, residual, own, channel)
+    elif covariate == "direction":
+        said = _directions(stack, residual, own, say)
+    elif places:
+        said = _between(stack, residual, own, covariate, places, say)
+    elif "·" in family:
+        said = _corner(stack, residual, own, family.split("·"), say)
+    else:
+        said = _along(stack, residual, own, covariate, say)
+    return _started(f"{name_of(channel)}, {said}; {percent(share)} of its misfit")
+
+
+def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: float) -> str:
+    """A ripple of so many times a turn and its amplitude in the channel's unit."""
+    size = _amplitude(stack, channel, amplitude)
+    return _started(
+        f"{name_of(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit"
+    )
+
+
+def wave(
+    stack: Stack, residual: Array, channel: str, axis: str, frequency: float, share: float
+) -> str:
+    """A wave in time [1/s] or along the bed [1/m], its amplitude the root of the mean square over the stretches."""
+    x, squares, count = stack.covariate(axis), 0.0, 0
+    for index in lines.stretches(stack, channel):
+        pair = lines.waves(x[index], np.array([frequency]))[:, 0]
+        fitted = np.linalg.lstsq(
+            np.column_stack((pair, np.ones(index.size))), residual[index], rcond=None
+        )[0]
+        squares, count = (
+            squares + index.size * float(fitted[0] ** 2 + fitted[1] ** 2),
+            count + index.size,
+        )
+    size = _amplitude(stack, channel, float(np.sqrt(squares / max(count, 1))))
+    length = _wavelength(stack, axis, 1.0 / frequency)
+    said = (
+        f"oscillates with a period of {length}"
+        if axis == "time"
+        else f"waves of {length} along the bed"
+    )
+    return _started(f"{name_of(channel)}, {said}, {size}; {percent(share)} of its misfit")
+
+
+def term(stack: Stack, channel: str, axis: str, wave: bool, place: float, size: float) -> str:
+    """A wave of a frequency [1/s, 1/m] or a step at a place, as a term of a law; size in the channel's unit."""
+    if wave:
+        return (
+            f"{_amplitude(stack, channel, abs(size))} every {_wavelength(stack, axis, 1.0 / place)}"
+        )
+    return f"{_signed(size, stack.rig.units[channel])} beyond {at(stack, axis, place)}"
+
+
+def _wavelength(stack: Stack, axis: str, length: float) -> str:
+    unit, factor = shown(stack.rig.units[axis])
+    return spaced(length * factor, unit, 3)
+
+
+def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:
+    """A calibration constant that the fit pulls off what is known of it."""
+    size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else _signed(value, unit)
+    moved = f"the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
+    return _started(f"{name_of(channel)}, {moved}")
+
+
+def _started(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+# ---- pieces --------------------------------------------------------------------------------------------------------
+
+Say = Callable[[float], str]
+
+
+def _sizes(stack: Stack, channel: str) -> Say:
+    """A mean residual, as more or less than the model."""
+    unit, factor = shown(stack.rig.units[channel])
+    return lambda mean: (
+        f"{spaced(abs(mean) * factor, unit, 2)} {'more' if mean >= 0.0 else 'less'} than the model"
+    )
+
+
+def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
+    """Friction acts while the wheel turns, an offset at rest too."""
+    mean = float(residual[own].mean())
+    if not rest.any():
+        return f"everywhere {say(mean)}"
+    still = float(residual[rest].mean())
+    if abs(still - mean) < ALIKE * abs(mean):
+        return f"at rest as while the wheel turns {say(mean)}"
+    known = "as the model" if abs(still) < ALIKE * abs(mean) else _brief(say(still))
+    return f"while the wheel turns {say(mean)}, at rest {known}"
+
+
+def _brief(said: str) -> str:
+    return said.replace(" than the model", "")
+
+
+def _signed(value: float, unit: str) -> str:
+    seen, factor = shown(unit)
+    return ("+" if value >= 0.0 else "") + spaced(value * factor, seen, 2)
+
+
+def at(stack: Stack, covariate: str, value: float) -> str:
+    """A value of a covariate in words, such as `30 % slip`."""
+    return AT.get(covariate, "{}").format(_value(stack, covariate, value))
+
+
+def _value(stack: Stack, covariate: str, value: float) -> str:
+    unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
+    return spaced(value * factor, unit, _digits(covariate, value * factor))
+
+
+def _digits(covariate: str, value: float) -> int:
+    return 3 if covariate in ("position", "time") and abs(value) >= 10.0 else 2
+
+
+def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) -> str:
+    """Means at the low and the high end, and in the middle where that stands out."""
+    x = stack.covariate(covariate)
+    ends = [_quantiles(x, residual, own, part) for part in (LOW, MIDDLE, HIGH)]
+    (_, low), (_, middle), (_, high) = ends
+    outside = max(middle - max(low, high), min(low, high) - middle)
+    if outside <= STANDS_OUT * abs(high - low):
+        ends = [ends[0], ends[2]]
+    (first, mean), *rest = ends
+    others = [f"{_brief(say(m))} at {_value(stack, covariate, v)}" for v, m in rest]
+    return ", ".join([f"{say(mean)} at {at(stack, covariate, first)}", *others])
+
+
+def _quantiles(
+    x: Array, residual: Array, own: Bools, part: tuple[float, float]
+) -> tuple[float, float]:
+    """Mean covariate and mean residual between two quantiles of the covariate."""
+    low, high = np.quantile(x[own], part)
+    inside = own & (x >= low) & (x <= high)
+    return float(x[inside].mean()), float(residual[inside].mean())
+
+
+def _between(
+    stack: Stack, residual: Array, own: Bools, covariate: str, places: Sequence[float], say: Say
+) -> str:
+    """The stretch between change points that is farthest from the rest."""
+    x = changes.values(stack, covariate)
+    assert x is not None
+    low, high, inside = _stretch(x, residual, own, places)
+    if len(places) == WINDOW:
+        low, high = sorted(places)
+        inside = own & (x > low) & (x <= high)
+    rest = own & ~inside
+    here, elsewhere = float(residual[inside].mean()), float(residual[rest].mean())
+    return f"{_span(stack, covariate, low, high)} {say(here)}, elsewhere {_brief(say(elsewhere))}"
+
+
+def _stretch(
+    x: Array, residual: Array, own: Bools, places: Sequence[float]
+) -> tuple[float, float, Bools]:
+    """Ends (infinite where open) and values of the stretch that differs most from the rest."""
+    edges = [-np.inf, *sorted(places), np.inf]
+    stretches = [
+        (a, b, own & (x > a) & (x <= b)) for i, a in enumerate(edges) for b in edges[i + 1 :]
+    ]
+    stretches = [s for s in stretches if s[2].any() and (own & ~s[2]).any()]
+    return max(stretches, key=lambda s: _contrast(residual[s[2]], residual[own & ~s[2]]))
+
+
+def shows(stack: Stack, residual: Array, channel: str, places: Sequence[float]) -> bool:
+    """Whether changes between runs take most of what the runs' mean residuals differ by."""
+    number_of, own = (
+        changes.values(stack, "run"),
+        stack.of(channel) & (stack.covariate("speed") > 0.0),
+    )
+    assert number_of is not None
+    numbers = np.unique(number_of[own])
+    means = np.array([residual[own & (number_of == n)].mean() for n in numbers])
+    side = np.searchsorted(sorted(places), numbers)
+    level = np.array([means[side == k].mean() for k in side])
+    return bool(np.sum((level - means.mean()) ** 2) >= SHOWS * np.sum((means - means.mean()) ** 2))
+
+
+def _contrast(inside: Array, rest: Array) -> tuple[float, float]:
+    """Squares that two means instead of one take up; then which side is farther off nought."""
+    between = (
+        (inside.mean() - rest.mean()) ** 2 * inside.size * rest.size / (inside.size + rest.size)
+    )
+    return round(float(between), 12), abs(float(inside.mean())) - abs(float(rest.mean()))
+
+
+def _span(stack: Stack, covariate: str, low: float, high: float) -> str:
+    """A stretch in words; infinite ends are open."""
+    if np.isfinite(low) and np.isfinite(high):
+        _, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
+        first = number(low * factor, _digits(covariate, low * factor))
+        return f"from {first} to {at(stack, covariate, high)}"
+    edge = at(stack, covariate, low if np.isfinite(low) else high)
+    return f"{'beyond' if np.isfinite(low) else 'up to'} {edge}"
+
+
+def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], say: Say) -> str:
+    number_of = changes.values(stack, "run")
+    assert number_of is not None
+    numbers = np.unique(number_of[own])
+    names = {float(n): stack.rig.runs[int(stack.run[number_of == n][0])].name for n in numbers}
+    means = {float(n): float(residual[own & (number_of == n)].mean()) for n in numbers}
+    if places:
+        low, high, inside = _stretch(number_of, residual, own, places)
+        within = [names[n] for n in names if low < n <= high]
+        span = f"in {within[0]}" if len(within) == 1 else f"from {within[0]} to {within[-1]}"
+        rest = float(residual[own & ~inside].mean())
+        return (
+            f"{span} {say(float(residual[inside].mean()))}, in the other runs {_brief(say(rest))}"
+        )
+    told = list(names)
+    if len(told) > NAMED:
+        told = sorted(sorted(told, key=lambda n: -abs(means[n]))[:MOST])
+    each = [f"{_brief(say(means[n]))} in {names[n]}" for n in told]
+    return (
+        f"{'from run to run' if len(told) == len(names) else 'most'}: {listed(each)} than the model"
+    )
+
+
+def _turn(stack: Stack, residual: Array, own: Bools, channel: str) -> str:
+    """Once or twice a turn, whichever is larger."""
+    angle = stack.covariate("wheel_angle")[own]
+    columns = np.column_stack(
+        [np.ones(angle.size), *(f(o * angle) for o in TIMES for f in (np.cos, np.sin))]
+    )
+    fitted = np.linalg.lstsq(columns, residual[own], rcond=None)[0]
+    sizes = {order: float(np.hypot(*fitted[2 * order - 1 : 2 * order + 1])) for order in TIMES}
+    order = max(sizes, key=lambda o: sizes[o])
+    return f"varies {TIMES[order]} a turn, {_amplitude(stack, channel, sizes[order])}"
+
+
+def _amplitude(stack: Stack, channel: str, amplitude: float) -> str:
+    unit, factor = shown(stack.rig.units[channel])
+    return f"± {spaced(amplitude * factor, unit, 2)}"
+
+
+def _times(order: float) -> str:
+    return TIMES.get(int(order), f"{order:.0f} times")
+
+
+def _directions(stack: Stack, residual: Array, own: Bools, say: Say) -> str:
+    forward = stack.covariate("direction") > 0.0
+    means = [float(residual[side].mean()) for side in (own & forward, own & ~forward) if side.any()]
+    if len(means) < 2:
+        return say(means[0])
+    return f"{say(means[0])} forward, {_brief(say(means[1]))} backward"
+
+
+def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say: Say) -> str:
+    """Of the four corners of two covariates the one that is farthest off."""
+    x, y = (stack.covariate(name) for name in names)
+    corners = []
+    for first in (LOW, HIGH):
+        for second in (LOW, HIGH):
+            inside = own & _within(x, own, first) & _within(y, own, second)
+            if inside.any():
+                corners.append((float(residual[inside].mean()), inside))
+    if not corners:
+        return _along(stack, residual, own, names[0], say)
+    mean, inside = max(corners, key=lambda c: abs(c[0]))
+    place = " and ".join(
+        at(stack, n, float(v[inside].mean())) for n, v in zip(names, (x, y), strict=True)
+    )
+    return f"at {place} {say(mean)}, elsewhere {_brief(say(float(residual[own & ~inside].mean())))}"
+
+
+def _within(x: Array, own: Bools, part: tuple[float, float]) -> Bools:
+    """The lower or the upper third of a covariate: of two together the outer ends may never meet."""
+    low, high = np.quantile(x[own], (0.0, 1.0 / 3.0) if part is LOW else (2.0 / 3.0, 1.0))
+    inside: Bools = (x >= low) & (x <= high)
+    return inside

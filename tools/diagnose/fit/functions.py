@@ -1,0 +1,122 @@
+"""Misfits without a name: smooth functions of covariates, offsets between runs, ripples a turn; one channel each.
+
+They say where a misfit lives, alarm when no listed effect would, and are the saturated model against which the best
+listed explanation is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.rig.interface import Bools, Stack
+
+SIZE = 0.03  # of the channel's size: the expected size of a misfit; a third and three times of it are tried too
+WAVES = 4  # cosines along time or place
+LEVELS = 1e-3  # relative spread below which a covariate does not vary
+TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
+BENDS = 2  # cosines by which a share of an effect may vary along time or place
+ORDERS = (
+    1.0,
+    2.0,
+)  # ripples a turn that a smooth term could not take; higher ones belong to listed effects
+
+
+def signatures(stack: Stack) -> list[Signature]:
+    """One for each channel and covariate (or product of two) that varies; named 'channel~covariate'."""
+    found = []
+    for channel in stack.rig.channels:
+        own = stack.of(channel)
+        size = size_of(stack, channel)
+        for name, columns in _families(stack):
+            kept = _scaled(np.where(own[:, None], columns, 0.0), own, size)
+            if kept.shape[1]:
+                found.append(Signature(f"{channel}~{name}", kept, (0,) * kept.shape[1], {}))
+    return found
+
+
+def size_of(stack: Stack, channel: str) -> float:
+    """The expected size of a misfit of a channel, in its unit."""
+    own = stack.of(channel)
+    return SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
+
+
+def tolerance(stack: Stack, share: float) -> Array:
+    """Smooth columns (N, t) by which the model may be off, together a share of the channel; each one its own σ."""
+    columns = []
+    for channel in stack.rig.channels:
+        own = stack.of(channel)
+        size = share * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
+        families = [f for name, f in _families(stack) if name in TOLERATED or "·" in name]
+        found = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
+        columns.append(found * size / np.sqrt(max(found.shape[1], 1)))
+    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def shares(stack: Stack, own: Bools) -> Array:
+    """Smooth functions (N, m) of unit size on some values: of slip, speed, load, sinkage, time, place, heat; and 1."""
+    columns = []
+    for name, family in _families(stack):
+        if name not in ("run", "wheel_angle", "acceleration", "direction"):
+            columns.append(family[:, :BENDS] if name in ("position", "time", "heat") else family)
+    return _scaled(np.column_stack(columns), own, 1.0)
+
+
+def _families(stack: Stack) -> Iterator[tuple[str, Array]]:
+    moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)
+    yield (
+        "constant",
+        np.column_stack((moving, 1.0 - moving)),
+    )  # friction acts while the wheel turns, an offset always
+    for names in stack.rig.smooth:
+        parts = [_standard(stack.covariate(name), moving > 0) for name in names]
+        if any(p is None for p in parts):
+            continue
+        value = np.prod([p for p in parts if p is not None], axis=0) * moving
+        powers = (value, value**2 - moving * np.mean(value**2)) if len(names) == 1 else (value,)
+        yield "·".join(names), np.column_stack(powers)
+    for name in ("position", "time", "heat"):
+        along = _waves(stack.covariate(name))
+        if along is not None:
+            yield name, along * moving[:, None]
+    for name in ("acceleration", "direction"):
+        part = _standard(stack.covariate(name), moving > 0)
+        if part is not None:
+            yield name, part[:, None]
+    if len(stack.rig.runs) > 2:
+        yield (
+            "run",
+            (stack.run[:, None] == np.arange(len(stack.rig.runs))).astype(float) * moving[:, None],
+        )
+    angle = stack.covariate("wheel_angle")
+    if np.ptp(angle) > 2.0 * np.pi:
+        yield (
+            "wheel_angle",
+            np.column_stack([f(o * angle) * moving for o in ORDERS for f in (np.cos, np.sin)]),
+        )
+
+
+def _waves(values: Array) -> Array | None:
+    span = float(np.ptp(values))
+    if span <= 1e-9:
+        return None
+    along = (values - values.min()) / span
+    return np.column_stack([np.cos(np.pi * k * along) for k in range(1, WAVES + 1)])
+
+
+def _standard(values: Array, where: Bools) -> Array | None:
+    inside = values[where]
+    spread = float(np.std(inside)) if inside.size else 0.0
+    if spread <= LEVELS * max(float(np.abs(values).max()), 1e-12):
+        return None
+    return np.asarray(np.clip((values - inside.mean()) / spread, -4.0, 4.0))
+
+
+def _scaled(columns: Array, own: Bools, size: float) -> Array:
+    """Columns of root mean square `size` on the channel; those that vanish there are left out."""
+    rms = np.sqrt(np.mean(columns[own] ** 2, axis=0)) if own.any() else np.zeros(columns.shape[1])
+    kept = rms > 1e-9
+    return columns[:, kept] / rms[kept] * size

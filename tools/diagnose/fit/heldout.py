@@ -1,0 +1,101 @@
+"""Prediction of what was held out: whole runs, and whole conditions (a load, a slip band), by a fit to the rest.
+
+Around its optimum a model is linear in its unknowns, so a fit without some values is linear algebra on the Jacobian at
+hand: no further evaluation of the physics. Repeats of one manoeuvre in the same fold cannot leak.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+
+BANDS = 3  # slip and load bands
+
+
+@dataclass(frozen=True)
+class Held:
+    """log_density: of each fold given the others [nats]; predicted: (N,) with the value's own fold held out."""
+
+    log_density: Array
+    predicted: Array
+
+
+def run_folds(stack: Stack) -> list[Bools]:
+    """Each run; where there are fewer than three, the thirds of each run in time."""
+    runs = np.unique(stack.run)
+    if len(runs) >= 3:
+        return [stack.run == r for r in runs]
+    ranks = _thirds(stack.time, stack.run)
+    return [f for f in ((ranks == k) for k in range(3)) if f.any()]
+
+
+def condition_folds(stack: Stack) -> list[Bools]:
+    """Bands of load and of slip, as far as they vary."""
+    folds = []
+    for name in ("load", "slip"):
+        if name in stack.rig.runs[0].covariates:
+            values = stack.covariate(name)
+            if np.ptp(values) > 0.05 * max(float(np.abs(values).max()), 1e-9):
+                band = _bands(values)
+                folds += [band == k for k in range(BANDS)]
+    return [f for f in folds if f.any() and not f.all()]
+
+
+def _bands(values: Array) -> Index:
+    edges = np.quantile(values, np.arange(1, BANDS) / BANDS)
+    return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.intp)
+
+
+def _thirds(time: Array, run: Index) -> Index:
+    out = np.zeros(time.size, dtype=np.intp)
+    for r in np.unique(run):
+        own = run == r
+        span = max(float(np.ptp(time[own])), 1e-9)
+        out[own] = np.minimum((3.0 * (time[own] - time[own].min()) / span).astype(int), 2)
+    return out
+
+
+def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> Held:
+    """Density and prediction of every fold by the model fitted to the others.
+
+    beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the channels' units.
+    """
+    own = np.zeros((fitted.predicted.size, 0)) if beside is None else beside
+    last = fitted.jacobian.shape[1] - own.shape[1]
+    j, r = fitted.jacobian, fitted.residual
+    size = len(fitted.u) + len(fitted.x)
+    centre = np.concatenate(
+        (fitted.u, fitted.x, np.zeros_like(fitted.slack))
+    )  # r is the residual without tolerance
+    penalty = fitted.penalty**2
+    gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
+    density, predicted = [], fitted.predicted.copy()
+    for fold in folds:
+        inside = j[fold]
+        less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]
+        step = np.linalg.solve(less, pulled)
+        predicted[fold] = (
+            fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
+        )
+        density.append(_log_density(r[fold] - inside @ step, inside, less))
+    return Held(np.array(density), predicted)
+
+
+def _log_density(error: Array, jacobian: Array, gram: Array) -> float:
+    """ln N(error; 0, I + J gram⁻¹ Jᵀ) without the constant, by the matrix inversion lemma."""
+    joint = gram + jacobian.T @ jacobian
+    pulled = jacobian.T @ error
+    square = error @ error - pulled @ np.linalg.solve(joint, pulled)
+    return float(-0.5 * (square + np.linalg.slogdet(joint)[1] - np.linalg.slogdet(gram)[1]))
+
+
+def rmse(stack: Stack, predicted: Array) -> dict[str, float]:
+    """Root mean square error of each channel in its unit."""
+    error = stack.measured - predicted
+    return {c: float(np.sqrt(np.mean(error[stack.of(c)] ** 2))) for c in stack.rig.channels}

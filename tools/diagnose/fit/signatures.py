@@ -1,0 +1,168 @@
+"""What each effect would change: finite differences of all channels over its strengths, on a grid of its shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+
+import numpy as np
+
+from gritd.estimator.effects.base import Effect, Parameter
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.rig.interface import Index, Rig, Stack
+
+HIGHEST_ORDER = 200.0  # ripples a turn
+NYQUIST = 0.45  # of the grid's rate: the averaging damps faster ripples too much
+TURNS = 1.5  # ripples a run must hold to be told from a trend
+STRONGEST = 3  # orders of a channel that do not count as its noise
+ORDERS = 120  # at most
+STEPS = (1.0, 0.1, 0.01)  # of an expected size, for a derivative
+LARGEST = 10.0  # times the largest value measured: what changes by more runs away
+RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
+
+
+def strengths(effect: type[Effect]) -> list[Parameter]:
+    return [p for p in effect.parameters() if p.role == "strength"]
+
+
+def raw_signatures(
+    stack: Stack, u: Array, base: Array, names: list[str] | None = None
+) -> Iterator[Signature]:
+    """Unwhitened signatures of all candidate effects about the base prediction (N,) at constants u."""
+    for name, effect in stack.rig.effects.items():
+        if names is None or name in names:
+            shapes = list(shape_grid(stack.rig, effect))
+            for shape in shapes:
+                found = signature(stack, u, base, effect, shape)
+                if found is not None:
+                    yield found
+
+
+def signature(
+    stack: Stack,
+    u: Array,
+    base: Array,
+    effect: type[Effect],
+    shape: Mapping[str, float],
+    others: tuple[Effect, ...] = (),
+) -> Signature | None:
+    """None where the effect changes nothing that is measured, or runs away however weak it is."""
+    found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
+    columns = np.column_stack(found)
+    if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
+        return None
+    sign = tuple(int(p.low >= p.off) for p in strengths(effect))
+    return Signature(effect.name, columns, sign, dict(shape))
+
+
+def _derivative(
+    stack: Stack,
+    u: Array,
+    base: Array,
+    effect: type[Effect],
+    shape: Mapping[str, float],
+    strength: Parameter,
+    others: tuple[Effect, ...],
+) -> Array:
+    """Change of all values (N,) per expected size; by a smaller step where the full one runs away, as a motor may that
+    heats the more the more current it draws; NaN where every step does."""
+    largest = LARGEST * np.abs(stack.measured).max(initial=0.0)
+    for step in STEPS:
+        acting = effect(**{**shape, strength.name: strength.off + step * strength.sigma})
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            change = stack.predict(u, (*others, acting)) - base
+        if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:
+            return np.asarray(change / step)
+    return np.full(stack.size, np.nan)
+
+
+def shape_grid(rig: Rig, effect: type[Effect]) -> Iterator[dict[str, float]]:
+    """Values of the effect's shapes worth trying on these recordings, all combinations."""
+    shapes = [p for p in effect.parameters() if p.role == "shape"]
+    for values in product(*(_values(rig, p) for p in shapes)):
+        yield {
+            p.name: float(np.clip(v, p.low, p.high)) for p, v in zip(shapes, values, strict=True)
+        }
+
+
+def _values(rig: Rig, parameter: Parameter) -> list[float]:
+    if parameter.scan and parameter.unit == "s":
+        length = max(float(np.ptp(run.time)) for run in rig.runs)
+        campaign = max(float(run.time[-1]) for run in rig.runs)
+        return sorted(
+            {
+                float(np.clip(f * t, parameter.low, parameter.high))
+                for f in RELATIVE_TIMES
+                for t in (length, campaign)
+            }
+        )
+    if parameter.scan and parameter.unit == "m":
+        return _places(rig, parameter)
+    if parameter.scan:
+        return orders(rig, parameter)
+    if parameter.sigma >= 0.4 * abs(parameter.centre):
+        return [0.4 * parameter.centre, parameter.centre, 2.0 * parameter.centre]
+    return [parameter.centre]
+
+
+def _places(rig: Rig, parameter: Parameter) -> list[float]:
+    """Lengths as shares of the bed that was driven; centres along it."""
+    along = np.concatenate([run.covariates["position"] for run in rig.runs])
+    low, high = float(along.min()), float(along.max())
+    span = max(high - low, 1e-3)
+    if "length" in parameter.name:
+        return [0.12 * span, 0.25 * span, 0.5 * span]
+    return [float(x) for x in np.linspace(low, high, 13)]
+
+
+def orders(rig: Rig, parameter: Parameter) -> list[float]:
+    """Ripples a turn that the grid can show: whole numbers, or as dense as the number of turns asks for."""
+    speed = np.concatenate(
+        [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
+    )
+    turning = speed[speed > 0.05 * speed.max()] if speed.max() > 0.0 else speed
+    rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
+    highest = NYQUIST * rate * 2.0 * np.pi / max(float(np.quantile(turning, 0.8)), 1e-6)
+    top = min(parameter.high, HIGHEST_ORDER, highest)
+    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
+    least = max(parameter.low, TURNS / max(turned, 1e-6))
+    whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
+    return [float(x) for x in whole[:: max(1, -(-len(whole) // ORDERS))]]
+
+
+def highest_order(stack: Stack) -> float:
+    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where the wheel hardly turns."""
+    run = stack.rig.runs[0]
+    rate = 1.0 / float(np.median(np.diff(run.time)))
+    speed = np.concatenate(
+        [np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs]
+    )
+    turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
+    usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
+    return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
+
+
+def ripple_columns(stack: Stack, residual: Array) -> Array:
+    """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after the other."""
+    orders = np.arange(3.0, highest_order(stack), 0.25)
+    if not orders.size:
+        return np.zeros((stack.size, 0))
+    moving = stack.covariate("speed") > 0.0
+    angle, columns = stack.covariate("wheel_angle"), []
+    for channel in stack.rig.channels:
+        own = np.flatnonzero(stack.of(channel) & moving)
+        waves = np.exp(1j * np.outer(angle[own], orders))
+        left = residual[own] - np.mean(residual[own])
+        for _ in range(STRONGEST if own.size > 100 else 0):
+            best = waves[:, int(np.argmax(np.abs(left @ waves)))]
+            pair = np.column_stack((best.real, best.imag))
+            left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
+            columns += [_placed(part, own, stack.size) for part in (best.real, best.imag)]
+    return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def _placed(values: Array, own: Index, size: int) -> Array:
+    out = np.zeros(size)
+    out[own] = values
+    return out

@@ -1,0 +1,163 @@
+"""Waves in time and along the bed: where they are looked for, and those that stand out of the noise's spectrum.
+
+A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any length, and what shakes
+a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its period, not its phase. A wave of the bed or of
+the rails stays where it is: one phase for all runs, or, where the bed was made anew, one for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.noise.colour import saturated_mean
+from gritd.tools.diagnose.rig.interface import Index, Stack
+
+AXES = ("time", "position")
+STRETCH = 40.0  # [s] for which a wave keeps its phase at least
+CYCLES = 2.0  # in a stretch, to be told from a trend
+FINER = 2.0  # frequencies tried in each that the longest stretch resolves
+NYQUIST = 0.35  # of the grid's rate: faster waves are damped too much by the averaging
+MOST = 200  # frequencies of a scan
+FEW = 12  # values a stretch must hold
+CHANCE = 0.01  # of any line of a channel by noise of a smooth spectrum
+NEAR, FAR = 1.5, 7.0  # neighbours of a line, in resolved frequencies
+STRONGEST = 3  # lines of a channel along an axis that may stand out
+LONG = 6  # waves of the bed that are too long to have neighbours, at most
+SHARE = 8  # of a channel's values, those that lines may take
+
+
+def stretches(stack: Stack, channel: str) -> list[Index]:
+    """Values of a channel in one run while the wheel moves, long runs cut into equal parts."""
+    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+    found: list[Index] = []
+    for number in range(len(stack.rig.runs)):
+        index = np.flatnonzero(own & (stack.run == number))
+        if index.size:
+            time = stack.time[index]
+            parts = int(np.ceil(max(float(np.ptp(time)), 1e-9) / STRETCH))
+            found += [index[part == k] for part in [_parts(time, parts)] for k in range(parts)]
+    return [index for index in found if index.size >= FEW]
+
+
+def _parts(time: Array, count: int) -> Index:
+    share = (time - time[0]) / max(float(np.ptp(time)), 1e-9)
+    return np.asarray(np.minimum((count * share).astype(int), count - 1), dtype=np.intp)
+
+
+def frequencies(stack: Stack, channel: str, axis: str) -> Array:
+    """Waves [1/s, 1/m] that the grid shows (f,): at least CYCLES in the longest stretch; empty where there is none."""
+    x, parts = stack.covariate(axis), stretches(stack, channel)
+    longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
+    if longest <= 1e-9:
+        return np.zeros(0)
+    along = np.concatenate(parts)
+    interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
+    span = longest if axis == "time" else float(np.ptp(x[along]))
+    low, high = CYCLES / longest, NYQUIST / max(interval, 1e-3 * longest)
+    tried = np.arange(low, high, 1.0 / (FINER * span))
+    return np.asarray(tried[:MOST])
+
+
+def waves(x: Array, frequency: Array) -> Array:
+    """Cosines and sines (n, f, 2)."""
+    phase = 2.0 * np.pi * np.multiply.outer(x, frequency)
+    return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
+
+
+def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells: Index) -> Array:
+    """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of the noise.
+
+    Noise has a smooth spectrum. A line of more power than that of its neighbours by a factor that chance gives one
+    channel in a hundred is none, and is not taken for it; of noise alone nothing is taken, so its size and colour stay
+    what they are. Long waves of the bed, the same in all runs, have too few neighbours: they are left out of the noise
+    whether they stand out or not, as lost freedom. The others as in `noise.fit`: what else is no noise, left out first.
+    """
+    columns = [_long(stack, channel) for channel in stack.rig.channels]
+    for channel in stack.rig.channels:
+        own = np.flatnonzero(stack.of(channel))
+        taken = saturated_mean(residual[own], explained[own], sure[own], cells[own])
+        left = np.zeros(stack.size)
+        left[own] = residual[own] - taken @ (taken.T @ residual[own])
+        room = own.size // SHARE
+        for axis, parts in _phases(stack, channel):
+            for pairs in _lines(
+                stack.covariate(axis), frequencies(stack, channel, axis), parts, left
+            ):
+                room -= pairs.shape[1]
+                if room >= 0:
+                    columns.append(pairs)
+    return np.column_stack(columns)
+
+
+def _long(stack: Stack, channel: str) -> Array:
+    """Waves along the bed (N, m), one phase for all runs, too long to have neighbours; of a single run none."""
+    parts, tried = stretches(stack, channel), frequencies(stack, channel, "position")
+    if len(parts) < 2 or not tried.size:
+        return np.zeros((stack.size, 0))
+    index, x = np.concatenate(parts), stack.covariate("position")
+    longest = max(float(np.ptp(x[part])) for part in parts)
+    found = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
+    out = np.zeros((stack.size, 2 * found.shape[1]))
+    out[index] = found.reshape(index.size, -1)
+    return out
+
+
+def _phases(stack: Stack, channel: str) -> Iterator[tuple[str, list[Index]]]:
+    """Axes, and the values that share a phase."""
+    parts = stretches(stack, channel)
+    yield "time", parts
+    if len(parts) > 1:
+        yield "position", [np.concatenate(parts)]
+    yield "position", parts
+
+
+def _lines(x: Array, tried: Array, parts: list[Index], left: Array) -> Iterator[Array]:
+    """Columns of one line after the other; `left` (N,) loses them."""
+    if tried.size < 2 * FAR:
+        return
+    shapes, near = [waves(x[index], tried) for index in parts], neighbours(x, parts, tried)
+    for _ in range(STRONGEST):
+        power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
+        chance = _chance(np.asarray(power), len(parts), near)
+        best = int(np.argmin(chance))
+        if chance[best] * tried.size > CHANCE:
+            return
+        out = np.zeros((x.size, 2 * len(parts)))
+        for number, (shape, index) in enumerate(zip(shapes, parts, strict=True)):
+            pair = shape[:, best]
+            out[index, 2 * number : 2 * number + 2] = pair
+            left[index] -= pair @ np.linalg.lstsq(pair, left[index], rcond=None)[0]
+        yield out
+
+
+def _power(shape: Array, values: Array) -> Array:
+    """Squares (f,) that cosine and sine take of values (n,)."""
+    return np.asarray(np.sum(np.tensordot(values, shape, 1) ** 2, axis=-1) * 2.0 / len(values))
+
+
+def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
+    """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it itself."""
+    longest = max(float(np.ptp(x[index])) for index in parts)
+    apart = np.abs(tried[:, None] - tried) * longest
+    return ((apart >= NEAR) & (apart <= FAR)).astype(float)
+
+
+def _chance(power: Array, parts: int, near: Array) -> Array:
+    """Chance (f,) of a power beside the mean of its neighbours on either side, for noise of a smooth spectrum.
+
+    All are sums of squares, the neighbours' of as many as they resolve. The side that holds more counts: the spectrum
+    of slow noise falls steeply. Without neighbours on both sides nothing is known.
+    """
+    out = np.zeros(power.size)
+    for side in (np.tril(near), np.triu(near)):
+        count = side.sum(axis=1)
+        freedom = 2.0 * parts * np.maximum(count / FINER, 1.0)
+        beside = f_distribution.sf(
+            power * count / np.maximum(side @ power, 1e-300), 2.0 * parts, freedom
+        )
+        out = np.maximum(out, np.where(count > FINER, beside, 1.0))
+    return out

@@ -1,0 +1,232 @@
+"""Conditions that were held, and held again: what varies inside a condition is noise, whatever the model.
+
+A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated model, so that a misfit
+of any shape over the conditions does not count as noise. Runs that held the same condition on equal terms (same pass,
+same start) are replicates: what their means, their drifts and the phases of their waves differ by, beyond the noise
+inside a run, is pure error between runs. A bed that is not level, say, lets the sinkage of each trial drift its own
+way, and an encoder without a zero mark begins each run at another tooth of the gear. A drift that replicates share (a
+soil that dries, a motor that warms) is none: it stays in full, to be explained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.stats import chi2
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.noise.colour import Colour, covariance
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+
+WIDTHS = {
+    "slip": 0.04,
+    "speed": 0.08,
+    "load": 0.05,
+}  # of a cell; of speed and load relative to their largest
+FEW, MANY = 10, 60  # values a cell must hold; cells a channel may have
+PHASES = (0.5, 0.75, 0.0, 0.25)  # of the edges of cells
+EQUAL = 1e-3  # difference of pass or start at which two runs are no replicates
+PAIRS, FEWEST = 2, 4  # comparisons of replicates at least; fewer than so many count as so many
+SHAPES, LONG = 4, 40  # of what a run does: a mean and three of drift; values that drifts need
+WHOLE = 0.9  # share of a run in one cell, by which it held one condition
+MOSTLY = 0.8  # share of a wave's squares that no drift could be
+RARE = 0.01  # probability by which noise alone may make drifts differ as they do
+
+
+def cells(stack: Stack) -> Index:
+    """Number of the cell of each value (N,); −1 where the wheel rests or hardly anything was held."""
+    for coarser in (1.0, 2.0, 4.0):
+        label = _labels(stack, coarser)
+        if label.max(initial=-1) < MANY:
+            break
+    return label
+
+
+def _labels(stack: Stack, coarser: float) -> Index:
+    keys = [stack.channel, (stack.covariate("speed") > 0.0).astype(int)]
+    keys += [_binned(values) for values in (_conditions(stack) / coarser).T]
+    table = np.column_stack(keys)
+    conditions, label = np.unique(table[:, 1:], axis=0, return_inverse=True)
+    label = label.ravel()
+    count = np.bincount(label) / max(len(stack.rig.channels), 1)
+    kept = (count >= FEW) & (conditions[:, 0] > 0)
+    renamed = np.where(kept, np.cumsum(kept) - 1, -1)
+    return np.asarray(renamed[label], dtype=np.intp)
+
+
+def _conditions(stack: Stack) -> Array:
+    """Slip, speed and load of each value, in widths of a cell (N, m)."""
+    columns = [np.zeros(stack.size)]
+    for name, width in WIDTHS.items():
+        if name in stack.rig.runs[0].covariates:
+            values = stack.covariate(name)
+            columns.append(
+                values
+                / (width * (1.0 if name == "slip" else max(float(np.abs(values).max()), 1e-9)))
+            )
+    return np.column_stack(columns)
+
+
+def _binned(values: Array) -> Index:
+    """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on an edge."""
+    tried = [np.floor(values + phase).astype(int) for phase in PHASES]
+    return max(
+        tried,
+        key=lambda bins: float(np.sum(np.unique(bins, return_counts=True)[1].astype(float) ** 2)),
+    )
+
+
+class Held(NamedTuple):
+    """What one run did while it held a condition."""
+
+    run: int
+    condition: Array  # mean slip, speed and load, in widths of a cell
+    shape: Array  # (m,) of the residual: coefficients of what a run may do for itself; NaN where not known
+    chance: Array  # (m,) their variance by noise
+
+
+def own_columns(
+    stack: Stack, residual: Array, colours: tuple[Colour, ...], standing: Array
+) -> Array:
+    """What each run may do for itself (N, m), one standard deviation each, as large as replicates show it.
+
+    An offset; and, of a run that held one condition, drifts and the phase of waves that stand out of the noise.
+    residual, standing: (N,) and (N, k), what was not predicted, and the waves in it (lines.py).
+    """
+    label, terms, columns = cells(stack), _terms(stack), []
+    for number, colour in enumerate(colours):
+        waves = _waves(stack, number, standing)
+        sigma = between_runs(
+            list(_held(stack, residual, label, number, colour, waves)),
+            terms,
+            SHAPES + waves.shape[1],
+        )
+        for run in range(len(stack.rig.runs)) if sigma.any() else ():
+            own = _driven(stack, number, run)
+            shapes = np.zeros((stack.size, len(sigma)))
+            shapes[own] = sigma * _shapes(stack.time[own], waves[own]) if own.any() else 0.0
+            columns += list(shapes[:, : None if _one_condition(own, label) else 1].T)
+    used = [column for column in columns if column.any()]
+    return np.column_stack(used) if used else np.zeros((stack.size, 0))
+
+
+def between_runs(held: list[Held], terms: Array, count: int) -> Array:
+    """Standard deviations between replicates beyond the noise inside a run (count,); 0 where nothing was repeated.
+
+    Of what one channel did while conditions were held. From successive differences (von Neumann 1941), so that what
+    changes steadily from run to run does not count. terms: pass and start of each run (runs, 2).
+    """
+    pairs = [(one, two) for one in held if (two := _next(one, held, terms)) is not None]
+    return _spread([(two.shape - one.shape, one.chance + two.chance) for one, two in pairs], count)
+
+
+def _waves(stack: Stack, number: int, standing: Array) -> Array:
+    """Waves of a channel that have a phase of their own in every run, one column for all runs (N, k)."""
+    runs = range(len(stack.rig.runs))
+    own = [(stack.channel == number) & (stack.run == run) for run in runs]
+    used = standing != 0.0
+    theirs = [np.flatnonzero(used[mask].any(axis=0) & ~used[~mask].any(axis=0)) for mask in own]
+    if len({index.size for index in theirs}) != 1:
+        return np.zeros((stack.size, 0))
+    return np.asarray(np.sum([standing[:, index] for index in theirs], axis=0))
+
+
+def _held(
+    stack: Stack, residual: Array, label: Index, number: int, colour: Colour, waves: Array
+) -> Iterator[Held]:
+    """Every condition that every run held, in one channel, run after run."""
+    conditions = _conditions(stack)
+    for run in range(len(stack.rig.runs)):
+        own = _driven(stack, number, run)
+        only = _one_condition(own, label)
+        masks = (
+            [own]
+            if only
+            else [own & (label == cell) for cell in np.unique(label[own & (label >= 0)])]
+        )
+        for mask in (m for m in masks if m.sum() >= FEW):
+            shapes = _shapes(stack.time[mask], waves[mask])[:, : None if only else 1]
+            inverse = np.linalg.pinv(shapes)
+            noise = covariance(colour, stack.time[mask], stack.gaps[mask])
+            found = np.full((2, SHAPES + waves.shape[1]), np.nan)
+            found[:, : shapes.shape[1]] = (
+                inverse @ residual[mask],
+                np.diag(inverse @ noise @ inverse.T),
+            )
+            found[:, : shapes.shape[1]][:, ~shapes.any(axis=0)] = np.nan
+            yield Held(run, conditions[mask].mean(axis=0), found[0], found[1])
+
+
+def _driven(stack: Stack, number: int, run: int) -> Bools:
+    return np.asarray(
+        (stack.channel == number) & (stack.run == run) & (stack.covariate("speed") > 0.0)
+    )
+
+
+def _one_condition(own: Bools, label: Index) -> bool:
+    """Whether a run, of values `own`, held one condition, long enough to tell how it drifted meanwhile."""
+    most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
+    return bool(most >= max(LONG, WHOLE * int(own.sum())))
+
+
+def _next(one: Held, held: list[Held], terms: Array) -> Held | None:
+    """The next run that held the same condition on equal terms."""
+    later = [
+        two
+        for two in held
+        if two.run > one.run
+        and np.abs(two.condition - one.condition).max() <= 1.0
+        and np.abs(terms[two.run] - terms[one.run]).max() <= EQUAL
+    ]
+    return min(
+        later, key=lambda two: (two.run, np.abs(two.condition - one.condition).max()), default=None
+    )
+
+
+def _shapes(time: Array, waves: Array) -> Array:
+    """What a run may do for itself (n, SHAPES + waves): Legendre polynomials over a stretch of time, and waves.
+
+    Of waves what is no drift; nothing where that is little.
+    """
+    along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), 1e-9) - 1.0
+    drifts = legendre.legvander(along, SHAPES - 1)
+    left = waves - drifts @ np.linalg.lstsq(drifts, waves, rcond=None)[0]
+    kept = np.sum(left**2, axis=0) > MOSTLY * np.sum(waves**2, axis=0)
+    return np.column_stack((drifts, np.where(kept, left, 0.0)))
+
+
+def _spread(found: list[tuple[Array, Array]], count: int) -> Array:
+    """Standard deviations (count,), from differences and what variance noise alone gives them, (count,) each.
+
+    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in few cases only.
+    """
+    out = np.zeros(count)
+    for order, (difference, chance) in enumerate(
+        np.array(found).reshape(-1, 2, count).transpose(2, 1, 0)
+    ):
+        known = np.isfinite(difference)
+        squares, chance = difference[known] ** 2, chance[known]
+        if squares.size >= PAIRS:
+            rare = chi2.sf(float(np.sum(squares / chance)), squares.size) < RARE
+            if order == 0 or rare:
+                out[order] = np.sqrt(
+                    _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)
+                )
+    return out
+
+
+def _few(count: int) -> float:
+    """Variance of Student's t: a variance known from few differences must be taken larger."""
+    return max(count, FEWEST) / (max(count, FEWEST) - 2.0)
+
+
+def _terms(stack: Stack) -> Array:
+    """Pass and start of each run (runs, 2): on other terms a repetition is no replicate."""
+    rows = []
+    for run in stack.rig.runs:
+        passes = run.covariates.get("pass", np.zeros(1))
+        rows.append((float(passes[0]), float(run.covariates["position"][0])))
+    return np.array(rows)

@@ -1,0 +1,107 @@
+"""All runs of a campaign through the forward model, in one call where no effect remembers what went before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.forward import simulate_arrays
+from gritd.estimator.stages.history import rate_of
+from gritd.estimator.stages.situation import Motion, Sensed
+from gritd.estimator.terramechanics.soil import Array, Soil
+
+ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
+LAGGING = ("sensor_latency",)  # looks back in time
+
+
+class Campaign:
+    """The motions of all runs one after the other (N,); `parts` says where each run lies."""
+
+    def __init__(
+        self, motions: Sequence[Motion], settings: Settings, channels: Sequence[str]
+    ) -> None:
+        self._settings, self._channels = settings, tuple(channels)
+        self._motions = [_filled(motion) for motion in motions]
+        ends = np.cumsum([np.size(m.time) for m in self._motions])
+        self.parts = [
+            slice(end - np.size(m.time), end) for m, end in zip(self._motions, ends, strict=True)
+        ]
+        self._joined = _joined(self._motions)
+        self._start: Array | None = None  # θ₁ of the last call: the next balance starts there
+
+    def readings(
+        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
+    ) -> Array:
+        """True readings (channels, N); weights (N,) and travel are factors on what the motions say."""
+        if all(_at_once(e) for e in effects):
+            return self._simulated(
+                soil, _scaled(self._joined, weights, travelled), effects, slice(None)
+            )
+        runs = [
+            _scaled(m, weights[part], travelled)
+            for m, part in zip(self._motions, self.parts, strict=True)
+        ]
+        return np.hstack(
+            [
+                self._simulated(soil, run, effects, part)
+                for run, part in zip(runs, self.parts, strict=True)
+            ]
+        )
+
+    def _simulated(
+        self, soil: Soil, motion: Motion, effects: Sequence[Effect], part: slice
+    ) -> Array:
+        response = simulate_arrays(
+            self._settings.wheel, soil, motion, effects, torque_constant=self._settings.drive.torque_constant.value,
+            theta_1=None if self._start is None else self._start[part], order=ORDER,
+        )  # fmt: skip
+        if part == slice(None):
+            self._start = response.theta_1
+        return np.stack([sensed_as(response.sensed, c, self._settings) for c in self._channels])
+
+
+def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:
+    """A channel's readings; `torque` is the motor's, told by its current."""
+    if channel == "torque":
+        return np.asarray(settings.drive.torque_constant.value * sensed.current)
+    return np.asarray(getattr(sensed, "torque" if channel == "axle_torque" else channel))
+
+
+def _at_once(effect: Effect) -> bool:
+    """Whether every sample stands for itself, so that runs may follow one another without touching."""
+    listed = EFFECTS.get(effect.name) is type(effect)
+    return listed and type(effect).remember is Effect.remember and effect.name not in LAGGING
+
+
+def _filled(motion: Motion) -> Motion:
+    """All fields arrays (n,), and the acceleration known: only a run itself can tell it."""
+    ones = np.ones(np.size(motion.time))
+    return replace(
+        motion,
+        load=motion.load * ones,
+        pass_number=motion.pass_number * ones,
+        start_position=motion.start_position * ones,
+        wheel_acceleration=rate_of(motion.time, motion.wheel_speed),
+    )
+
+
+def _joined(motions: Sequence[Motion]) -> Motion:
+    names = (
+        "time", "wheel_angle", "wheel_speed", "carriage_position", "carriage_speed", "load", "pass_number",
+        "start_position", "wheel_acceleration",
+    )  # fmt: skip
+    return Motion(**{name: np.concatenate([getattr(m, name) for m in motions]) for name in names})
+
+
+def _scaled(motion: Motion, weights: Array, travelled: float) -> Motion:
+    return replace(
+        motion,
+        load=motion.load * weights,
+        carriage_speed=motion.carriage_speed * travelled,
+        carriage_position=motion.carriage_position * travelled,
+    )

@@ -1,0 +1,234 @@
+"""The adapter for a motor drive without soil: T = J dω/dt + B ω, and whatever of the library acts on a drivetrain.
+
+Position is low-passed and differentiated on a fine grid, the model evaluated there, and prediction and measured torque
+low-passed and thinned alike, so that neither noise of the acceleration nor a lag of a filter is taken for physics: the
+parallel decimation of Gautier and Poignet (2001), Control Eng. Practice 9, 1361-1372, which the EMPS benchmark uses.
+
+The same engine, effects and statistics as for a wheel. The library's expected sizes are those of a small wheel, so an
+effect sees torques in units of the drive's own, `unit` newton metres, and speeds in units of its usual speed; what is
+said is in newton metres and radians a second again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
+from scipy.signal import butter, sosfiltfilt
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.forward import drive
+from gritd.estimator.stages.situation import Sensed, Situation
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.command import DAMAGED, CommandError
+from gritd.tools.diagnose.rig.interface import Bools, Known, Run
+from gritd.tools.diagnose.rig.signals import Series
+
+RATE = 10.0  # [Hz] of the comparison, as for a wheel
+FINE = 250.0  # [Hz] at most, on which position and current are averaged first and the model is evaluated
+ORDER = 4  # of the zero-phase low-passes
+SHARP, BAND = (
+    0.12,
+    0.4,
+)  # their cut-offs: of position and torque, of FINE; of the comparison, of RATE
+STAMPS = 2.0  # sampling intervals by which current and position may be apart: a held output, a bus, a mean
+SHORTEST = 2.0  # [s] of a log
+EDGE = 0.2  # [s] at either end, where a filter lacks its neighbours
+USUAL = 2.0  # size that the drive's torque has in units of `unit`: that of the wheel the priors were made for
+STILL = 0.05  # share of the usual speed; a drive that stays below it rests, and friction holds whatever is asked
+EFFECTS_OF_A_DRIVE = (
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple", "motor_heating", "current_offset",
+    "sensor_latency",
+)  # fmt: skip
+UNITS = {
+    "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad", "wheel_angle": "rad", "time": "s",
+    "heat": "A²·s", "direction": "-", "run": "-", "constant": "-", "slip": "-", "load": "N", "sinkage": "m",
+}  # fmt: skip
+
+
+class DriveRig:
+    """See rig.Rig."""
+
+    channels = ("torque",)
+    units: Mapping[str, str] = UNITS
+    smooth = (
+        ("speed",),
+        ("velocity",),
+        ("acceleration",),
+        ("wheel_angle",),
+        ("velocity", "acceleration"),
+    )
+    baseline: tuple[Effect, ...] = ()
+    partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
+    blurs = False  # prediction and measurement go through the same filters
+
+    def __init__(
+        self, series: Sequence[Mapping[str, Series]], names: Sequence[str], settings: Settings
+    ) -> None:
+        self.settings = settings
+        self.caveats: list[str] = [
+            "A drive without soil: inertia and viscous friction are the base model."
+        ]
+        self._motions = [
+            _motion(s, settings.drive.torque_constant.value, n)
+            for s, n in zip(series, names, strict=True)
+        ]
+        self.unit = _size(m.torque for m in self._motions) / USUAL
+        speed = np.abs(np.concatenate([m.velocity for m in self._motions]))
+        self.usual = float(np.median(speed[speed > 0.05 * speed.max()]))  # [rad/s]
+        self.constants = (
+            Known("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
+            Known("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
+            Known(
+                "torque_delay", 0.0, apart := STAMPS * max(m.sampled for m in self._motions), "s"
+            ),
+            Known("torque_blur", 0.0, apart**2, "s²"),
+        )
+        self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}
+        self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
+
+    def _most(self, values: Iterable[Array]) -> float:
+        """A constant that is not known is nothing, give or take ten times what would take all of the torque."""
+        return 10.0 * USUAL * self.unit / _size(values)
+
+    @property
+    def unsure(self) -> Sequence[Mapping[str, Array]]:
+        """Nothing: both sides of the comparison go through one filter."""
+        return [{"torque": np.zeros_like(run.time)} for run in self.runs]
+
+    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+        inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
+        torques = [
+            self._torque(m, inertia / self.unit, damping / self.unit, effects)
+            for m in self._motions
+        ]
+        return [
+            {"torque": m.compared(_timed(t, m.step, *timing))}
+            for m, t in zip(self._motions, torques, strict=True)
+        ]
+
+    def _torque(
+        self, motion: Moving, inertia: float, damping: float, effects: Sequence[Effect]
+    ) -> Array:
+        """As the current tells it, on the fine grid [N·m]."""
+        zero = np.zeros(motion.time.size)
+        situation = Situation(
+            time=motion.time, wheel_angle=motion.angle, wheel_speed=motion.velocity / self.usual,
+            wheel_acceleration=motion.acceleration, carriage_speed=zero, position=motion.angle, pass_number=1.0,
+            radius=1.0, width=1.0, slip=zero, direction=np.sign(motion.velocity), load=zero,
+        )  # fmt: skip
+        torque = inertia * motion.acceleration + damping * motion.velocity
+        situation, _ = drive(replace(situation, torque=torque), effects, 1.0)
+        sensed = Sensed(zero, situation.current, zero, zero, torque)
+        for effect in effects:
+            sensed = effect.sensors(sensed, situation)
+        return np.asarray(sensed.current) * self.unit
+
+    def stated(self, unit: str) -> float:
+        """Factor from a parameter of the library to what it means for this drive."""
+        if unit == "rad/s":
+            return self.usual
+        if unit == "A":
+            return self.unit / self.settings.drive.torque_constant.value
+        return self.unit if unit == "N·m" else 1.0
+
+    def _run(self, motion: Moving, name: str) -> Run:
+        velocity, torque, angle = (
+            motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
+        )
+        still = STILL * self.usual
+        fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
+        covariates = {
+            "speed": np.abs(velocity), "velocity": velocity, "acceleration": motion.compared(motion.acceleration),
+            "wheel_angle": angle, "position": angle, "time": motion.time[motion.kept],
+            "heat": np.cumsum(torque**2) * motion.every * motion.step, "direction": np.tanh(velocity / still),
+            "constant": np.ones(velocity.size),
+        }  # fmt: skip
+        return Run(
+            name,
+            motion.time[motion.kept],
+            {"torque": torque},
+            {"torque": fastest > still},
+            covariates,
+        )
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A drive's motion and torque on the fine grid, arrays (n,), all through one low-pass: none lags another."""
+
+    step: float  # [s]
+    sampled: float  # [s] sampling interval of the log
+    time: Array  # [s]
+    angle: Array  # [rad]
+    velocity: Array
+    acceleration: Array
+    torque: Array  # [N·m]
+
+    @property
+    def every(self) -> int:
+        """Fine intervals in one of the comparison."""
+        return max(round(1.0 / (RATE * self.step)), 1)
+
+    @property
+    def kept(self) -> slice:
+        """The comparison's grid in the fine one."""
+        return slice(edge := round(EDGE / self.step), -edge, self.every)
+
+    def compared(self, values: Array) -> Array:
+        """Low-passed and thinned to the grid of the comparison."""
+        return np.asarray(_low_passed(values, BAND / self.every)[self.kept])
+
+
+def _motion(series: Mapping[str, Series], constant: float, name: str) -> Moving:
+    """The fine grid, no finer than the log's own sampling. Raises CommandError where the log is too short."""
+    time, angle = series["wheel_encoder"]
+    current_time, current = series["motor_shunt"]
+    sampled = max(float(np.median(np.diff(t))) for t in (time, current_time))
+    step = max(1.0 / FINE, sampled)
+    begin, end = max(time[0], current_time[0]), min(time[-1], current_time[-1])
+    if end - begin < SHORTEST:
+        raise CommandError(
+            f"{name}: found {max(end - begin, 0.0):.2f} s of position and current; expected {SHORTEST:g} s",
+            DAMAGED,
+        )
+    fine = np.arange(begin + step, end - step, step)
+    smooth = _low_passed(_averaged(fine, step, time, angle), SHARP)
+    velocity = _rate(smooth, step)
+    torque = constant * _low_passed(_averaged(fine, step, current_time, current), SHARP)
+    return Moving(step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque)
+
+
+def _timed(torque: Array, step: float, delay: float, blur: float) -> Array:
+    """As a current that lags by `delay` [s], and was averaged over a window of variance 2 `blur` [s²], shows it."""
+    rate = np.gradient(torque, step)
+    return np.asarray(torque - delay * rate + blur * np.gradient(rate, step))
+
+
+def _rate(values: Array, step: float) -> Array:
+    """Derivative by a cubic spline: differences would smooth the acceleration, and nothing else, by 2 % at 10 Hz."""
+    return np.asarray(
+        CubicSpline(step * np.arange(values.size), values)(step * np.arange(values.size), 1)
+    )
+
+
+def _low_passed(values: Array, cutoff: float) -> Array:
+    """Through a zero-phase Butterworth filter; the cut-off in units of the sampling rate."""
+    return np.asarray(sosfiltfilt(butter(ORDER, 2.0 * cutoff, output="sos"), values))
+
+
+def _averaged(fine: Array, step: float, time: Array, values: Array) -> Array:
+    """Values at the fine grid, each the mean over one of its intervals."""
+    total = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))))
+    edges = np.append(fine - 0.5 * step, fine[-1] + 0.5 * step)
+    return np.asarray(np.diff(np.interp(edges, time, total)) / step)
+
+
+def _size(values: Iterable[Array]) -> float:
+    """Root mean square of all together."""
+    return float(np.sqrt(np.mean(np.concatenate(list(values)) ** 2)))

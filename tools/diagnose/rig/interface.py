@@ -1,0 +1,170 @@
+"""What the engine needs of a rig: runs on a time grid, a prediction of the channels, what is known of its constants.
+
+A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil. All else in this
+package works on the arrays defined here and knows nothing of wheels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.terramechanics.soil import Array
+
+Bools = NDArray[np.bool_]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Known:
+    """A constant of the base model: its prior N(0, 1) is on `u`, and its value is what `of` makes of u.
+
+    log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept inside low … high.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str = ""
+    soil: bool = False
+    log: bool = False
+    low: float = -np.inf
+    high: float = np.inf
+
+    def of(self, u: float) -> float:
+        if self.log:
+            return float(self.value * np.exp(u * self.sigma / self.value))
+        return float(np.clip(self.value + u * self.sigma, self.low, self.high))
+
+    def spread(self, u: float, sigma_u: float) -> float:
+        """Standard deviation of the value for one of u."""
+        return float(sigma_u * self.sigma * (self.of(u) / self.value if self.log else 1.0))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run on the analysis grid; arrays (n,). `used` says which values of a channel the comparison counts."""
+
+    name: str
+    time: Array  # [s] since the campaign began
+    measured: Mapping[str, Array]
+    used: Mapping[str, Bools]
+    covariates: Mapping[str, Array]
+
+
+class Rig(Protocol):
+    """The adapter."""
+
+    caveats: list[str]
+
+    @property
+    def runs(self) -> Sequence[Run]: ...
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Of channels and covariates."""
+
+    @property
+    def constants(self) -> tuple[Known, ...]: ...
+
+    @property
+    def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
+        """Constants that do to some values, marked per run, what another constant does to all: a cheap derivative."""
+
+    @property
+    def effects(self) -> Mapping[str, type[Effect]]:
+        """The candidates."""
+
+    @property
+    def baseline(self) -> tuple[Effect, ...]:
+        """Effects of the configuration: the model has them already."""
+
+    @property
+    def smooth(self) -> tuple[tuple[str, ...], ...]:
+        """Covariates, alone or multiplied, on which a smooth misfit may depend."""
+
+    @property
+    def unsure(self) -> Sequence[Mapping[str, Array]]:
+        """Per run, standard deviation of every channel's prediction by what is left open of the motion."""
+
+    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+        """Every channel of every run, for constants u (in prior σ) and effects beyond the baseline."""
+
+    def stated(self, unit: str) -> float:
+        """Factor from a parameter of the library in this unit to what it means for this rig."""
+
+
+class Stack:
+    """The used values of all channels and runs as one vector (N,): by channel, then run, then time."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.parts = [
+            (channel, number) for channel in rig.channels for number in range(len(rig.runs))
+        ]
+        self._masks = [rig.runs[number].used[channel] for channel, number in self.parts]
+        sizes = [int(mask.sum()) for mask in self._masks]
+        self.channel: Index = np.repeat([rig.channels.index(c) for c, _ in self.parts], sizes)
+        self.run: Index = np.repeat([number for _, number in self.parts], sizes)
+        self.time: Array = self.joined([{c: run.time for c in rig.channels} for run in rig.runs])
+        self.size = int(sum(sizes))
+
+    def joined(self, values: Sequence[Mapping[str, Array]]) -> Array:
+        """Per run and channel to one vector."""
+        pieces = [values[n][c][mask] for (c, n), mask in zip(self.parts, self._masks, strict=True)]
+        return np.concatenate(pieces) if pieces else np.zeros(0)
+
+    def covariate(self, name: str) -> Array:
+        return self.joined(
+            [dict.fromkeys(self.rig.channels, run.covariates[name]) for run in self.rig.runs]
+        )
+
+    @cached_property
+    def measured(self) -> Array:
+        return self.joined([run.measured for run in self.rig.runs])
+
+    @cached_property
+    def unsure(self) -> Array:
+        return self.joined(self.rig.unsure)
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Time since the value before in the same channel and run [s]; inf at the first."""
+        return self.gaps_of(np.ones(self.size, bool))
+
+    def gaps_of(self, kept: Bools) -> Array:
+        """The same, with only some values kept."""
+        gap = np.diff(self.time[kept], prepend=0.0)
+        first = np.diff(self.channel[kept] * 100_000 + self.run[kept], prepend=-1) != 0
+        return np.where(first, np.inf, gap)
+
+    def predict(self, u: Array, effects: Sequence[Effect] = ()) -> Array:
+        return self.joined(self.rig.predict(u, effects))
+
+    @cached_property
+    def partial(self) -> dict[int, tuple[int, Array]]:
+        """Of each constant of `rig.partial`: the constant that it is a part of, and its derivative's share of that
+        one's (N,)."""
+        place = {known.name: i for i, known in enumerate(self.rig.constants)}
+        sigma = [known.sigma for known in self.rig.constants]
+        out = {}
+        for name, (whole, masks) in self.rig.partial.items():
+            share = sigma[place[name]] / sigma[place[whole]]
+            marked = self.joined(
+                [dict.fromkeys(self.rig.channels, np.where(mask, share, 0.0)) for mask in masks]
+            )
+            out[place[name]] = place[whole], marked
+        return out
+
+    def of(self, channel: str) -> Bools:
+        mask: Bools = self.channel == self.rig.channels.index(channel)
+        return mask

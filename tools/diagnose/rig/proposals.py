@@ -1,0 +1,67 @@
+"""The feasible menu of driven experiments, as motions about the middle of what was driven so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.stages.situation import Motion
+from gritd.estimator.terramechanics.soil import Array
+
+SECONDS, RATE = 24.0, 10.0
+LEVELS = {  # factors on the middle speed, slips, factors on the middle load
+    "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
+    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
+    "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
+    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
+    "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
+    "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
+    "second_pass": ((1.0,), (0.2,), (1.0,)),
+    "shifted_start": ((1.0,), (0.2,), (1.0,)),
+}
+
+
+def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
+    """The motion of one experiment: its levels in turn, each for an equal time."""
+    speeds, slips, loads = LEVELS[key]
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    middle_speed, middle_load = (
+        _middle([np.abs(m.wheel_speed) for m in driven]),
+        _middle([m.load for m in driven]),
+    )
+    speed, slip = middle_speed * _stepped(speeds, time), _stepped(slips, time)
+    last = max(float(np.max(m.pass_number)) for m in driven)
+    reached = max(float(np.max(np.asarray(m.start_position) + m.carriage_position)) for m in driven)
+    travel = radius * speed * (1.0 - slip)
+    return Motion(
+        time=time,
+        wheel_angle=np.cumsum(speed) / RATE,
+        wheel_speed=speed,
+        carriage_position=np.cumsum(travel) / RATE,
+        carriage_speed=travel,
+        load=middle_load * _stepped(loads, time),
+        pass_number=last + 1.0 if key == "second_pass" else last,
+        start_position=reached if key == "shifted_start" else 0.0,
+    )
+
+
+def driving(key: str) -> NDArray[np.bool_]:
+    """Whether the wheel drives on the soil: at rest and lifted the motor current alone tells something."""
+    speeds, _, loads = LEVELS[key]
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)
+    return driving
+
+
+def _middle(values: Sequence[Array | float]) -> float:
+    joined = np.concatenate([np.atleast_1d(v) for v in values])
+    moving = joined[joined > 0.05 * joined.max()] if joined.max() > 0.0 else joined
+    return float(np.median(moving))
+
+
+def _stepped(levels: Sequence[float], time: Array) -> Array:
+    index = np.minimum((time / SECONDS * len(levels)).astype(int), len(levels) - 1)
+    values: Array = np.asarray(levels, dtype=np.float64)
+    return np.asarray(values[index], dtype=np.float64)

@@ -1,0 +1,83 @@
+"""The weights on the axle in each run: as the run states them, or as the force/torque sensor tells them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.signals import Signals
+
+CLOSE = (
+    0.15  # relative distance of the measured load from the stated one at which both mean the same
+)
+RAISED = 0.2  # share of the stated load below which the wheel is lifted
+PASSING = 0.1  # share of a run that may pass between lifted and loaded
+DOUBT = 4.0  # [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
+LEVEL = 0.03  # relative change of the measured load that is a change of weights
+HOLD = 1.0  # [s] weights stay for at least this long
+
+
+class Weights(NamedTuple):
+    values: Array  # (n,) [N]
+    known: bool  # stated, so that the measured load can be compared with them
+
+
+def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weights:
+    """Stated weights where the measured load does not contradict them, else the levels of the measured load.
+
+    A run that states nothing has the configuration's weights, if the measured load is theirs within the uncertainties.
+    """
+    said = signals.info.nominal_load
+    stated = settings.load.nominal.value if said is None else said
+    constant = np.full(signals.time.size, float(stated))
+    measured = signals.analogue.get("load")
+    if measured is None or settings.wrench is None or settings.wrench.load.offset.sigma > 1e5:
+        return Weights(constant, True)
+    load = _bridged(measured)
+    near, lifted = np.abs(load - stated) <= CLOSE * stated + 1.0, load <= RAISED * stated
+    held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
+    known = said is not None or abs(held - stated) <= DOUBT * _sigma(
+        settings.load.nominal, settings.wrench.load
+    )
+    if known and np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
+        return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
+    note = "Weights are taken from the measured load in runs that do not state theirs or that change them: "
+    note += "friction of the load axis cannot show there."
+    if note not in caveats:
+        caveats.append(note)
+    return Weights(levels(signals.time, load), False)
+
+
+def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
+    """Of the configured weights beside the sensor that measures them [N]."""
+    gain = sensor.scale.sigma / sensor.scale.value * nominal.value
+    return float(np.sqrt(nominal.sigma**2 + gain**2 + sensor.offset.sigma**2))
+
+
+def levels(time: Array, load: Array) -> Array:
+    """The measured load: its mean over each stretch on which it is level, as measured where it changes."""
+    step = float(np.median(np.diff(time)))
+    half = max(round(0.5 * HOLD / step), 1)
+    padded = np.pad(load, half, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    slack = LEVEL * np.abs(load) + 6.0 * _noise(load)
+    level = np.ptp(windows, axis=1) <= slack
+    local = windows.mean(axis=1)
+    out = np.where(level, local, load)
+    for stretch in np.split(np.arange(load.size), np.flatnonzero(np.diff(level.astype(int))) + 1):
+        if level[stretch[0]] and np.ptp(local[stretch]) <= slack[stretch].mean():
+            out[stretch] = load[stretch].mean()
+    return out
+
+
+def _noise(values: Array) -> float:
+    return float(1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0))
+
+
+def _bridged(values: Array) -> Array:
+    good = np.isfinite(values)
+    at = np.arange(values.size)
+    return np.interp(at, at[good], values[good])

@@ -1,0 +1,156 @@
+"""Whether slow noise alone explains it: evidence of a misfit with size and colour of the noise left open.
+
+The screen whitens with one colour for each channel, found with everything explained away (noise.py). Short campaigns
+leave that colour wide open: what tells slow noise lies in the slow part of the residual, and there the saturated mean
+takes it. A misfit that stands out of the assumed colour may then be noise of a slower one. So what raised the alarm is
+weighed once more: base model and base model with the misfit, each with the colours that suit *it*, averaged over what
+they may be. A misfit that follows its covariate through all runs is far likelier than noise that happens to; slow noise
+that looks like a trend is not.
+
+Linear about the fit, Gaussian priors: for noise of covariance Σ, columns C of unit prior, and at the fit
+y = measured − predicted + C θ,
+
+    ln p(y) = −½ [yᵀΣ⁻¹y − bᵀK⁻¹b + ln det K + ln det Σ],   K = I + CᵀΣ⁻¹C,   b = CᵀΣ⁻¹y
+
+(Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14). Channels share the columns, so colours are sought one channel
+after the other, from those that suit each alone; the average of each is over its own colours and sizes, the other
+channels' at their best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import logsumexp
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import SCALES, Signature
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.noise import colour as noise
+from gritd.tools.diagnose.rig.interface import Index
+
+SIZES = np.array(
+    [0.8, 0.9, 1.0, 1.1, 1.25, 1.5]
+)  # of the noise, beside what suits a channel for itself
+NEAR = 10.0  # [nats] colours so far behind the best for a channel alone are not tried in it
+SWEEPS = 2
+AT_ONCE = 8_000_000  # numbers whitened at once
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Products of a channel's whitened columns, for each colour (g, m, m); log det of the correlation (g,); values."""
+
+    gram: Array
+    log_det: Array
+    count: int
+
+
+@dataclass(frozen=True)
+class Suiting:
+    """Colours that may suit a channel: products (k, p + 1, p + 1), what their size adds (k,), variance (k,), values."""
+
+    gram: Array
+    rest: Array
+    variance: Array
+    count: int
+
+
+class OpenNoise:
+    """Evidence of signatures on top of a fit, with the colour of every channel open."""
+
+    def __init__(self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature]) -> None:
+        stack = problem.stack
+        centre = np.concatenate((fitted.u, fitted.x))
+        base = np.column_stack((fitted.raw / fitted.penalty[: len(centre)], problem.allowed))
+        y = stack.measured - fitted.predicted + fitted.raw @ centre
+        columns = np.column_stack((base, *(s.columns for s in signatures), y))
+        self._base = np.arange(base.shape[1])
+        ends = base.shape[1] + np.cumsum([0, *(s.columns.shape[1] for s in signatures)])
+        self._own = [np.arange(low, high) for low, high in pairwise(ends.tolist())]
+        self._share = [s.prior for s in signatures]
+        self._y = columns.shape[1] - 1
+        self._colours = noise.colours()
+        self._prior = noise.log_prior(self._colours, stack.gaps)
+        self._squares = [
+            _squares(columns[own], stack.gaps_of(own), problem.noise.loose[own], self._colours)
+            for own in (stack.of(channel) for channel in stack.rig.channels)
+            if own.any()
+        ]
+        self._without = self._evidence(np.zeros(0, dtype=np.intp))
+
+    def gain(self, number: int) -> float:
+        """Log Bayes factor of a signature [nats], its share among the shapes of its name counted."""
+        return self._evidence(self._own[number]) - self._without + self._share[number]
+
+    def _evidence(self, more: Index) -> float:
+        """Log evidence with some more columns, averaged over their sizes."""
+        index = np.concatenate((self._base, more, [self._y]))
+        scales = SCALES if more.size else SCALES[:1]
+        prior = np.ones((len(scales), index.size - 1))
+        prior[:, self._base.size :] = scales[:, None] ** -2
+        parts = [self._suiting(squares, index) for squares in self._squares]
+        at = [
+            int(np.argmax(part.rest - 0.5 * part.count * np.log(part.variance))) for part in parts
+        ]
+        size = [1.0 for _ in parts]
+        found: list[tuple[float, float]] = []
+        for _ in range(SWEEPS):
+            found = []
+            for i, part in enumerate(parts):
+                others = [
+                    _term(p, a, s)
+                    for j, (p, a, s) in enumerate(zip(parts, at, size, strict=True))
+                    if j != i
+                ]
+                value = _averaged(part, prior, others)
+                best = np.unravel_index(int(np.argmax(value)), value.shape)
+                at[i], size[i] = int(best[0]), float(SIZES[best[1]])
+                found.append((float(value.max()), float(logsumexp(value))))
+        return found[-1][0] + sum(average - top for top, average in found)
+
+    def _suiting(self, squares: Squares, index: Index) -> Suiting:
+        gram = squares.gram[:, index[:, None], index]
+        acting = np.flatnonzero(np.diagonal(gram[0]) > 0.0)
+        alone, variance = noise.restricted(
+            gram[:, acting[:, None], acting], squares.log_det, squares.count
+        )
+        near = np.flatnonzero(alone + self._prior > (alone + self._prior).max() - NEAR)
+        rest = self._prior[near] - 0.5 * squares.log_det[near]
+        return Suiting(gram[near], rest, variance[near], squares.count)
+
+
+def _squares(columns: Array, gaps: Array, loose: Array, colours: Sequence[noise.Colour]) -> Squares:
+    columns, grams, dets = columns / loose[:, None], [], []
+    for some in np.array_split(np.arange(len(colours)), -(-len(colours) * columns.size // AT_ONCE)):
+        whitened, log_det = noise.whiten_unit(columns, gaps, [colours[i] for i in some])
+        grams.append(whitened.transpose(0, 2, 1) @ whitened)
+        dets.append(log_det)
+    return Squares(np.concatenate(grams), np.concatenate(dets), len(columns))
+
+
+def _term(part: Suiting, at: int, size: float) -> tuple[Array, float]:
+    """What a channel of known colour adds to the products and to the log evidence."""
+    variance = part.variance[at] * size**2
+    return part.gram[at] / variance, float(part.rest[at] - 0.5 * part.count * np.log(variance))
+
+
+def _averaged(part: Suiting, prior: Array, others: Sequence[tuple[Array, float]]) -> Array:
+    """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors (s, p)."""
+    variance = part.variance[:, None] * SIZES**2
+    gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
+    added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
+    return np.asarray(
+        logsumexp([_log_evidence(gram, p) for p in prior], axis=0) - np.log(len(prior)) + added
+    )
+
+
+def _log_evidence(gram: Array, prior: Array) -> Array:
+    """From products (…, p + 1, p + 1) of columns and y, and the prior precision (p,) of the columns."""
+    root = np.linalg.cholesky(gram[..., :-1, :-1] + np.diag(prior))
+    taken = np.linalg.solve(root, gram[..., :-1, -1:])[..., 0]
+    spread = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) - 0.5 * np.log(prior).sum()
+    return np.asarray(-0.5 * (gram[..., -1, -1] - np.sum(taken**2, axis=-1)) - spread)

@@ -1,0 +1,325 @@
+"""Misfits without a name that must be searched for: waves (lines.py) and steps, in time and along the bed.
+
+A family is one channel along one axis, with a wave at every frequency that the grid shows, or a step at every place.
+Its evidence is the average over all of them, in the recordings and in every surrogate alike, so that the number of
+frequencies and places tried is paid for. Cosine and sine of a wave are of one size and at a right angle to each other;
+so are those of one stretch to another's: what this leaves out is small, and the same for the surrogates. Where a wave's
+neighbours in the spectrum hold more than the noise that is assumed, its power counts by so much less: a line stands out
+of what is near it, whatever the colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import digamma, logsumexp
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit import functions as generic
+from gritd.tools.diagnose.fit.evidence import SCALES, Base, Signature
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.noise import lines
+from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.screen.ripples import order_of
+
+WAVE, STEP = "wave", "step"
+PLACES = 48  # of a step along an axis
+FEW = 8  # values on either side of a step
+WIDTH = (
+    0.015  # of a step, relative to the whole stretch: a wheel is on both sides of it for a while
+)
+PEAKS = 4  # shapes of a family that are fitted
+TINY = 1e-12
+FINER = 4.0  # frequencies tried in each that the whole campaign resolves
+HARMONICS, LARGE = 4, 3.0  # of a ripple that is known; their standard deviation in expected sizes
+FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the scan
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Values whose shapes have coefficients of their own: whitened shapes (n, f, c), their scores (f · c, draws)."""
+
+    rows: slice
+    shapes: Array
+    nulls: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A channel's waves or steps along an axis; at: frequencies [1/s, 1/m] or places [s, m] (f,)."""
+
+    channel: str
+    axis: str
+    kind: str
+    at: Array
+    blocks: tuple[Block, ...]
+    near: Array | None = None  # (f, f) 1 for neighbours in the spectrum, of waves
+
+    @property
+    def name(self) -> str:
+        return f"{self.channel}~{self.axis} {self.kind}"
+
+    @property
+    def shared(self) -> tuple[bool, ...]:
+        """Whether all blocks have one coefficient: of waves in time never, of waves along the bed it is not known."""
+        if len(self.blocks) == 1:
+            return (True,)
+        return (False,) if self.axis == "time" else (False, True)
+
+    def evidence(self, left: Left, near: Array | None = None) -> Array:
+        """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands out of them."""
+        return np.stack([self.form(left, shared, near) for shared in self.shared])
+
+    def form(self, left: Left, shared: bool, near: Array | None = None) -> Array:
+        """The same (f, 1 + draws), with one coefficient for all blocks or one for each."""
+        return _weighed([left.of(block) for block in self.blocks], self.at.size, shared, near)
+
+    def average(self, left: Left) -> Array:
+        """Log Bayes factor (1 + draws,) of the family."""
+        every = self.evidence(left, self.near)
+        return np.asarray(logsumexp(every, axis=(0, 1)) - np.log(every.shape[0] * every.shape[1]))
+
+
+class Left:
+    """What of a shape is left beside a fitted model, in the recordings and in every surrogate."""
+
+    def __init__(self, base: Base, noise: Array | None = None, strain: Array | None = None) -> None:
+        """Surrogates: noise (N, draws) whitened, strain (q, draws); without them the recordings alone count."""
+        noise = np.zeros((base.residual.size, 0)) if noise is None else noise
+        strain = np.zeros((base.u.size, 0)) if strain is None else strain
+        self._base = base
+        score = base.jacobian.T @ np.column_stack((base.residual, noise)) - np.column_stack(
+            (base.u, strain)
+        )
+        self._pulled = np.linalg.solve(base.root, score)
+
+    def of(self, block: Block) -> tuple[Array, Array, Array]:
+        """Squares of the shapes (m,), coordinates in the model's directions (q, m), scores (m, 1 + draws)."""
+        flat = block.shapes.reshape(len(block.shapes), -1)
+        jacobian = self._base.jacobian[block.rows]
+        acting = np.any(jacobian != 0.0, axis=0)
+        inside = np.zeros((jacobian.shape[1], flat.shape[1]))
+        inside[acting] = jacobian[:, acting].T @ flat
+        inside = solve_triangular(self._base.root, inside, lower=True, check_finite=False)
+        nulls = block.nulls[:, : self._pulled.shape[1] - 1]
+        score = (
+            np.column_stack((flat.T @ self._base.residual[block.rows], nulls))
+            - inside.T @ self._pulled
+        )
+        return np.sum(flat**2, axis=0), inside, score
+
+
+def _weighed(
+    found: Sequence[tuple[Array, Array, Array]], count: int, shared: bool, near: Array | None
+) -> Array:
+    """Log Bayes factor (count, draws) from squares, coordinates and scores of every block."""
+    if shared:
+        squares, inside, score = (np.sum([f[i] for f in found], axis=0) for i in range(3))
+        found = [(squares, inside, score)]
+    width = found[0][0].size // count
+    sizes = [
+        np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)[:, None]
+        for s, i, _ in found
+    ]
+    powers = [np.sum(score.reshape(count, width, -1) ** 2, axis=1) for _, _, score in found]
+    level = 1.0 if near is None else _level(sizes, powers, near)
+    parts = np.zeros((len(SCALES), *powers[0].shape))
+    for size, power in zip(sizes, powers, strict=True):
+        for part, scale in zip(parts, SCALES, strict=True):
+            part += 0.5 * power / level / (size + scale**-2) - 0.5 * width * np.log1p(
+                scale**2 * size
+            )
+    return np.asarray(logsumexp(parts, axis=0) - np.log(len(SCALES)))
+
+
+def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
+    """Geometric mean (f, draws) of the neighbours' power, in that of the noise assumed; 1 at least."""
+    ratio = np.sum(
+        [power / np.maximum(size, TINY) for size, power in zip(sizes, powers, strict=True)], axis=0
+    )
+    expected = digamma(len(sizes)) + np.log(2.0)  # of the logarithm of a χ² of two degrees each
+    share = near / np.maximum(near.sum(axis=1, keepdims=True), 1.0)
+    return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, TINY)) - expected), 0.0)))
+
+
+# ---- what is searched ----------------------------------------------------------------------------------------------
+
+
+def families(stack: Stack, noise: Noise, nulls: Array) -> list[Family]:
+    """Of every channel; nulls (N, draws) whitened surrogates."""
+    found = []
+    for channel in stack.rig.channels:
+        for axis in lines.AXES:
+            found.append(
+                waves(stack, noise, nulls, channel, axis, lines.frequencies(stack, channel, axis))
+            )
+            found.append(steps(stack, noise, nulls, channel, axis, places(stack, channel, axis)))
+    return [family for family in found if family.blocks and family.at.size]
+
+
+def waves(
+    stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, frequencies: Array
+) -> Family:
+    size, x = np.sqrt(2.0) * generic.size_of(stack, channel), stack.covariate(axis)
+    blocks = []
+    for index in lines.stretches(stack, channel) if frequencies.size else ():
+        rows = _rows(stack.of(channel) & (stack.run == stack.run[index[0]]))
+        raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
+        raw[index - rows.start] = size * lines.waves(x[index], frequencies)
+        blocks.append(_block(noise, nulls, rows, raw))
+    near = lines.neighbours(x, lines.stretches(stack, channel), frequencies) if blocks else None
+    return Family(channel, axis, WAVE, frequencies, tuple(blocks), near)
+
+
+def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at: Array) -> Family:
+    if not at.size:
+        return Family(channel, axis, STEP, at, ())
+    rows = _rows(stack.of(channel))
+    raw = generic.size_of(stack, channel) * _risen(stack, rows, axis, at)[:, :, None]
+    return Family(channel, axis, STEP, at, (_block(noise, nulls, rows, raw),))
+
+
+def places(stack: Stack, channel: str, axis: str) -> Array:
+    """Where a step may be [s, m] (p,): as many values between two as between others, some on either side of all."""
+    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+    x = stack.covariate(axis)[own]
+    if x.size < 2 * FEW or np.ptp(x) <= 1e-9:
+        return np.zeros(0)
+    ordered = np.sort(x)
+    beyond = np.unique(np.linspace(FEW, x.size - FEW, PLACES).astype(int))
+    return np.unique(0.5 * (ordered[beyond - 1] + ordered[beyond]))
+
+
+def _risen(stack: Stack, rows: slice, axis: str, at: Array) -> Array:
+    """(n, p) from 0 to 1 at each place while the wheel moves."""
+    x, moving = stack.covariate(axis)[rows], stack.covariate("speed")[rows] > 0.0
+    width = WIDTH * (float(np.ptp(x[moving])) if axis == "position" else lines.STRETCH)
+    return np.asarray(
+        np.where(moving[:, None], 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0)
+    )
+
+
+def _rows(own: Bools) -> slice:
+    index = np.flatnonzero(own)
+    return slice(int(index[0]), int(index[-1]) + 1)
+
+
+def _block(noise: Noise, nulls: Array, rows: slice, raw: Array) -> Block:
+    white = np.asarray(noise.whitener[rows, rows] @ raw.reshape(len(raw), -1))
+    return Block(rows, white.reshape(raw.shape), white.T @ nulls[rows])
+
+
+# ---- those that stand out ------------------------------------------------------------------------------------------
+
+
+def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> list[Signature]:
+    """The likeliest shapes of every family beside a model, each with its log share among all that were tried."""
+    left = Left(without_harmonics(problem, fitted))
+    return [found for family in search for found in _peaks(family, problem, left)]
+
+
+def _peaks(family: Family, problem: Problem, left: Left) -> Iterator[Signature]:
+    every = family.evidence(left)[..., 0]
+    share = -float(np.log(every.size))
+    best = every.max(axis=0)
+    edge = np.full(1, -np.inf)
+    before, after = np.concatenate((edge, best[:-1])), np.concatenate((best[1:], edge))
+    top = np.flatnonzero((best >= before) & (best > after) & (best + share > 0.0))
+    for place in top[np.argsort(-best[top])][:PEAKS]:
+        shared = family.shared[int(np.argmax(every[:, place]))]
+        at = (
+            _refined(family, problem, left, int(place), shared)
+            if family.kind == WAVE
+            else float(family.at[place])
+        )
+        columns = shape_columns(problem.stack, family.channel, family.axis, family.kind, at, shared)
+        yield Signature(
+            family.name,
+            columns,
+            (0,) * columns.shape[1],
+            {"at": at, "shared": float(shared)},
+            share,
+        )
+
+
+def _refined(family: Family, problem: Problem, left: Left, place: int, shared: bool) -> float:
+    """The best frequency between two of the scan."""
+    near = family.at[place] + FINE * (family.at[1] - family.at[0] if family.at.size > 1 else 0.0)
+    none = np.zeros((problem.stack.size, 0))
+    finer = waves(problem.stack, problem.noise, none, family.channel, family.axis, near)
+    return float(near[int(np.argmax(finer.form(left, shared)[:, 0]))])
+
+
+def in_step(
+    search: Sequence[Family], problem: Problem, fitted: Fitted, found: Signature
+) -> Signature:
+    """A wave in time with one phase for all runs, where that is likelier than one for each; else as it was."""
+    family = next(f for f in search if f.name == found.name)
+    if family.kind != WAVE or family.axis != "time" or found.shape["shared"]:
+        return found
+    stack, left = problem.stack, Left(without_harmonics(problem, fitted))
+    x = stack.covariate("time")[stack.of(family.channel)]
+    reach = float(family.at[1] - family.at[0]) if family.at.size > 1 else 0.0
+    count = int(min(2.0 * reach * FINER * np.ptp(x), lines.MOST)) + 1
+    tried = found.shape["at"] + reach * np.linspace(-1.0, 1.0, count)
+    finer = waves(stack, problem.noise, np.zeros((stack.size, 0)), family.channel, "time", tried)
+    value = finer.form(left, True)[:, 0] - np.log(count)
+    best = int(np.argmax(value))
+    if value[best] < finer.form(left, False)[:, 0].max():
+        return found
+    columns = shape_columns(stack, family.channel, "time", WAVE, float(tried[best]), True)
+    return Signature(
+        found.name, columns, (0, 0), {"at": float(tried[best]), "shared": 1.0}, found.prior
+    )
+
+
+def shape_columns(
+    stack: Stack, channel: str, axis: str, kind: str, at: float, shared: bool
+) -> Array:
+    """One wave or step (N, m), of the expected size of a misfit; of a wave two columns, or two a stretch."""
+    size = generic.size_of(stack, channel)
+    if kind == STEP:
+        rows, out = _rows(stack.of(channel)), np.zeros((stack.size, 1))
+        out[rows] = size * _risen(stack, rows, axis, np.array([at]))
+        return out
+    parts: list[Index] = lines.stretches(stack, channel)
+    parts = [np.concatenate(parts)] if shared else parts
+    out = np.zeros((stack.size, 2 * len(parts)))
+    for number, index in enumerate(parts):
+        pair = lines.waves(stack.covariate(axis)[index], np.array([at]))[:, 0]
+        out[index, 2 * number : 2 * number + 2] = np.sqrt(2.0) * size * pair
+    return out
+
+
+def without_harmonics(problem: Problem, fitted: Fitted) -> Base:
+    """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too.
+
+    At a steady speed they are waves in time and along the bed, and another published form of the ripple has them.
+    """
+    base, columns = fitted.base(), list(_harmonics(problem.stack, fitted))
+    if not columns:
+        return base
+    more = whiten(problem.noise, np.column_stack(columns))
+    return Base(
+        np.column_stack((base.jacobian, more)),
+        base.residual,
+        np.append(base.u, np.zeros(more.shape[1])),
+    )
+
+
+def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
+    for effect in fitted.acting:
+        if effect.fingerprint.covariate == "wheel_angle":
+            name = order_of(type(effect))
+            phase = stack.covariate("wheel_angle") * (getattr(effect, name) if name else 1.0)
+            for channel in stack.rig.channels:
+                own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+                for number in range(1, HARMONICS + 1):
+                    for wave in (np.cos, np.sin):
+                        yield np.where(
+                            own, LARGE * generic.size_of(stack, channel) * wave(number * phase), 0.0
+                        )

@@ -1,0 +1,108 @@
+"""Many trials, resumable, with progress."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.proof.blind import seal, strata, trial
+from gritd.tools.proof.blind.trial import Spec
+
+BATCH, SECRET = "batch.json", "answers/batch.json"
+AHEAD = 2  # cases in hand for every worker
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a batch is; `sealed` is public before any diagnosis, `secret` is what every case is drawn from."""
+
+    output: Path
+    cases: int
+    strata: tuple[str, ...]
+    secret: str
+    sealed: str
+
+    def specs(self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE) -> list[Spec]:
+        rng = np.random.default_rng(_number(self.secret, "assignments"))
+        drawn = strata.assignments(self.cases, rng, self.strata)
+        return [
+            Spec(
+                number,
+                _number(self.secret, f"case {number}"),
+                assignment,
+                str(self.output),
+                keep,
+                diagnose,
+            )
+            for number, assignment in enumerate(drawn, start=1)
+        ]
+
+
+def _number(secret: str, purpose: str) -> int:
+    """63 bits that only the secret foretells."""
+    return int.from_bytes(hashlib.sha256(f"{secret}/{purpose}".encode()).digest()[:8], "big") >> 1
+
+
+def started(output: Path, cases: int, chosen: tuple[str, ...], seed: int | None) -> Batch:
+    """A new batch, from the operating system's randomness or from a seed. Raises CommandError where one is there."""
+    if (output / BATCH).exists():
+        raise CommandError(f"{output}: found a batch; expected a new folder, or --resume", USAGE)
+    secret = secrets.token_hex(32) if seed is None else f"seed {seed}"
+    sealed = seal.close(output / SECRET, {"secret": secret, "cases": cases, "strata": list(chosen)})
+    (output / "answers").chmod(0o700)
+    public = {"cases": cases, "strata": list(chosen), "seal": sealed}
+    (output / BATCH).write_text(json.dumps(public, indent=1), encoding="utf-8")
+    return Batch(output, cases, chosen, secret, sealed)
+
+
+def resumed(output: Path) -> Batch:
+    """A batch that was begun before. Raises CommandError where there is none."""
+    try:
+        public = json.loads((output / BATCH).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise CommandError(
+            f"{output}: found no batch; expected one that was begun without --resume", USAGE
+        ) from None
+    answers = seal.opened(output / SECRET, public["seal"])
+    return Batch(
+        output, answers["cases"], tuple(answers["strata"]), answers["secret"], public["seal"]
+    )
+
+
+def run(
+    specs: Sequence[Spec],
+    executor: Executor,
+    width: int,
+    sealed: Callable[[Spec, str], None],
+    finished: Callable[[Spec], None],
+    diagnosed: bool = True,
+) -> None:
+    """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends the batch."""
+    waiting = [spec for spec in specs if not spec.done]
+    waiting.reverse()
+    active: dict[Future[Any], tuple[Spec, bool]] = {}
+    while waiting or active:
+        while waiting and len(active) < AHEAD * width:
+            spec = waiting.pop()
+            active[executor.submit(trial.prepare, spec)] = (spec, False)
+        done, _ = wait(active, return_when=FIRST_COMPLETED)
+        for future in done:
+            spec, last = active.pop(future)
+            value = future.result()
+            if last:
+                finished(spec)
+                continue
+            sealed(spec, value)
+            if not diagnosed:
+                finished(spec)
+                continue
+            active[executor.submit(trial.diagnose, spec)] = (spec, True)

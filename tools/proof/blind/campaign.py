@@ -1,0 +1,173 @@
+"""Campaigns as an engineer would drive them: runs of steady stretches at several loads, slips and speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gritd.tools.proof.blind.plant.axle import balance
+from gritd.tools.proof.blind.plant.contact import Ground, Rim, reaction
+from gritd.tools.proof.blind.plant.quadrature import Array
+from gritd.tools.proof.blind.plant.respond import Orders
+from gritd.tools.proof.blind.plant.scene import Rig
+
+RATE = 250.0  # [Hz]
+ANGLES = (0.35, 0.85)  # [rad] entry angles within which loads are chosen
+SLIPS = (0.04, 0.6)
+RAMP = (0.4, 1.0)  # [s]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    duration: float  # [s]
+    weight: float  # [N]; 0 lifts the wheel
+    slip: float
+    speed: float  # of the rim [m/s], negative backward, 0 at rest
+
+
+@dataclass(frozen=True)
+class Run:
+    stretches: tuple[Stretch, ...]
+    ramp: float  # [s]
+    passes: int  # 1 on fresh soil
+    start: float  # [m]
+    begins: float  # [s] since the campaign began
+
+    @property
+    def duration(self) -> float:
+        return sum(stretch.duration for stretch in self.stretches)
+
+    @property
+    def weight(self) -> float:
+        return max(stretch.weight for stretch in self.stretches)
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What the engineer does and does not do. None lets chance decide."""
+
+    runs: int | None = None
+    loads: int | None = None
+    standstill: bool | None = None
+    reversal: bool | None = None
+    lifted: bool | None = None
+    second_pass: bool | None = None
+    speeds: bool | None = None
+    wrench: bool | None = None
+
+
+def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habits:
+    """Habits by chance where they are not fixed."""
+    fixed = fixed or Habits()
+    runs = int(rng.choice((1, 2, 3, 4, 5, 6), p=(0.1, 0.1, 0.25, 0.25, 0.15, 0.15)))
+    drawn = {
+        "runs": runs,
+        "loads": 1 if rng.random() < 0.15 else 4,
+        "standstill": bool(rng.random() < 0.7),
+        "reversal": bool(rng.random() < 0.25),
+        "lifted": bool(rng.random() < 0.15),
+        "second_pass": bool(rng.random() < 0.25),
+        "speeds": bool(rng.random() < 0.6),
+        "wrench": bool(rng.random() < 0.7),
+    }
+    chosen: dict[str, Any] = {
+        name: value for name, value in drawn.items() if getattr(fixed, name) is None
+    }
+    habits = replace(fixed, **chosen)
+    return replace(
+        habits, lifted=bool(habits.lifted and habits.wrench)
+    )  # nothing else tells that the load is off
+
+
+def campaign(rig: Rig, ground: Ground, habits: Habits, rng: np.random.Generator) -> tuple[Run, ...]:
+    """Runs over soil that was prepared anew, but for second passes."""
+    count = habits.runs or 1
+    weights = _weights(rig, ground, min(count, habits.loads or 4), rng)
+    runs: list[Run] = []
+    begins = 0.0
+    for number in range(count):
+        again = bool(habits.second_pass) and number > 0 and rng.random() < 0.5
+        weight = runs[-1].weight if again else weights[number % len(weights)]
+        run = _run(rig, habits, weight, rng)
+        passes, start = (runs[-1].passes + 1, runs[-1].start) if again else (1, _start(rng))
+        runs.append(replace(run, passes=passes, start=start, begins=begins))
+        begins += run.duration + float(rng.uniform(60.0, 400.0))
+    return tuple(runs)
+
+
+def _start(rng: np.random.Generator) -> float:
+    return 0.0 if rng.random() < 0.7 else round(float(rng.uniform(0.05, 0.3)), 2)
+
+
+def _weights(rig: Rig, ground: Ground, count: int, rng: np.random.Generator) -> list[float]:
+    """Loads that sink the wheel to entry angles spread over ANGLES, in an order of chance [N]."""
+    low, high = sorted(rng.uniform(*ANGLES, 2)) if count == 1 else ANGLES
+    angles = np.linspace(low, high, count + 1)[:count] + rng.uniform(
+        0.0, (high - low) / (count + 1), count
+    )
+    loads = reaction(
+        ground, Rim(), rig.radius, rig.width, np.full(count, 0.8), np.asarray(angles)
+    ).load
+    rounded = [float(np.round(load, 1 if load < 20 else 0)) for load in loads]
+    return [rounded[place] for place in rng.permutation(count)]
+
+
+def _run(rig: Rig, habits: Habits, weight: float, rng: np.random.Generator) -> Run:
+    usual = float(rng.uniform(0.015, 0.04))
+    slips = rng.permutation(np.linspace(*SLIPS, int(rng.integers(4, 7)))) + rng.uniform(-0.02, 0.02)
+    stretches = [_stretch(weight, float(slip), usual, habits, rng) for slip in slips]
+    if habits.reversal:
+        stretches[-2:] = [
+            replace(stretches[-2], duration=3.0),
+            replace(stretches[-1], speed=-usual),
+        ]
+    if habits.lifted:
+        stretches.append(Stretch(4.0, 0.0, 0.0, usual))
+    if habits.standstill:
+        stretches.insert(0, Stretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
+    ramp = float(rng.uniform(*RAMP))
+    return Run(tuple(stretches), ramp, 1, 0.0, 0.0)
+
+
+def _stretch(
+    weight: float, slip: float, usual: float, habits: Habits, rng: np.random.Generator
+) -> Stretch:
+    speed = usual * float(rng.choice((0.4, 0.7, 1.0, 1.6))) if habits.speeds else usual
+    return Stretch(float(rng.uniform(4.0, 6.0)), weight, round(slip, 3), round(speed, 4))
+
+
+def orders(run: Run, radius: float, rate: float = RATE) -> Orders:
+    """What the controllers are told, smooth between the stretches. `radius` [m] is the one that is configured."""
+    time = np.arange(round(run.duration * rate)) / rate
+    speed = _levels(run, time, [stretch.speed for stretch in run.stretches])
+    slip = _levels(run, time, [stretch.slip for stretch in run.stretches])
+    weight = _levels(run, time, [stretch.weight for stretch in run.stretches])
+    travel = speed * np.where(slip >= 0.0, 1.0 - slip, 1.0 / (1.0 + np.minimum(slip, 0.0)))
+    return Orders(run.begins + time, speed / radius, travel, weight, run.passes, run.start)
+
+
+def _levels(run: Run, time: Array, levels: list[float]) -> Array:
+    """Levels joined by half cosines of the run's ramp, each at the end of its stretch."""
+    values, edge = np.full(time.size, levels[0]), 0.0
+    for before, after, stretch in zip(levels[:-1], levels[1:], run.stretches[:-1], strict=True):
+        edge += stretch.duration
+        share = np.clip((time - edge) / run.ramp + 1.0, 0.0, 1.0)
+        values = values + (after - before) * 0.5 * (1.0 - np.cos(np.pi * share))
+    return values
+
+
+def deepest(rig: Rig, ground: Ground, weight: float) -> float:
+    """Entry angle [rad] at the largest slip."""
+    at = np.array([1.0 - SLIPS[1]])
+
+    def load_at(theta_1: Array) -> Array:
+        return reaction(ground, Rim(), rig.radius, rig.width, at, theta_1).load
+
+    return float(balance(load_at, np.array([weight]), np.array([0.6]))[0])
+
+
+def with_weight(given: Orders, weight: Array) -> Orders:
+    """The same orders under other weights [N]."""
+    return replace(given, weight=weight)

@@ -1,0 +1,170 @@
+"""One blind case: everything that is true of it, drawn from its own seed; and what of it is handed over."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gritd.tools.proof.blind import campaign, detect, knowledge
+from gritd.tools.proof.blind.detect import Detector, Trial
+from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
+from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.respond import World
+from gritd.tools.proof.blind.strata import LEVELS, Assignment
+
+ATTEMPTS = 25  # campaigns tried until one shows the effect as strongly as wanted
+COMPARED = ("single", "absorbed", "confounded")
+CHANNELS = {
+    "sinkage": "sinkage",
+    "current": "torque",
+    "pull": "drawbar_pull",
+    "load": "load",
+    "torque": "axle_torque",
+}
+HEAVIEST = 400.0  # [N]
+WRONG_NOISE = {
+    True: 0.5,
+    False: 0.3,
+}  # share of cases without and with an effect whose stated noise is off by two
+
+
+@dataclass(frozen=True)
+class Case:
+    """The answers: never shown to the diagnosis before it has spoken."""
+
+    number: int
+    seed: int
+    assignment: Assignment
+    family: str
+    habits: campaign.Habits
+    trial: Trial  # its world holds the concealed effects
+    noise_factor: float  # stated noise over true
+    detectability: float  # D of all concealed effects together
+    single: tuple[float, ...]  # D of each
+    inseparable: dict[
+        str, float
+    ]  # rivals that this campaign cannot tell from the (only) effect, with what D is left
+    oracle_variance: dict[
+        str, float
+    ]  # what fitting adds to a held-out error, by the diagnosis' channels [SI²]
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        return self.trial.world.effects
+
+    def stated(self) -> knowledge.Knowledge:
+        return knowledge.misstated(self.trial.known, self.noise_factor)
+
+    def answers(self) -> dict[str, Any]:
+        """As JSON types."""
+        ground = self.trial.world.ground
+        return {
+            "case": self.number,
+            "seed": self.seed,
+            **asdict(self.assignment),
+            "detectability": self.detectability,
+            "detectability_single": list(self.single),
+            "detection_limit": detect.LIMIT,
+            "inseparable": self.inseparable,
+            "oracle_variance": self.oracle_variance,
+            "concealed": [
+                {"name": e.name, **asdict(e), "coinciding": e.coinciding()} for e in self.effects
+            ],
+            "soil_family": self.family,
+            "soil": {name: float(value) for name, value in asdict(ground).items()},
+            "habits": asdict(self.habits),
+            "noise_factor": self.noise_factor,
+            "runs": [asdict(run) for run in self.trial.runs],
+            "chain": asdict(self.trial.chain),
+            "rig": asdict(self.trial.world.rig),
+        }
+
+
+def drawn(number: int, seed: int, assignment: Assignment) -> Case:
+    """A case from its seed. Campaigns are drawn until the effect shows as wanted, or the best of them is taken."""
+    rng = np.random.default_rng(seed)
+    wanted = detect.LIMIT * LEVELS.get(assignment.level, 0.0)
+    best: Case | None = None
+    for _ in range(ATTEMPTS if assignment.effects else 1):
+        case = _attempt(number, seed, assignment, wanted, rng)
+        if best is None or min(case.single, default=0.0) > min(best.single, default=0.0):
+            best = case
+        if min(best.single, default=wanted) > 0.9 * wanted:
+            break
+    assert best is not None
+    return _judged(best, rng)
+
+
+def _attempt(
+    number: int, seed: int, assignment: Assignment, wanted: float, rng: np.random.Generator
+) -> Case:
+    habits = campaign.habits_drawn(rng, _fixed(assignment))
+    family, trial = _trial(habits, rng)
+    detector = Detector(trial)
+    facts = detector.facts()
+    made = [(LISTED | UNLISTED)[name].drawn(rng, facts) for name in assignment.effects]
+    fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
+    effects = tuple(effect for effect, _ in fitted)
+    return Case(
+        number=number,
+        seed=seed,
+        assignment=assignment,
+        family=family,
+        habits=habits,
+        trial=replace(trial, world=replace(trial.world, effects=effects)),
+        noise_factor=noise_factor(not effects, rng),
+        detectability=detector.detectability(effects) if effects else 0.0,
+        single=tuple(found for _, found in fitted),
+        inseparable={},
+        oracle_variance={},
+    )
+
+
+def _fixed(assignment: Assignment) -> campaign.Habits:
+    fixed: dict[str, Any] = dict(assignment.without)
+    return campaign.Habits(**fixed)
+
+
+def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Trial]:
+    """Soil, rig, knowledge, sensors and campaign, in this order; campaigns that would bog the wheel are not driven."""
+    while True:
+        family, ground = knowledge.ground_drawn(rng)
+        rig = knowledge.rig_drawn(rng)
+        runs = campaign.campaign(rig, ground, habits, rng)
+        heaviest = max(run.weight for run in runs)
+        if (
+            min(run.weight for run in runs) >= 4.0
+            and heaviest <= HEAVIEST
+            and campaign.deepest(rig, ground, heaviest) < 1.15
+        ):
+            break
+    known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
+    rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
+    return family, Trial(World(rig, ground), known, knowledge.chain_drawn(known, rng), runs)
+
+
+def noise_factor(nothing: bool, rng: np.random.Generator) -> float:
+    """Stated noise over true."""
+    return float(rng.choice((0.5, 2.0))) if rng.random() < WRONG_NOISE[nothing] else 1.0
+
+
+def _judged(case: Case, rng: np.random.Generator) -> Case:
+    """With the oracle's error, and the rivals that this campaign cannot tell from a single listed effect."""
+    detector = Detector(case.trial)
+    added = detector.refit_variance(case.effects)
+    unit = {"current": case.trial.known.torque_constant.value**2}
+    variance = {CHANNELS[name]: unit.get(name, 1.0) * value for name, value in added.items()}
+    rivals = _rivals(case, detector, rng) if case.assignment.stratum in COMPARED else {}
+    return replace(case, oracle_variance=variance, inseparable=rivals)
+
+
+def _rivals(case: Case, detector: Detector, rng: np.random.Generator) -> dict[str, float]:
+    change = detector.change(case.effects)
+    left = {
+        name: detector.beside(change, detector.rivals(rival, rng))
+        for name, rival in LISTED.items()
+        if name != case.effects[0].name
+    }
+    return {name: d for name, d in left.items() if d < detect.NEAR}

@@ -1,0 +1,127 @@
+"""`gritd prove`: blind trials of the diagnosis, sealed, scored, resumable, on this computer or on a cluster."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.progress import Progress
+from gritd.tools.cli.workers import workers
+from gritd.tools.proof.blind import batch, page, score, tables, trial
+from gritd.tools.proof.blind.strata import STRATA
+from gritd.tools.proof.blind.verdicts import Row, row
+
+SCORE, PAGE, SEALS = "score.json", "score.html", "seals.txt"
+OUTPUT = Path("proof")
+
+
+def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int:
+    """Run the trials, open the answers, print the score; 1 where a diagnosis failed. Raises CommandError."""
+    arguments = _parser().parse_args(argv)
+    output: Path = arguments.output
+    begun = batch.resumed(output) if arguments.resume else _started(arguments)
+    print(
+        f"{begun.cases} cases in {output}; sealed before any diagnosis, SHA-256 {begun.sealed}",
+        flush=True,
+    )
+    specs = begun.specs(arguments.keep, diagnose)
+    _run(specs, arguments, output / SEALS)
+    if arguments.seal_only:
+        print(f"all sealed, {output / SEALS}; go on with: gritd prove --resume --output {output}")
+        return DONE
+    rows = [row(spec) for spec in specs]
+    _tell(rows, begun, output)
+    return FAILED if any(each.verdict == "failed" for each in rows) else DONE
+
+
+def _started(arguments: argparse.Namespace) -> batch.Batch:
+    chosen = _strata(arguments.strata)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    return batch.started(arguments.output, arguments.cases, chosen, arguments.seed)
+
+
+def _strata(text: str) -> tuple[str, ...]:
+    chosen = tuple(text.split(",")) if text else STRATA
+    unknown = [name for name in chosen if name not in STRATA]
+    if unknown:
+        raise CommandError(
+            f"--strata {text}: found '{unknown[0]}'; expected some of {','.join(STRATA)}", USAGE
+        )
+    return chosen
+
+
+def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path) -> None:
+    left = sum(not spec.done for spec in specs)
+    told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
+    with (
+        seals.open("a", encoding="utf-8") as published,
+        workers(arguments.jobs, arguments.scheduler) as (executor, width),
+        Progress("cases", left) as progress,
+    ):
+
+        def sealed(spec: trial.Spec, digest: str) -> None:
+            if digest not in told:
+                published.write(f"{spec.name} {digest}\n")
+                published.flush()
+
+        batch.run(
+            specs,
+            executor,
+            width,
+            sealed,
+            lambda _: progress.advance(),
+            diagnosed=not arguments.seal_only,
+        )
+
+
+def _tell(rows: Sequence[Row], begun: batch.Batch, output: Path) -> None:
+    counted = score.score(rows)
+    (output / SCORE).write_text(
+        json.dumps(counted, indent=1, ensure_ascii=False, allow_nan=False), encoding="utf-8"
+    )
+    (output / PAGE).write_text(page.page(counted, rows, begun.sealed), encoding="utf-8")
+    print(f"answers opened: all {len(rows)} are as sealed; they were drawn from {begun.secret}\n")
+    print(tables.text(counted, rows))
+    print(f"\n{output / SCORE}, {output / PAGE}")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="gritd prove",
+        description="Blind trials: an independent plant conceals, `gritd diagnose` names.",
+    )
+    parser.add_argument("--cases", type=_positive, default=60, metavar="N", help="default 60")
+    parser.add_argument(
+        "--seed", type=int, help="for a batch that can be repeated; default: nobody can foretell it"
+    )
+    parser.add_argument(
+        "--jobs", type=_positive, default=os.cpu_count() or 1, metavar="J", help="cases at a time"
+    )
+    parser.add_argument(
+        "--strata", default="", metavar="A,B", help=f"some of {','.join(STRATA)}; default: all"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=OUTPUT, metavar="DIR", help=f"default {OUTPUT}"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on with the batch in DIR")
+    parser.add_argument(
+        "--seal-only",
+        action="store_true",
+        help="draw and seal all cases; diagnose them later with --resume",
+    )
+    parser.add_argument("--keep", action="store_true", help="keep the recordings, about 1 MB a run")
+    parser.add_argument(
+        "--scheduler", metavar="tcp://…", help="a dask scheduler whose workers see DIR"
+    )
+    return parser
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"found {text}; expected 1 or more")
+    return value

@@ -1,0 +1,82 @@
+"""The shape of a concealed effect. Each acts where its physics acts; off, at strength 0, it changes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from gritd.tools.proof.blind.plant.contact import Ground, Rim
+from gritd.tools.proof.blind.plant.quadrature import Array
+from gritd.tools.proof.blind.plant.scene import Felt, Motion, Scene
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What shapes are drawn by: how far, how long, how heavy, how fast the campaign is, typically."""
+
+    duration: float  # of a run [s]
+    length: float  # of the bed used [m]
+    radius: float  # [m]
+    weight: float  # [N]
+    omega: float  # [rad/s]
+    torque: float  # [N·m]
+    current: float  # [A]
+    sinkage: float  # [m]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect of one strength; subclasses add shapes as fields, with their draw.
+
+    `most` is the largest strength still plausible on a testbed; `signed` says that it may have either sign.
+    """
+
+    strength: float
+
+    name: ClassVar[str] = ""
+    signed: ClassVar[bool] = False
+    most: ClassVar[float] = 1.0
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        """At the largest plausible strength, sign and shapes drawn."""
+        return cls(cls.most * cls.sign(rng))
+
+    @classmethod
+    def sign(cls, rng: np.random.Generator) -> float:
+        return float(rng.choice((-1.0, 1.0))) if cls.signed else 1.0
+
+    def radius(self, radius: Array, motion: Motion) -> Array:
+        """Radius below the axle."""
+        return radius
+
+    def soil(self, ground: Ground, scene: Scene) -> Ground:
+        return ground
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        return rim
+
+    def carried(self, weight: Array, scene: Scene) -> Array:
+        """Load on the soil. `scene.sinkage` is that of the round before, or empty."""
+        return weight
+
+    def forces(self, scene: Scene) -> Scene:
+        """After the soil: torque, pull, carried, sinkage of the scene, in the bed's frame."""
+        return scene
+
+    def loss(self, scene: Scene) -> Array | float:
+        """Torque that the drivetrain or the wheel's own body takes, at the axle."""
+        return 0.0
+
+    def drawn_current(self, current: Array, scene: Scene) -> Array:
+        """True current of the motor from that of an ideal one."""
+        return current
+
+    def sensed(self, felt: Felt) -> Felt:
+        return felt
+
+    def coinciding(self) -> dict[str, float]:
+        """Parameters that `gritd` states in the same terms, by its names; SI."""
+        return {}

@@ -1,0 +1,129 @@
+"""One trial: draw and seal the answers, hand over recordings and configuration, have them diagnosed elsewhere."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gritd.tools.proof.blind import cases, handover, seal
+from gritd.tools.proof.blind.strata import Assignment
+
+ROOT = Path(__file__).resolve().parents[3]
+DIAGNOSE = (sys.executable, "-m", "gritd", "diagnose")
+PATIENCE = 1200.0  # [s] after which a diagnosis is given up and counts as failed
+OUTCOME = "outcome.json"
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What a worker needs to know. The folder must be one that all workers see."""
+
+    number: int
+    seed: int
+    assignment: Assignment
+    output: str
+    keep: bool = False  # the recordings, after the diagnosis
+    diagnose: tuple[str, ...] = DIAGNOSE
+
+    @property
+    def name(self) -> str:
+        return f"case-{self.number:04d}"
+
+    @property
+    def folder(self) -> Path:
+        return Path(self.output) / "cases" / self.name
+
+    @property
+    def answers(self) -> Path:
+        return Path(self.output) / "answers" / f"{self.name}.json"
+
+    @property
+    def seal(self) -> Path:
+        return self.folder / "seal.txt"
+
+    @property
+    def done(self) -> bool:
+        return (self.folder / OUTCOME).exists()
+
+
+def prepare(spec: Spec) -> str:
+    """Draw the case, write what is handed over, seal the answers; returns the seal. A finished step is not redone."""
+    if spec.seal.exists():
+        return spec.seal.read_text(encoding="utf-8").strip()
+    shutil.rmtree(spec.folder, ignore_errors=True)
+    case = cases.drawn(spec.number, spec.seed, spec.assignment)
+    handover.write(case, spec.folder / "given")
+    sealed = seal.close(spec.answers, case.answers(), _truth(spec, case))
+    spec.seal.write_text(sealed + "\n", encoding="utf-8")
+    return sealed
+
+
+def _truth(spec: Spec, case: cases.Case) -> dict[str, str]:
+    """The noiseless channels, beside the answers; hashes by file name."""
+    spec.answers.parent.mkdir(parents=True, exist_ok=True)
+    found = {}
+    for number in range(len(case.trial.runs)):
+        path = spec.answers.with_name(f"{spec.name}.run-{number + 1}.npz")
+        np.savez_compressed(path, **handover.truth(case, number))  # type: ignore[arg-type]
+        found[path.name] = seal.sha256(path)
+    return found
+
+
+def diagnose(spec: Spec) -> dict[str, Any]:
+    """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed over."""
+    given, result = spec.folder / "given", spec.folder / "result.json"
+    files = sorted(path.name for path in given.glob("*.mcap"))
+    command = [
+        *spec.diagnose,
+        *files,
+        "--config",
+        handover.CONFIGURATION,
+        "--json",
+        str(result.resolve()),
+    ]
+    command += ["--jobs", "1"]  # cases run side by side
+    began = time.monotonic()
+    code, said = _run(command, given)
+    outcome = {"code": code, "seconds": time.monotonic() - began, "said": said[-2000:]}
+    (spec.folder / OUTCOME).write_text(json.dumps(outcome, indent=1), encoding="utf-8")
+    if not spec.keep:
+        for name in files:
+            (given / name).unlink()
+    return outcome
+
+
+def _run(command: list[str], folder: Path) -> tuple[int, str]:
+    """Exit code and what was said on standard error; -1 after PATIENCE."""
+    try:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return -1, f"no answer within {PATIENCE:g} s"
+    return done.returncode, done.stderr
+
+
+def _environment() -> dict[str, str]:
+    """Nothing of ours but where the code is; one thread for linear algebra, for cases run side by side."""
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name in ("PATH", "HOME", "LANG", "TMPDIR")
+    }
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    return kept | threads | {"PYTHONPATH": str(ROOT)}

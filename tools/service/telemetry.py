@@ -1,0 +1,95 @@
+"""What the running daemon tells of itself: the mapping that goes out on its status socket, in SI units."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from gritd.drivers.queue import ReadingQueue
+from gritd.drivers.reader import Reader
+from gritd.estimator.daemon.daemon import Daemon
+from gritd.estimator.messages.record import CHANNEL_BITS, TICK_NAMES, Flag, Status
+
+Report = dict[str, Any]
+
+LOG = ("state", "error", "accepted", "written", "dropped", "queued")  # of WriterStatus
+
+
+class Reporter:
+    """Makes reports of one daemon; called by the publisher's thread, ten times a second at most."""
+
+    def __init__(
+        self, daemon: Daemon, readers: Sequence[Reader], queue: ReadingQueue, notice: str
+    ) -> None:
+        self._daemon, self._readers, self._queue, self._notice = daemon, readers, queue, notice
+        self._began = time.monotonic()
+        self._rates: dict[
+            str, tuple[float, int, float]
+        ] = {}  # device -> when, readings then, rate before
+
+    def __call__(self) -> Report:
+        daemon = self._daemon
+        log, disagreement = daemon.writer.status(), daemon.model.present
+        return {
+            "pid": os.getpid(),
+            "uptime": time.monotonic() - self._began,
+            "healthy": not daemon.health,
+            "hanging": daemon.health,
+            "real_time": self._notice or "yes",
+            "configuration": daemon.configuration.source,
+            **_tick(daemon),
+            "disagreement": disagreement and disagreement._asdict(),
+            "queue": self._queue.counts()._asdict(),
+            "devices": {reader.device: self._device(reader) for reader in self._readers},
+            "log": {
+                **{name: getattr(log, name) for name in LOG},
+                "files": len(log.files),
+                "file": str(log.files[-1]),
+            },
+        }
+
+    def _device(self, reader: Reader) -> Report:
+        stats = asdict(reader.stats())
+        stats["silent_for"] = (self._daemon.clock.now() - stats.pop("last_received")) * 1e-9
+        stats["rate"] = self._rate(stats["device"], stats["readings"])
+        return stats
+
+    def _rate(self, device: str, readings: int) -> float:
+        """Readings a second, over the last second or more."""
+        now = time.monotonic()
+        when, before, rate = self._rates.get(device, (self._began, 0, 0.0))
+        if now - when >= 1.0:
+            rate = (readings - before) / (now - when)
+            self._rates[device] = (now, readings, rate)
+        return rate
+
+
+def _tick(daemon: Daemon) -> Report:
+    """The latest tick and what the loop says of it; empty before the first."""
+    loop = {"ticks": daemon.loop.ticks, **daemon.loop.lateness()}
+    if daemon.loop.latest is None:
+        return {"status": "STARTING", "flags": [], "tick": {}, "loop": loop, "channels": {}}
+    tick, record = daemon.loop.latest
+    fields = dict(zip(TICK_NAMES, tick, strict=True))
+    return {
+        "status": Status(int(fields["status"])).name,
+        "flags": [flag.name for flag in Flag if flag and int(fields["flags"]) & flag],
+        "channels": {name: _condition(fields, bit) for name, bit in _channels(daemon).items()},
+        "tick": fields,
+        "loop": {**record._asdict(), **loop},
+    }
+
+
+def _channels(daemon: Daemon) -> dict[str, int]:
+    settings = daemon.configuration.settings
+    used = {*settings.channels, *(("wrench",) if settings.wrench else ())}
+    return {name: bit for name, bit in CHANNEL_BITS.items() if name in used}
+
+
+def _condition(fields: dict[str, float], bit: int) -> str:
+    return (
+        "stale" if int(fields["stale"]) & bit else "stuck" if int(fields["stuck"]) & bit else "ok"
+    )

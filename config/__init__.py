@@ -1,4 +1,6 @@
-"""Packaged defaults: the testbed's configuration, its CAN database, the service unit and the udev rules."""
+"""Packaged defaults: the testbed's configuration, its CAN database, the service unit and the udev
+rules.
+"""
 
 from gritd.config.files import packaged
 

@@ -1,4 +1,6 @@
-"""A CAN bus through python-can: socketcan in production; slcan, udp_multicast or virtual without such hardware."""
+"""A CAN bus through python-can: socketcan in production; slcan, udp_multicast or virtual without
+such hardware.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,8 @@ from gritd.drivers.link import POLL, Chunk, Clock
 from gritd.estimator.config.settings import Device
 
 LONGEST_LINE = 4096  # [bytes] of slcan; a message takes 32
-RECEIVE_BUFFER = (
-    1 << 20
-)  # [bytes] asked of the kernel, so that a burst waits there instead of being lost
+# [bytes] asked of the kernel, so that a burst waits there instead of being lost
+RECEIVE_BUFFER = 1 << 20
 
 # Options an interface needs to be safe or prompt; the configuration's `options` win.
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -30,7 +31,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
 
 
 class CanLink:
-    """Messages of the wanted ids only: the filters are given to the bus, which gives them to kernel or hardware.
+    """Messages of the wanted ids only: the filters are given to the bus, which gives them to kernel
+    or hardware.
 
     filters: as python-can takes them, from CanFraming.filters().
     """
@@ -109,10 +111,11 @@ class CanLink:
 
 
 def packed(message: can.Message) -> bytes:
-    """The message as a chunk of CanFraming. Raises struct.error, TypeError or ValueError if it is none."""
-    flags = (
-        EXTENDED if message.is_extended_id else 0
-    )  # a hostile message has anything in the place of a flag
+    """The message as a chunk of CanFraming. Raises struct.error, TypeError or ValueError if it is
+    none.
+    """
+    # a hostile message has anything in the place of a flag
+    flags = EXTENDED if message.is_extended_id else 0
     flags |= REMOTE if message.is_remote_frame else 0
     flags |= ERROR if message.is_error_frame else 0
     data = bytes(message.data)

@@ -1,4 +1,6 @@
-"""Where the signals of a CAN bus lie in its messages: a DBC file, or inline definitions. One database for both."""
+"""Where the signals of a CAN bus lie in its messages: a DBC file, or inline definitions. One
+database for both.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ INLINE_KEYS = tuple(_RULES)
 
 
 def database(device: Device) -> Database:
-    """The message database of a CAN device. Raises DeviceSettingsError where file or definitions are wrong."""
+    """The message database of a CAN device. Raises DeviceSettingsError where file or definitions
+    are wrong.
+    """
     if device.dbc and device.signals:
         raise DeviceSettingsError(
             f"device {device.name}", "both dbc and signals are given, expected one of them"

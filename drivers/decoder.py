@@ -1,4 +1,6 @@
-"""Chunks of one device in, readings out: framing, device clock, sensors. No thread, no hardware, no clock."""
+"""Chunks of one device in, readings out: framing, device clock, sensors. No thread, no hardware, no
+clock.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ class Decoder:
         self._last: dict[str, tuple[int, int | None]] = {}
 
     def decode(self, received: int, data: bytes) -> list[Reading]:
-        """The readings completed by a chunk that came at `received` [ns]. Never raises on any bytes."""
+        """The readings completed by a chunk that came at `received` [ns]. Never raises on any
+        bytes.
+        """
         frames = [frame for frame in self.framing.decode(data) if self._is_wanted(frame)]
         stamps = self._stamps(frames, received)
         readings = []
@@ -59,7 +63,9 @@ class Decoder:
         return not twice
 
     def _stamps(self, frames: Sequence[Frame], received: int) -> list[int]:
-        """When each frame's sample was taken: by the device's clock where it sends one, else the receive time."""
+        """When each frame's sample was taken: by the device's clock where it sends one, else the
+        receive time.
+        """
         stamps = [received] * len(frames)
         timed = [
             (self.framing.clock(f.key), i) for i, f in enumerate(frames) if f.device_us is not None

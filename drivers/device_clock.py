@@ -1,13 +1,15 @@
-"""A device's wrapping microsecond clock mapped to ours, so that batching on the way is not read as speed.
+"""A device's wrapping microsecond clock mapped to ours, so that batching on the way is not read as
+speed.
 
-Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms, schedulers add more. The
-difference receive time − device time is therefore a line (offset and drift between two crystals) plus a positive
-delay, and the line is its lower envelope. A sliding window keeps the smallest difference of each block of time; the
-edge of their lower convex hull over the middle of the window gives the drift, and the line is pushed down until it
-touches the lowest point.
+Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms,
+schedulers add more. The difference receive time − device time is therefore a line (offset and drift
+between two crystals) plus a positive delay, and the line is its lower envelope. A sliding window
+keeps the smallest difference of each block of time; the edge of their lower convex hull over the
+middle of the window gives the drift, and the line is pushed down until it touches the lowest point.
 
-S. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, IEEE INFOCOM
-1999, Eq. (4): the line under all points that is closest to them is that edge of the hull.
+S. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay
+measurements, IEEE INFOCOM 1999, Eq. (4): the line under all points that is closest to them is that
+edge of the hull.
 """
 
 from __future__ import annotations
@@ -30,8 +32,8 @@ RESET_STEP = 500_000_000  # [ns] a device clock going back by this much, or forw
 class DeviceClock:
     """Stamps for the frames of one device clock that wraps at `modulus_us` µs.
 
-    A stamp is never later than the receive time and grows with the device time. What remains is the smallest delay of
-    the last 20 s, a constant that belongs into the channel's latency.
+    A stamp is never later than the receive time and grows with the device time. What remains is the
+    smallest delay of the last 20 s, a constant that belongs into the channel's latency.
     """
 
     _newest: int  # latest device time [ns], unwrapped
@@ -50,7 +52,8 @@ class DeviceClock:
         self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
 
     def stamps(self, device_us: Sequence[int], received: int) -> list[int]:
-        """When the samples of one chunk were taken [ns, our clock]; `received` [ns] is when the chunk came.
+        """When the samples of one chunk were taken [ns, our clock]; `received` [ns] is when the
+        chunk came.
 
         The whole chunk is looked at before any of it is stamped: its last frame waited least.
         """
@@ -78,8 +81,9 @@ class DeviceClock:
         return [self._stamp(time, received, end) for time in times]
 
     def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
-        """Device time and stamp of the chunk's newest sample where its oldest new one would be stamped before the last
-        chunk's: the line was pushed down below that."""
+        """Device time and stamp of the chunk's newest sample where its oldest new one would be
+        stamped before the last chunk's: the line was pushed down below that.
+        """
         last = self._last
         fresh = [time for time in times if last is not None and time > last[0]]
         if last is None or not fresh or self._mapped(min(fresh), received) > last[1]:
@@ -87,7 +91,9 @@ class DeviceClock:
         return max(fresh), self._mapped(max(fresh), received)
 
     def _unwrap(self, wrapped: int, received: int) -> int:
-        """Device time without wraps [ns]: the turn of the clock nearest to where our own clock expects it."""
+        """Device time without wraps [ns]: the turn of the clock nearest to where our own clock
+        expects it.
+        """
         if not self._started:
             self._start(wrapped, received)
         expected = self._newest + received - self._newest_received
@@ -148,12 +154,16 @@ class DeviceClock:
 
 
 def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
-    """A stamp between the last one and that of the chunk's newest sample, evenly: no sample may look like a jump."""
+    """A stamp between the last one and that of the chunk's newest sample, evenly: no sample may
+    look like a jump.
+    """
     return last[1] + (end[1] - last[1]) * (time - last[0]) // (end[0] - last[0])
 
 
 def hull_slope(points: Sequence[Point]) -> float:
-    """Slope of the lower convex hull's edge over the mean abscissa; points sorted by abscissa, two or more."""
+    """Slope of the lower convex hull's edge over the mean abscissa; points sorted by abscissa, two
+    or more.
+    """
     hull: list[Point] = []
     for point in points:
         while len(hull) >= 2 and _turns_down(hull[-2], hull[-1], point):

@@ -13,7 +13,9 @@ class DeviceError(Exception):
 
 
 class DeviceSettingsError(ValueError):
-    """The configuration of a device or of a channel cannot work. One line: where, and what was expected."""
+    """The configuration of a device or of a channel cannot work. One line: where, and what was
+    expected.
+    """
 
     def __init__(self, where: str, reason: object) -> None:
         super().__init__(f"{where}: {one_line(reason)}")

@@ -1,6 +1,7 @@
 """What every framing shares: the frame, its counters, and the interface of a decoder.
 
-A framing is fed chunks of any size, keeps at most a bounded remainder, and never raises on any input.
+A framing is fed chunks of any size, keeps at most a bounded remainder, and never raises on any
+input.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class Frame(NamedTuple):
 
 @dataclass
 class Counts:
-    """Since the framing was created. Every byte fed in is in a good frame, in garbage, or still pending."""
+    """Since the framing was created. Every byte fed in is in a good frame, in garbage, or still
+    pending.
+    """
 
     good: int = 0  # frames decoded
     bad: int = 0  # frames delimited, but of wrong checksum or content
@@ -53,7 +56,8 @@ class Framing(Protocol):
     def clock(self, key: str) -> tuple[str, int]:
         """Which clock stamps the frames of this key, and at how many µs it wraps.
 
-        All keys of a serial device share one; on a CAN bus every message may come from another node.
+        All keys of a serial device share one; on a CAN bus every message may come from another
+        node.
         """
         ...
 

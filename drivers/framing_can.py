@@ -1,10 +1,13 @@
 """CAN messages as frames: signals picked by name from a message database.
 
-A chunk holds whole messages, each packed as `u32 id and flags | u8 length | 3 bytes zero | data` (the head of Linux'
-can_frame), so that a recorded CAN bus and a recorded serial port are the same kind of log.
+A chunk holds whole messages, each packed as `u32 id and flags | u8 length | 3 bytes zero | data`
+(the head of Linux' can_frame), so that a recorded CAN bus and a recorded serial port are the same
+kind of log.
 
-A wanted key is `Message.Signal` (one value) or `Message` (all its data signals in the order of their start bits).
-Three signal names are not data: `Sequence` or `Cycle` is the message counter, `DeviceTime` the node's clock [µs].
+A wanted key is `Message.Signal` (one value) or `Message` (all its data signals in the order of
+their start bits).
+Three signal names are not data: `Sequence` or `Cycle` is the message counter, `DeviceTime` the
+    node's clock [µs].
 """
 
 from __future__ import annotations
@@ -31,7 +34,9 @@ DEVICE_TIME = "devicetime"
 
 
 def pack(can_id: int, data: bytes) -> bytes:
-    """One message as a chunk. can_id carries the flags EXTENDED, REMOTE, ERROR. Raises struct.error out of range."""
+    """One message as a chunk. can_id carries the flags EXTENDED, REMOTE, ERROR. Raises struct.error
+    out of range.
+    """
     return _HEAD.pack(can_id, len(data)) + data
 
 
@@ -54,7 +59,8 @@ class _Wanted:
 
 
 class CanFraming:
-    """Decoder of packed CAN messages. `keys` are the wanted ones; other messages are ignored, uncounted.
+    """Decoder of packed CAN messages. `keys` are the wanted ones; other messages are ignored,
+    uncounted.
 
     Raises DeviceSettingsError for a key that the database does not hold.
     """

@@ -27,7 +27,9 @@ class Link(Protocol):
         ...
 
     def read(self) -> Chunk | None:
-        """What came, or None after POLL of silence. Raises DeviceError, or EOFError where a recording ends."""
+        """What came, or None after POLL of silence. Raises DeviceError, or EOFError where a
+        recording ends.
+        """
         ...
 
     def close(self) -> None:

@@ -43,7 +43,8 @@ class ReaderStats:
 class Reader:
     """Reads one device into the queue until it is stopped.
 
-    tap, if given, is called with (received [ns], bytes) of every chunk before it is decoded: a wire log.
+    tap, if given, is called with (received [ns], bytes) of every chunk before it is decoded: a wire
+    log.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """Recorded input in the place of hardware: the chunks of a wire log, or readings of an earlier run.
 
-Paced in real time, an item is due as long after the first one as it was when recorded. Unpaced, everything comes at
-once and keeps its recorded times, so that a test of an hour takes seconds.
+Paced in real time, an item is due as long after the first one as it was when recorded. Unpaced,
+everything comes at once and keeps its recorded times, so that a test of an hour takes seconds.
 """
 
 from __future__ import annotations

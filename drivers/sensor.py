@@ -1,7 +1,7 @@
 """What a sensor kind is: a class that turns the raw values of its frames into one validated value.
 
-A kind is one file in `drivers/sensors/` with one subclass of Sensor. A value that cannot be right is counted as
-quarantined and not passed on; nothing is ever put in its place.
+A kind is one file in `drivers/sensors/` with one subclass of Sensor. A value that cannot be right
+is counted as quarantined and not passed on; nothing is ever put in its place.
 """
 
 from __future__ import annotations
@@ -56,9 +56,11 @@ class Sensor(ABC):
 
 
 class Encoder(Sensor):
-    """An incremental encoder: a counter of `bits` width that wraps both ways, unwrapped to an exact integer.
+    """An incremental encoder: a counter of `bits` width that wraps both ways, unwrapped to an exact
+    integer.
 
-    The first count is taken as read. After a reset of the device the total goes on from where it was.
+    The first count is taken as read. After a reset of the device the total goes on from where it
+    was.
     """
 
     def __init__(self, settings: Channel) -> None:
@@ -99,7 +101,9 @@ class Encoder(Sensor):
 
 
 class Analog(Sensor):
-    """A converter's reading as a float; NaN, infinity and what lies outside [low, high] are refused."""
+    """A converter's reading as a float; NaN, infinity and what lies outside [low, high] are
+    refused.
+    """
 
     def __init__(self, settings: Channel) -> None:
         super().__init__(settings.signal)

@@ -21,7 +21,9 @@ _FAILURES = (
 
 
 class SerialLink:
-    """Reads whatever is there, as soon as there is something. The port is locked against a second reader."""
+    """Reads whatever is there, as soon as there is something. The port is locked against a second
+    reader.
+    """
 
     def __init__(self, device: str, port: str, baud: int, clock: Clock) -> None:
         self.damaged = 0

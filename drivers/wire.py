@@ -1,4 +1,6 @@
-"""The sending end, for a simulated testbed: the bytes that a device of this configuration would send."""
+"""The sending end, for a simulated testbed: the bytes that a device of this configuration would
+send.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ class SerialWire:
         self._sequence = 0
 
     def encode(self, key: str, values: Sequence[FieldValue], device_us: int | None = None) -> bytes:
-        """The bytes of one frame; device_us [µs] may run past its wrap. Counters must have wrapped already."""
+        """The bytes of one frame; device_us [µs] may run past its wrap. Counters must have wrapped
+        already.
+        """
         wrapped = None if device_us is None else device_us % framing_cobs.CLOCK_MODULUS
         frame = Frame(key, self._sequence, wrapped, tuple(values))
         self._sequence = (self._sequence + 1) % framing_cobs.SEQUENCE_MODULUS
@@ -43,8 +47,8 @@ class CanWire:
     ) -> can.Message:
         """The message of a key, `Message` or `Message.Signal`; signals that are not given are 0.
 
-        A value outside the signal's stated range is sent all the same: a broken sensor does so. Raises an error of
-        cantools or bitstruct if it does not fit the bits.
+        A value outside the signal's stated range is sent all the same: a broken sensor does so.
+        Raises an error of cantools or bitstruct if it does not fit the bits.
         """
         name, _, signal = key.partition(".")
         message = self._database.get_message_by_name(name)

@@ -1,7 +1,8 @@
 """A recorded wire: the chunks of one device with the time each came, before any decoding.
 
-File: the line `gritd wire 1`, then records `i64 received [ns] | u32 length | bytes`, little-endian. A CAN bus is
-recorded in the packing of framing_can. A log cut anywhere gives the records before the cut.
+File: the line `gritd wire 1`, then records `i64 received [ns] | u32 length | bytes`, little-endian.
+A CAN bus is recorded in the packing of framing_can. A log cut anywhere gives the records before the
+cut.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ class WireWriter:
 
 
 def read_wire(path: str | Path) -> Iterator[Chunk]:
-    """The chunks of a log, up to its end or its first damaged record. Raises DeviceSettingsError if it is no log."""
+    """The chunks of a log, up to its end or its first damaged record. Raises DeviceSettingsError if
+    it is no log.
+    """
     try:
         file = open(path, "rb")  # noqa: SIM115 - closed below
     except OSError as error:

@@ -21,8 +21,10 @@ def assert_jacobian(
 ) -> None:
     """Compare `jacobian`, of shape (len(f), len(x)), with central differences of f at x.
 
-    step: one for all entries of x or one each; the differences are fourth-order, so their error is of order step⁴.
-    rtol: relative to the largest entry of each row scaled by `step`, i.e. to the largest change f makes in one step.
+    step: one for all entries of x or one each; the differences are fourth-order, so their error is
+        of order step⁴.
+    rtol: relative to the largest entry of each row scaled by `step`, i.e. to the largest change f
+        makes in one step.
     """
     point = np.asarray(x, dtype=float)
     steps = np.broadcast_to(np.asarray(step, dtype=float), point.shape)

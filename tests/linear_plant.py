@@ -1,4 +1,6 @@
-"""A wheel that obeys the linear model exactly: readings of a schedule of loads and slips, for tests of the filter."""
+"""A wheel that obeys the linear model exactly: readings of a schedule of loads and slips, for tests
+of the filter.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def entry_angle(settings, truth, load, slip):
 
 
 def readings(settings, truth, schedule, *, seed, rate=50):
-    """Yield, every tick of 0.1 s, its time [ns] and its readings. truth = (c, tan φ, k); `rate` readings a second."""
+    """Yield, every tick of 0.1 s, its time [ns] and its readings. truth = (c, tan φ, k); `rate`
+    readings a second.
+    """
     rng = np.random.default_rng(seed)
     wheel, clock, turned, travelled = settings.wheel, 0.0, 0.0, 0.0
     tick, batch = START + NS // 10, []
@@ -47,9 +51,8 @@ def readings(settings, truth, schedule, *, seed, rate=50):
         current = forces.torque / settings.drive.torque_constant.value
         amplifier = (current - shunt.offset.value) / shunt.scale.value
         for _ in range(round(duration * rate)):
-            step = (
-                rng.uniform(0.8, 1.2) / rate
-            )  # no testbed samples exactly evenly; the stamps are right
+            # no testbed samples exactly evenly; the stamps are right
+            step = rng.uniform(0.8, 1.2) / rate
             clock += step
             turned += OMEGA * step
             travelled += OMEGA * wheel.radius * (1.0 - slip) * step

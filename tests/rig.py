@@ -84,7 +84,9 @@ def readings_of(
     frozen=("", 0.0),
     seed=0,
 ):
-    """Readings of steady motion at 250 Hz a channel, received when sampled. frozen = (channel, from second)."""
+    """Readings of steady motion at 250 Hz a channel, received when sampled. frozen = (channel, from
+    second).
+    """
     rng = np.random.default_rng(seed)
     steps = round(seconds * 250)
     scatter = rng.normal(size=(steps, 2)) * (2e-3 if noise else 0.0)

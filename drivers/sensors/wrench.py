@@ -16,8 +16,9 @@ FORCES = 3  # fx fy fz come before tx ty tz
 class Wrench(Sensor):
     """fx fy fz [N], tx ty tz [N·m], from one frame or from several of the same cycle.
 
-    `signal` names the frames, joined by `+`, in the order in which their values make up the six. Frames belong
-    together if they carry the same sequence number; a cycle with a missing frame is dropped and counted.
+    `signal` names the frames, joined by `+`, in the order in which their values make up the six.
+    Frames belong together if they carry the same sequence number; a cycle with a missing frame is
+    dropped and counted.
     """
 
     channel = "wrench"

@@ -1,6 +1,8 @@
-"""The configuration file: strict YAML to `Settings`, with the effective text that is saved beside every run.
+"""The configuration file: strict YAML to `Settings`, with the effective text that is saved beside
+every run.
 
-An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in table.py.
+An error is one line, `FILE:LINE: key.path: found …; expected …`. The format itself stands in
+table.py.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ class Configuration:
     """What a configuration file says.
 
     settings: typed, SI.
-    text:     the effective YAML: every default filled in, units as written; loading it gives the same settings.
+    text:     the effective YAML: every default filled in, units as written; loading it gives the
+        same settings.
     source:   the file's name, for messages.
     run:      the `run` section, with its defaults where the file has none.
     """
@@ -47,7 +50,8 @@ def loads(
     folder: Path | None = None,
     effect_schema: EffectSchema | None = quantities,
 ) -> Configuration:
-    """Read configuration text; `name` stands in messages. Without a folder a relative DBC path stays as it is.
+    """Read configuration text; `name` stands in messages. Without a folder a relative DBC path
+    stays as it is.
 
     Raises ConfigError.
     """

@@ -1,4 +1,6 @@
-"""The part of the configuration's format that says where sensors are connected: serial ports and CAN buses."""
+"""The part of the configuration's format that says where sensors are connected: serial ports and
+CAN buses.
+"""
 
 from __future__ import annotations
 

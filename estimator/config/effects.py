@@ -1,4 +1,6 @@
-"""What the configuration says of effects: how their parameters are read, and the effects as configured."""
+"""What the configuration says of effects: how their parameters are read, and the effects as
+configured.
+"""
 
 from __future__ import annotations
 

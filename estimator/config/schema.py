@@ -1,7 +1,9 @@
-"""Kinds of configuration values. Each reads a YAML node into a value and says, in words, what it expects.
+"""Kinds of configuration values. Each reads a YAML node into a value and says, in words, what it
+expects.
 
-A `Section` is a table of keys; parsing, defaults, error lines and the key reference all come from it. Reading
-returns the value and the node completed with the defaults, so that the effective configuration is a by-product.
+A `Section` is a table of keys; parsing, defaults, error lines and the key reference all come from
+it. Reading returns the value and the node completed with the defaults, so that the effective
+configuration is a by-product.
 """
 
 from __future__ import annotations
@@ -47,7 +49,9 @@ class Kind(Protocol):
 
 
 class Impossible(Exception):
-    """Values that cannot go together: which key (dotted, within the section), and what was expected of it."""
+    """Values that cannot go together: which key (dotted, within the section), and what was expected
+    of it.
+    """
 
     def __init__(self, key: str, expected: str, found: str = "") -> None:
         super().__init__(key, expected, found)
@@ -56,7 +60,9 @@ class Impossible(Exception):
 
 @dataclass(frozen=True)
 class Key:
-    """One key of a section: kind, what it means, and the default as it would be written in the file."""
+    """One key of a section: kind, what it means, and the default as it would be written in the
+    file.
+    """
 
     kind: Kind
     doc: str
@@ -65,7 +71,9 @@ class Key:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with a unit of the same kind as `unit`; a plain number where `unit` is empty; any where it is None."""
+    """A number with a unit of the same kind as `unit`; a plain number where `unit` is empty; any
+    where it is None.
+    """
 
     unit: str | None
     above: float = -math.inf
@@ -221,7 +229,9 @@ class Text:
 
 @dataclass(frozen=True)
 class FilePath:
-    """A path. A relative one counts from the folder and stands absolute in the effective configuration."""
+    """A path. A relative one counts from the folder and stands absolute in the effective
+    configuration.
+    """
 
     folder: Path | None
     expected: str = "a path"
@@ -249,7 +259,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Options:
-    """A mapping that is handed on to a library as it is: numbers, true, false, text, lists and mappings."""
+    """A mapping that is handed on to a library as it is: numbers, true, false, text, lists and
+    mappings.
+    """
 
     expected: str = "a mapping of options"
 
@@ -306,7 +318,9 @@ class Section:
 
 @dataclass(frozen=True)
 class Named:
-    """A mapping from names of the user's choosing; `build` makes a value from a name and what stands under it."""
+    """A mapping from names of the user's choosing; `build` makes a value from a name and what
+    stands under it.
+    """
 
     kind: Kind
     build: Callable[[str, Any], Any]

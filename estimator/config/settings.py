@@ -42,8 +42,8 @@ class Calibration:
 class Channel:
     """One sensor channel: where it comes from and how raw becomes physical.
 
-    Physical units: wheel_encoder rad; carriage_encoder rad of the pulley; sinkage_pot m; motor_shunt A;
-    motor_temperature K above 0 °C (°C); wrench: see Wrench.
+    Physical units: wheel_encoder rad; carriage_encoder rad of the pulley; sinkage_pot m;
+    motor_shunt A; motor_temperature K above 0 °C (°C); wrench: see Wrench.
     """
 
     name: str
@@ -63,7 +63,9 @@ class Channel:
 
 @dataclass(frozen=True)
 class Wrench:
-    """The optional force/torque sensor. fx is drawbar pull, fz vertical load, ty torque about the axle."""
+    """The optional force/torque sensor. fx is drawbar pull, fz vertical load, ty torque about the
+    axle.
+    """
 
     device: str
     signal: str

@@ -1,7 +1,8 @@
 """The format of the configuration file: every key with its kind, unit, bounds, default and meaning.
 
-Parsing, defaults, error lines and the reference in docs/configuration.md all come from these tables. A default is
-written as it would be in the file. The builders below them check what concerns several keys at once.
+Parsing, defaults, error lines and the reference in docs/configuration.md all come from these
+tables. A default is written as it would be in the file. The builders below them check what concerns
+several keys at once.
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ def _uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
     return UncertainQuantity(Quantity(unit, **bounds))
 
 
-# ---- wheel, soil, drive, load --------------------------------------------------------------------------------------
+# ---- wheel, soil, drive, load
+# --------------------------------------------------------------------------------------
 
 WHEEL = {
     "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
@@ -131,7 +133,8 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
     return Load(nominal, minimum)
 
 
-# ---- channels ------------------------------------------------------------------------------------------------------
+# ---- channels ------------------------------------------------------------------------------------
+# ------------------
 
 # channel -> raw unit, physical unit, unit of raw differences
 UNITS = {
@@ -149,7 +152,9 @@ LEAST_NOISE = 1e-9  # in every raw unit
 
 @dataclass(frozen=True)
 class Unlimited:
-    """A limit that this kind of channel cannot have. The word stands in the effective text of earlier recordings."""
+    """A limit that this kind of channel cannot have. The word stands in the effective text of
+    earlier recordings.
+    """
 
     value: Any
     reason: str
@@ -285,7 +290,8 @@ CHANNEL_DOCS = {
     "motor_temperature": "degrees Celsius of the winding",
 }
 
-# ---- rates, filter, logging, effects, run --------------------------------------------------------------------------
+# ---- rates, filter, logging, effects, run
+# --------------------------------------------------------------------------
 
 RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
@@ -363,7 +369,9 @@ def _rates(tick: float, update: float, horizon: float) -> Rates:
 
 @dataclass(frozen=True)
 class Effects:
-    """Effect name → parameters. With a schema each has its unit and bounds; without one any quantity will do."""
+    """Effect name → parameters. With a schema each has its unit and bounds; without one any
+    quantity will do.
+    """
 
     schema: EffectSchema | None
     expected: str = "a mapping of effects"
@@ -400,11 +408,14 @@ class Effects:
         return f"{found.centre!r} {found.unit}".strip()
 
 
-# ---- the whole file ------------------------------------------------------------------------------------------------
+# ---- the whole file
+# ------------------------------------------------------------------------------------------------
 
 
 def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:
-    """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if there is one."""
+    """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if
+    there is one.
+    """
     devices = Named(
         device(folder), lambda name, value: replace(value, name=name), "a mapping of devices"
     )

@@ -1,8 +1,10 @@
-"""Strict YAML: text → a tree of nodes that remember their line, refusing what a configuration never needs.
+"""Strict YAML: text → a tree of nodes that remember their line, refusing what a configuration never
+needs.
 
-PyYAML's parser makes the events; the tree is built here because PyYAML overlooks duplicate keys, follows aliases
-(a few lines can unfold to gigabytes), builds objects from tags and forgets the lines. Scalars stay text: the schema
-decides what they are, and `tag` says what YAML would have made of them. Loads in a few milliseconds, unlike the schema.
+PyYAML's parser makes the events; the tree is built here because PyYAML overlooks duplicate keys,
+follows aliases (a few lines can unfold to gigabytes), builds objects from tags and forgets the
+lines. Scalars stay text: the schema decides what they are, and `tag` says what YAML would have made
+of them. Loads in a few milliseconds, unlike the schema.
 """
 
 from __future__ import annotations

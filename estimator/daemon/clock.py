@@ -1,4 +1,6 @@
-"""The daemon's one clock: nanoseconds since the epoch, set once from the wall, driven by the monotonic clock."""
+"""The daemon's one clock: nanoseconds since the epoch, set once from the wall, driven by the
+monotonic clock.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,9 @@ import time
 
 
 class Clock:
-    """Never steps. `wall_offset` tells how far the wall clock has moved away from it since the start."""
+    """Never steps. `wall_offset` tells how far the wall clock has moved away from it since the
+    start.
+    """
 
     def __init__(self) -> None:
         self._origin = time.time_ns() - time.monotonic_ns()

@@ -1,8 +1,10 @@
-"""The daemon: readers, loop and writer as threads of one process, started, watched and stopped in order.
+"""The daemon: readers, loop and writer as threads of one process, started, watched and stopped in
+order.
 
-Readers are handed in (they come from `drivers`, which the estimator does not know). If a thread dies the daemon stops
-with a named reason and a closed log, so that the service manager starts it anew; it never runs on without a thread. If
-one hangs, `health` names it and the watchdog is no longer stroked.
+Readers are handed in (they come from `drivers`, which the estimator does not know). If a thread
+dies the daemon stops with a named reason and a closed log, so that the service manager starts it
+anew; it never runs on without a thread. If one hangs, `health` names it and the watchdog is no
+longer stroked.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ KEPT_TUPLES, LONGEST_KEPT = (
 PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
-STOP = 1.5  # [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s more
+# [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s
+# more
+STOP = 1.5
 MIN_PART = 1.0  # [s] a part is at least this long
 MAX_CHUNKS = 400_000  # and of no more flushes than this: a reader takes 500,000
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
@@ -107,7 +111,8 @@ class LogSink:
 
 
 class Daemon:
-    """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last word.
+    """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last
+    word.
 
     Raises DaemonError, and what WriterThread raises if the first file cannot be created.
     """
@@ -157,7 +162,8 @@ class Daemon:
         self.writer.put((), [(LOG_TOPIC.name, now, (now, level, "gritd", text, "", "", 0))])
 
     def change_to(self, configuration: Configuration) -> Change | None:
-        """What goes on with another configuration, made ready; None where it is the same. It may take a second.
+        """What goes on with another configuration, made ready; None where it is the same. It may
+        take a second.
 
         Raises DaemonError where that needs a restart.
         """
@@ -188,7 +194,9 @@ class Daemon:
         return self._close(left)
 
     def _drained(self, loop: Thread) -> float:
-        """End the readers, then the loop, which takes what they left; what remains of STOP for the writer [s]."""
+        """End the readers, then the loop, which takes what they left; what remains of STOP for the
+        writer [s].
+        """
         for reader in self.readers:
             reader.stop(0.0)
         left = STOP / 2 + waited(lambda: not any(reader.alive for reader in self.readers), STOP / 2)
@@ -289,7 +297,9 @@ def _size(path: Path) -> int | None:
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Short switch interval, no garbage collection of what was built at start, and memory as it will be for good."""
+    """Short switch interval, no garbage collection of what was built at start, and memory as it
+    will be for good.
+    """
     interval = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.collect()
@@ -303,8 +313,9 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _fill_free_lists() -> None:
-    """What CPython keeps of freed tuples, it keeps from the start: else it comes by and by, 0.4 MB when a path through
-    the code is first taken, and looks like a leak for hours."""
+    """What CPython keeps of freed tuples, it keeps from the start: else it comes by and by, 0.4 MB
+    when a path through the code is first taken, and looks like a leak for hours.
+    """
     for length in range(1, LONGEST_KEPT + 1):
         kept = [tuple(range(length)) for _ in range(KEPT_TUPLES)]
         del kept

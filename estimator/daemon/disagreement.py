@@ -1,7 +1,9 @@
-"""While the wheel still turns: that model and measurement disagree, in which channel, and since when.
+"""While the wheel still turns: that model and measurement disagree, in which channel, and since
+when.
 
-The filter raises Flag.MISMATCH where its innovations are larger than their stated size for seconds. After a reset of
-the covariance the figure starts anew, so a disagreement ends only when the flag has been down for a while.
+The filter raises Flag.MISMATCH where its innovations are larger than their stated size for seconds.
+After a reset of the covariance the figure starts anew, so a disagreement ends only when the flag
+has been down for a while.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ PLACE = {name: at for at, name in enumerate(TICK_NAMES)}
 
 
 class Disagreement(NamedTuple):
-    """channel: the one that is farthest off; since: [s since the epoch]; sigmas: r.m.s. of measured less predicted."""
+    """channel: the one that is farthest off; since: [s since the epoch]; sigmas: r.m.s. of measured
+    less predicted.
+    """
 
     channel: str
     since: float

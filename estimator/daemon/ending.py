@@ -1,7 +1,8 @@
 """The wish that a loop should end, as a signal handler may utter it.
 
-`threading.Event` will not do: its lock is not reentrant, and a handler runs in the main thread between any two
-instructions, so also while that thread holds the lock inside `wait`. `set` would then wait for ever for itself.
+`threading.Event` will not do: its lock is not reentrant, and a handler runs in the main thread
+between any two instructions, so also while that thread holds the lock inside `wait`. `set` would
+then wait for ever for itself.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Whether the threads do their work: what counts must go on counting.
 
-Seen by looks, not by time: a process that was stopped or starved looks less often too, and must not take its own
-silence for a thread's.
+Seen by looks, not by time: a process that was stopped or starved looks less often too, and must not
+take its own silence for a thread's.
 """
 
 from __future__ import annotations

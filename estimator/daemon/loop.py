@@ -34,7 +34,9 @@ class LoopRecord(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Asked of the loop between two ticks: a new part of the log; with a pipeline, a new configuration too."""
+    """Asked of the loop between two ticks: a new part of the log; with a pipeline, a new
+    configuration too.
+    """
 
     configuration: str  # effective text
     pipeline: Pipeline | None = None
@@ -127,7 +129,9 @@ class Loop:
         self.ticks += 1
 
     def _between(self, state: State, stamp: int) -> State:
-        """Take over what was asked for. After a loss in the log too, log what a replay needs to go on."""
+        """Take over what was asked for. After a loss in the log too, log what a replay needs to go
+        on.
+        """
         dropped = self.latest[1].log_dropped if self.latest else 0
         if self._asked:
             change = self._asked.popleft()

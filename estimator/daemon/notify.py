@@ -29,7 +29,9 @@ def status(text: str) -> str:
 
 
 class Notifier:
-    """The manager named by NOTIFY_SOCKET; `interval` [s] is how often its watchdog must be stroked, 0 for never."""
+    """The manager named by NOTIFY_SOCKET; `interval` [s] is how often its watchdog must be stroked,
+    0 for never.
+    """
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         address = environment.get("NOTIFY_SOCKET", "")
@@ -40,8 +42,10 @@ class Notifier:
         self._waiting: deque[str] = deque(maxlen=_MOST)
 
     def tell(self, *messages: str) -> None:
-        """Send what there is to say, as one datagram. Never waits and never raises: a manager that is gone is no
-        reason to stop. A state that one who is behind could not take goes out first the next time."""
+        """Send what there is to say, as one datagram. Never waits and never raises: a manager that
+        is gone is no reason to stop. A state that one who is behind could not take goes out first
+        the next time.
+        """
         if self._address:
             self._waiting.append("\n".join(messages))
             self._send()

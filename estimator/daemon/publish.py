@@ -1,7 +1,9 @@
-"""What the daemon shows of itself: JSON lines over a Unix stream socket, ten a second at most, to whoever connects.
+"""What the daemon shows of itself: JSON lines over a Unix stream socket, ten a second at most, to
+whoever connects.
 
-A thread of its own asks for a report only while somebody listens, so the loop is never waited for nor waits. A client
-that does not read loses its connection. Nothing that a client sends is looked at. Who may connect is decided by the
+A thread of its own asks for a report only while somebody listens, so the loop is never waited for
+nor waits. A client that does not read loses its connection. Nothing that a client sends is looked
+at. Who may connect is decided by the
 permissions of the socket file: the daemon's user and group.
 """
 

@@ -15,8 +15,8 @@ class AsymmetricFriction(Effect):
 
     T_loss = A sign²(ω): A more than the mean loss forward, A less backward, nothing at rest
 
-    Source: direction-dependent Coulomb level, Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30,
-    1083-1138; the offset term of the EMPS benchmark, Janot, Gautier, Brunot (2019).
+    Source: direction-dependent Coulomb level, Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),
+    Automatica 30, 1083-1138; the offset term of the EMPS benchmark, Janot, Gautier, Brunot (2019).
     """
 
     difference: float = strength(

@@ -1,8 +1,10 @@
-"""What an effect is: one class in one file, whose fields are its parameters and whose methods are where it acts.
+"""What an effect is: one class in one file, whose fields are its parameters and whose methods are
+where it acts.
 
-A method left alone is the identity. A method that is written gives back its first argument unchanged, to the last
-bit, when every strength has its off value, which is also its default. All of them are pure and take floats as well
-as arrays (n,), so the simulator, the diagnosis and the on-line filter share them.
+A method left alone is the identity. A method that is written gives back its first argument
+unchanged, to the last bit, when every strength has its off value, which is also its default. All of
+them are pure and take floats as well as arrays (n,), so the simulator, the diagnosis and the
+on-line filter share them.
 """
 
 from __future__ import annotations
@@ -45,7 +47,8 @@ class Parameter:
     """One parameter of an effect.
 
     role:   a strength turns the effect off at `off`; a shape says where, how fast, or how often.
-    centre: prior mean (a strength's is its off value); sigma: prior standard deviation, the size to be expected.
+    centre: prior mean (a strength's is its off value); sigma: prior standard deviation, the size to
+        be expected.
     scan:   the fit has many local optima along it, so walk a grid before descending.
     """
 
@@ -67,7 +70,9 @@ class Parameter:
 def strength(
     meaning: str, unit: str, *, typical: float, low: float, high: float, off: float = 0.0
 ) -> Any:
-    """A field whose off value switches the effect off; `typical` is the size to be expected where it is at work."""
+    """A field whose off value switches the effect off; `typical` is the size to be expected where
+    it is at work.
+    """
     return _field(off, meaning, unit, "strength", typical, low, high)
 
 
@@ -107,14 +112,15 @@ def told_apart(**by: str) -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects. The first line of a subclass's docstring is its plain sentence, the rest its formula."""
+    """Base of all effects. The first line of a subclass's docstring is its plain sentence, the rest
+    its formula.
+    """
 
     name: ClassVar[str]  # the file's name
     stage: ClassVar[Stage]
     fingerprint: ClassVar[Fingerprint]
-    confusable_with: ClassVar[Mapping[str, str]] = (
-        told_apart()
-    )  # other effect -> key of EXPERIMENTS
+    # other effect -> key of EXPERIMENTS
+    confusable_with: ClassVar[Mapping[str, str]] = told_apart()
     at_start: ClassVar[float] = 0.0  # what `remember` starts from
     filter_only: ClassVar[bool] = (
         False  # acts on the on-line filter alone; the forward model needs nothing of it
@@ -155,7 +161,9 @@ class Effect:
         return reaction
 
     def torque_loss(self, situation: Situation) -> Scalar:
-        """Torque consumed between motor and axle, seen from the axle [N·m], positive for forward rotation."""
+        """Torque consumed between motor and axle, seen from the axle [N·m], positive for forward
+        rotation.
+        """
         return 0.0
 
     def torque_factor(self, situation: Situation) -> Scalar:
@@ -215,6 +223,7 @@ TURNING = 0.01  # [rad/s] width over which a friction torque changes sign
 def turning(wheel_speed: Scalar) -> Scalar:
     """Sign of the rotation, −1 … 1, smooth over ±TURNING so that a standing wheel has none.
 
-    tanh instead of a jump: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083-1138, section 3.
+    tanh instead of a jump: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30,
+        1083-1138, section 3.
     """
     return np.tanh(wheel_speed / TURNING)

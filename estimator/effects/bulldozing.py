@@ -16,8 +16,9 @@ class Bulldozing(Effect):
 
     R = s b [cot X + tan(X + φ)] [c z + γ z²/2 (cot X + cot² X / cot φ)],   X = 45° − φ/2;   DP − R
 
-    Source: Hegedus (1960), Land Locomotion Laboratory Report 61, as given by Ishigami et al. (2007), J. Field Robotics
-    24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as wide as the wheel.
+    Source: Hegedus (1960), Land Locomotion Laboratory Report 61, as given by Ishigami et al.
+    (2007), J. Field Robotics 24, 233-250, there for the sides of a wheel; s = 1 is a plane blade as
+    wide as the wheel.
     """
 
     share: float = strength(

@@ -17,8 +17,8 @@ class DryingCohesion(Effect):
 
     c · [1 + a (1 − e^(−t/τ))]
 
-    Source: first-order loss of apparent cohesion, c = suction · tan φ_b (Fredlund, Morgenstern, Widger 1978, Canadian
-    Geotechnical J. 15, 313-321), suction relaxing exponentially.
+    Source: first-order loss of apparent cohesion, c = suction · tan φ_b (Fredlund, Morgenstern,
+    Widger 1978, Canadian Geotechnical J. 15, 313-321), suction relaxing exponentially.
     """
 
     change: float = strength("final relative change of c, a", "", typical=0.4, low=-0.95, high=5.0)

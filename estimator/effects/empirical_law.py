@@ -33,12 +33,13 @@ def _depth(term: str) -> float:
 
 @dataclass(frozen=True)
 class EmpiricalLaw(Effect):
-    """Something acts that no listed effect explains; a fitted expression stands for it within its domain.
+    """Something acts that no listed effect explains; a fitted expression stands for it within its
+    domain.
 
     y + a₀ + a₁ i + a₂ i² + a₃ ζ + a₄ ν for y = T, DP (along the travel) and z
 
-    ζ = z/r,   ν = ln((r|ω| + v_f)/(v₀ + v_f)),   v₀ = 20 mm/s,   v_f = 1 mm/s
-    Outside the domain i, ζ and ν keep the value at its edge. Source: none; that is what the name says.
+    ζ = z/r,   ν = ln((r|ω| + v_f)/(v₀ + v_f)),   v₀ = 20 mm/s,   v_f = 1 mm/s Outside the domain i,
+    ζ and ν keep the value at its edge. Source: none; that is what the name says.
     """
 
     torque_constant: float = _torque("1")

@@ -14,8 +14,8 @@ class FrameCompliance(Effect):
 
     z_read = z + C W
 
-    Source: linear elasticity; the testbed of Pavlov and Johnson (Carnegie Mellon) yields 0.0125 mm/N when it presses on
-    a rigid stop.
+    Source: linear elasticity; the testbed of Pavlov and Johnson (Carnegie Mellon) yields 0.0125
+    mm/N when it presses on a rigid stop.
     """
 
     compliance: float = strength("yielding per load, C", "m/N", typical=1.5e-5, low=0.0, high=2e-4)

@@ -17,8 +17,8 @@ class GearRipple(Effect):
 
     T_loss = a cos Nψ + b sin Nψ
 
-    Source: first harmonic of the transmission error, Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30,
-    1083-1138, position-dependent friction.
+    Source: first harmonic of the transmission error, Armstrong-Hélouvry, Dupont, Canudas de Wit
+    (1994), Automatica 30, 1083-1138, position-dependent friction.
     """
 
     ripple_cos: float = strength("ripple in phase, a", "N·m", typical=0.2, low=-3.0, high=3.0)

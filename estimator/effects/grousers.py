@@ -15,15 +15,17 @@ HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady de
 
 @dataclass(frozen=True)
 class Grousers(Effect):
-    """Lugs on the rim shear the soil at a larger radius, grip, carry soil away as they slip, and make N ripples a turn.
+    """Lugs on the rim shear the soil at a larger radius, grip, carry soil away as they slip, and
+    make N ripples a turn.
 
     r_s = r + λ h;  (c, tan φ) · (1 + g);  z + d i/(1 − i), i from 0 to 0.95;
     q = a cos Nψ + b sin Nψ;  T(1 + q),  DP + qT/r,  z − q h;   ψ wheel angle
 
-    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45; ripple Skonieczny,
-    Moreland, Wettergreen (2012), IEEE/RSJ IROS; soil-to-soil against soil-to-metal friction Wong (2008), section 2.4.
-    Lugs that carry the soil between them away: i/(1 − i) is attributed to Reece (1965), whose paper was not at hand;
-    d = h where all of it is carried.
+    Source: shearing radius Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45;
+    ripple Skonieczny, Moreland, Wettergreen (2012), IEEE/RSJ IROS; soil-to-soil against
+    soil-to-metal friction Wong (2008), section 2.4.
+    Lugs that carry the soil between them away: i/(1 − i) is attributed to Reece (1965), whose paper
+    was not at hand; d = h where all of it is carried.
     """
 
     height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)
@@ -79,6 +81,8 @@ class Grousers(Effect):
 
 
 def _carried(slip: Scalar) -> Scalar:
-    """i/(1 − i): travel of the rim that does not drive, over the travel; a wheel that hardly moves digs in for long."""
+    """i/(1 − i): travel of the rim that does not drive, over the travel; a wheel that hardly moves
+    digs in for long.
+    """
     driving = np.clip(slip, 0.0, HIGHEST_SLIP)
     return driving / (1.0 - driving)

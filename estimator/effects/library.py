@@ -1,6 +1,8 @@
-"""The library of effects: physics that may be at work on a testbed and that Eqs. (1)-(10) leave out.
+"""The library of effects: physics that may be at work on a testbed and that Eqs. (1)-(10) leave
+out.
 
-Each module of this package but `base` and this one defines one Effect; the file's name is the effect's name. `EFFECTS` finds them.
+Each module of this package but `base` and this one defines one Effect; the file's name is the
+effect's name. `EFFECTS` finds them.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ def _find() -> dict[str, type[Effect]]:
 
 
 def make(name: str, values: Mapping[str, float]) -> Effect:
-    """The effect of this name; parameters not given keep their default. ValueError names what does not exist."""
+    """The effect of this name; parameters not given keep their default. ValueError names what does
+    not exist.
+    """
     if name not in EFFECTS:
         raise ValueError(f"effects: no effect '{name}'; there are {', '.join(EFFECTS)}")
     effect = EFFECTS[name]

@@ -16,12 +16,15 @@ PRESLIDING = 1e-4  # [m] travel over which the friction turns round
 
 @dataclass(frozen=True)
 class LoadAxisFriction(Effect):
-    """The vertical axis sticks: the soil feels less than the weights while the wheel sinks, more while it rises.
+    """The vertical axis sticks: the soil feels less than the weights while the wheel sinks, more
+    while it rises.
 
-    W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z,   s = 1 at the start: the wheel was lowered on the soil
+    W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z,   s = 1 at the start: the wheel was
+    lowered on the soil
 
-    The friction keeps its last direction when the axis stops. Source: presliding model of Dahl (1968), Aerospace Corp.
-    TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083-1138.
+    The friction keeps its last direction when the axis stops. Source: presliding model of Dahl
+    (1968), Aerospace Corp. TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),
+    Automatica 30, 1083-1138.
     """
 
     friction: float = strength("friction of the axis, F", "N", typical=2.0, low=0.0, high=30.0)

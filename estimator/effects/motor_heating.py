@@ -18,8 +18,9 @@ class MotorHeating(Effect):
 
     K_t / (1 + β H),   τ dH/dt = I² − H,   H = 0 at the start of the run
 
-    Source: one-body winding thermal model τ dΔT/dt = R_th R I² − ΔT with K_t falling linearly in a small ΔT, Hendershot
-    and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins thermal resistance and magnet coefficient.
+    Source: one-body winding thermal model τ dΔT/dt = R_th R I² − ΔT with K_t falling linearly in a
+    small ΔT, Hendershot and Miller (2010), Design of Brushless Permanent-Magnet Machines; β joins
+    thermal resistance and magnet coefficient.
     """
 
     fall: float = strength(

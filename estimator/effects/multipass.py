@@ -17,8 +17,9 @@ class Multipass(Effect):
 
     K · (1 + a g),  c · (1 + a_c g),  k / (1 + a_k g),   g = 1 − e^(−(N − 1)/N₀) on the N-th pass
 
-    Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.2 (repetitive loading); saturating growth after
-    Holm (1969), Proc. 3rd ISTVS Conf., and Senatore and Sandu (2011), J. Terramechanics 48, 265-276.
+    Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.2 (repetitive loading);
+    saturating growth after Holm (1969), Proc. 3rd ISTVS Conf., and Senatore and Sandu (2011), J.
+    Terramechanics 48, 265-276.
     """
 
     stiffening: float = strength("final rise of K, a", "", typical=0.5, low=0.0, high=5.0)

@@ -11,11 +11,13 @@ from gritd.estimator.terramechanics.soil import Wheel
 
 @dataclass(frozen=True)
 class PulleySlip(Effect):
-    """The carriage belt slips on the encoder's pulley, so the carriage travels farther than it is told.
+    """The carriage belt slips on the encoder's pulley, so the carriage travels farther than it is
+    told.
 
     v = (1 + s) v_read,   x = (1 + s) x_read
 
-    Source: elastic creep of a belt drive, Johnson (1985), Contact Mechanics, chapter 8: a share of the travel.
+    Source: elastic creep of a belt drive, Johnson (1985), Contact Mechanics, chapter 8: a share of
+        the travel.
     """
 
     share: float = strength("travel not seen, s", "", typical=0.03, low=-0.1, high=0.4)

@@ -14,7 +14,8 @@ class RearContact(Effect):
 
     θ₂ = −c₃ θ₁, in the rear zone of Eq. (4) and in the integrals (8)-(10)
 
-    Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98; Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98; Ishigami et al. (2007), J. Field
+        Robotics 24, 233-250.
     """
 
     ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=0.8)

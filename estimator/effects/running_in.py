@@ -12,12 +12,14 @@ from gritd.estimator.stages.situation import Reaction, Situation
 
 @dataclass(frozen=True)
 class RunningIn(Effect):
-    """A run begins in undisturbed soil: bow wave and slip-sinkage build up while the wheel moves on from there.
+    """A run begins in undisturbed soil: bow wave and slip-sinkage build up while the wheel moves on
+    from there.
 
     DP + f W e,  z − d |i| e,   e = e^(−s/λ),   s travel since the run began
 
-    Source: none published. A first-order approach to the steady state of Eqs. (1)-(10) over a length like that of the
-    contact; the form was chosen here, after single-wheel trials that start from rest (MGST, docs/proof.md).
+    Source: none published. A first-order approach to the steady state of Eqs. (1)-(10) over a
+    length like that of the contact; the form was chosen here, after single-wheel trials that start
+    from rest (MGST, docs/proof.md).
     """
 
     pull: float = strength(

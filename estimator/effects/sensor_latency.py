@@ -16,8 +16,8 @@ class SensorLatency(Effect):
 
     y_read(t) = y(t − d), each channel its own d; d < 0 leads
 
-    Source: transport delay. It has no inverse at one instant: on line it is undone by the channel's configured latency,
-    which shifts its stamps; `correct` undoes it for whole runs.
+    Source: transport delay. It has no inverse at one instant: on line it is undone by the channel's
+    configured latency, which shifts its stamps; `correct` undoes it for whole runs.
     """
 
     sinkage: float = strength("delay of the potentiometer", "s", typical=0.1, low=-0.5, high=1.0)

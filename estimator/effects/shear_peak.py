@@ -13,15 +13,18 @@ from gritd.estimator.terramechanics.soil import Array
 
 @dataclass(frozen=True)
 class ShearPeak(Effect):
-    """Dense or crusted soil resists shear up to a peak, then breaks and falls to a residual strength.
+    """Dense or crusted soil resists shear up to a peak, then breaks and falls to a residual
+    strength.
 
     τ = τ_res [(1 − e^(−j/k)) + P e (1 − e^(−j/K_w)) e^(−j/K_w)]
 
-    With K_w = k this is Wong's third form, (1 − e^(−j/K_w)) [1 + P e^(1 − j/K_w)] with P = 1/(K_r (1 − 1/e)) − 1,
-    written with the residual strength τ_res = K_r τ_max = c + σ tan φ in front: c and φ stay what they are in Eq. (2),
-    and P = 0 is Eq. (2) itself. K_w is free because published peaks stand at other displacements: Oida's (1979) hump
-    x e^(1 − x), x = j/k, has its top at k, not at 0.69 k, and is this one with K_w = 1.4 k within 7 %.
-    Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas (1983).
+    With K_w = k this is Wong's third form, (1 − e^(−j/K_w)) [1 + P e^(1 − j/K_w)] with P = 1/(K_r
+    (1 − 1/e)) − 1, written with the residual strength τ_res = K_r τ_max = c + σ tan φ in front: c
+    and φ stay what they are in Eq. (2), and P = 0 is Eq. (2) itself. K_w is free because published
+    peaks stand at other displacements: Oida's (1979) hump x e^(1 − x), x = j/k, has its top at k,
+    not at 0.69 k, and is this one with K_w = 1.4 k within 7 %.
+    Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas
+        (1983).
     """
 
     overshoot: float = strength(

@@ -10,12 +10,14 @@ from gritd.estimator.stages.situation import Reaction, Situation
 
 @dataclass(frozen=True)
 class SideWallRubbing(Effect):
-    """A sideways force presses the wheel on the bin's wall, and its friction takes from the drawbar pull.
+    """A sideways force presses the wheel on the bin's wall, and its friction takes from the drawbar
+    pull.
 
     DP − s W, against the direction of travel
 
     The sideways force of a slightly skewed wheel is a share of W, its friction a share of that.
-    Source: Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6, who add 0.25 of the sideways force.
+    Source: Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6, who add 0.25 of the
+        sideways force.
     """
 
     share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=0.5)

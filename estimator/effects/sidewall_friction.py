@@ -19,13 +19,15 @@ STILL = 0.02  # [-] of r: distance from the centre of rotation below which a poi
 class SidewallFriction(Effect):
     """Both faces of the wheel rub on the soil in which they are buried.
 
-    On the buried segment of each face τ_f = s (c + K₀ σ̄ tan φ), K₀ = ½, σ̄ = W/(b r sin θ₁), against the sliding
-    velocity u ∝ (V − y, x), V = r(1 − i), of a point x ahead of and y below the axle:
+    On the buried segment of each face τ_f = s (c + K₀ σ̄ tan φ), K₀ = ½, σ̄ = W/(b r sin θ₁),
+    against the sliding velocity u ∝ (V − y, x), V = r(1 − i), of a point x ahead of and y below the
+    axle:
 
         T + 2∫τ_f [x² − y(V − y)]/|u| dA,   DP − 2∫τ_f (V − y)/|u| dA
 
-    The lift of the faces is left out. Source: rigid-plastic sliding of a disc; Mohr-Coulomb strength as in Eq. (2), and
-    the faces of the wheel as in Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    The lift of the faces is left out. Source: rigid-plastic sliding of a disc; Mohr-Coulomb
+    strength as in Eq. (2), and the faces of the wheel as in Ishigami et al. (2007), J. Field
+    Robotics 24, 233-250.
     """
 
     share: float = strength(
@@ -55,11 +57,12 @@ class SidewallFriction(Effect):
 
 
 def _face(theta_1: Array, slip: Array) -> tuple[Array, Array]:
-    """Moment over r³ and forward force over r² of unit stress on the buried front half of one face, 5 × 5 nodes."""
+    """Moment over r³ and forward force over r² of unit stress on the buried front half of one face,
+    5 × 5 nodes.
+    """
     moment, force = np.zeros(np.shape(theta_1)), np.zeros(np.shape(theta_1))
-    rolling = (
-        1.0 - np.maximum(slip, 0.0) - np.minimum(slip, 0.0) / np.maximum(1.0 + slip, 0.05)
-    )  # V/r
+    # V/r
+    rolling = 1.0 - np.maximum(slip, 0.0) - np.minimum(slip, 0.0) / np.maximum(1.0 + slip, 0.05)
     top = np.cos(theta_1)
     for node, weight in zip(0.5 * (NODES + 1.0), 0.5 * WEIGHTS, strict=True):
         x = node * np.sin(theta_1)

@@ -13,7 +13,8 @@ from gritd.estimator.terramechanics.soil import Scalar
 
 @dataclass(frozen=True)
 class StribeckFriction(Effect):
-    """At creeping speed the drivetrain sticks: the loss is highest at break-away and falls as a film forms.
+    """At creeping speed the drivetrain sticks: the loss is highest at break-away and falls as a
+    film forms.
 
     T_loss = T_S e^(−(ω/ω_S)²) sign(ω), above the Coulomb level
 

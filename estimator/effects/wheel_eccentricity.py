@@ -17,7 +17,8 @@ class WheelEccentricity(Effect):
 
     R(ψ) = r + a cos ψ + b sin ψ;   rim speed R ω;   sinkage of the axle z − (R − r);   T + W dR/dψ
 
-    The last term is the work of lifting the load W. Source: rigid-body kinematics of an eccentric disc.
+    The last term is the work of lifting the load W. Source: rigid-body kinematics of an eccentric
+    disc.
     """
 
     offset_cos: float = strength(

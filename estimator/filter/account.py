@@ -1,6 +1,8 @@
-"""What a tick's record says of the tracker: measured, estimated and predicted quantities, the account of the updates.
+"""What a tick's record says of the tracker: measured, estimated and predicted quantities, the
+account of the updates.
 
-Each block is a plain tuple in the order of its names, and the blocks follow one another as in record.TICK_FIELDS.
+Each block is a plain tuple in the order of its names, and the blocks follow one another as in
+record.TICK_FIELDS.
 """
 
 from __future__ import annotations
@@ -99,7 +101,9 @@ def estimated(estimate: Estimate) -> Row:
 
 
 def predicted(measurement: Measurement, estimate: Estimate, account: Account) -> Row:
-    """In the order of PREDICTED: what the estimate says of this window, NaN where the wheel touches nothing."""
+    """In the order of PREDICTED: what the estimate says of this window, NaN where the wheel touches
+    nothing.
+    """
     torque = pull = resistance = load = NOTHING
     now = account.now
     if account.touching:

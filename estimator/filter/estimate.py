@@ -1,13 +1,16 @@
 """The extended Kalman filter on c, tan φ and ln k, with considered nuisances (Schmidt).
 
-Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance. They, and ln k while
-slip does not vary, are considered: their uncertainty and their correlation with the state take part in every
-innovation covariance, but their own value and variance never change. Without them a filter fed ten windows a second
-soon claims to know c far better than the calibration of the sensors allows.
+Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance.
+They, and ln k while
+slip does not vary, are considered: their uncertainty and their correlation with the state take part
+in every innovation covariance, but their own value and variance never change. Without them a filter
+fed ten windows a second soon claims to know c far better than the calibration of the sensors
+allows.
 
-Two engines share one interface: `FilterpyEngine` is filterpy's ExtendedKalmanFilter with the Schmidt gain, and
-`plain.PlainEngine` the same algebra in plain floats. Both use the Joseph form with the gain that was really applied,
-zeroed rows included, so the covariance stays symmetric and positive.
+Two engines share one interface: `FilterpyEngine` is filterpy's ExtendedKalmanFilter with the
+Schmidt gain, and `plain.PlainEngine` the same algebra in plain floats. Both use the Joseph form
+with the gain that was really applied, zeroed rows included, so the covariance stays symmetric and
+positive.
 """
 
 from __future__ import annotations
@@ -53,7 +56,9 @@ class Engine(Protocol):
 
 
 class _SchmidtFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
-    """filterpy's EKF, whose gain is set to zero for considered states before it is applied anywhere."""
+    """filterpy's EKF, whose gain is set to zero for considered states before it is applied
+    anywhere.
+    """
 
     x: np.ndarray
     P: np.ndarray
@@ -75,7 +80,8 @@ class FilterpyEngine:
     def __init__(self, nuisance_variances: Vector) -> None:
         self._size = size = STATES + len(nuisance_variances)
         self._prior = np.diag((*(0.0,) * STATES, *nuisance_variances))
-        # made once: a filter's construction costs more than its update; every update sets all that it reads
+        # made once: a filter's construction costs more than its update; every update sets all that
+        # it reads
         self._filters = {m: _SchmidtFilter(dim_x=size, dim_z=m) for m in (1, 2)}
 
     def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
@@ -108,7 +114,9 @@ def predict(estimate: Estimate, walk: Vector) -> Estimate:
 
 
 def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tuple[Vector, Vector]:
-    """Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and g (q,)."""
+    """Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and
+    g (q,).
+    """
     h0, h1, h2 = h
     (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
     c0, c1, c2 = estimate.cross
@@ -125,7 +133,9 @@ def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tupl
 
 
 def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
-    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never negative."""
+    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never
+    negative.
+    """
     (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
     (h0, h1, h2), (c0, c1, c2) = h, estimate.cross
     own = (

@@ -1,4 +1,6 @@
-"""The measurement of one window, linearised at an estimate: innovation, Jacobians, noise, σ of what is predicted."""
+"""The measurement of one window, linearised at an estimate: innovation, Jacobians, noise, σ of what
+is predicted.
+"""
 
 from __future__ import annotations
 
@@ -38,14 +40,18 @@ class Measurement:
     def state(
         self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns
     ) -> WheelState:
-        """The window in the wheel's own terms, effects accounted for; columns: those of the last update."""
+        """The window in the wheel's own terms, effects accounted for; columns: those of the last
+        update.
+        """
         now = _sensed(self.settings, self.model, self.chain, snapshot, context, estimate)
         return now._replace(columns=columns or self._unmoved)
 
     def with_columns(
         self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate
     ) -> WheelState:
-        """The window with the change of its innovation for one σ of each uncertain effect parameter, and of n."""
+        """The window with the change of its innovation for one σ of each uncertain effect
+        parameter, and of n.
+        """
         if not self._variants:
             return now
         here = _innovation(now, _predicted(self.model, estimate, now))
@@ -65,7 +71,9 @@ class Measurement:
         return _predicted(self.model, estimate, now)
 
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
-        """Innovation, H, G and R of the components that are measured: T always, DP where there is a sensor."""
+        """Innovation, H, G and R of the components that are measured: T always, DP where there is a
+        sensor.
+        """
         torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity = _sensitivity(now, prediction)
         update = Update(
@@ -82,7 +90,9 @@ class Measurement:
         return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
 
     def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
-        """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians, which T and DP share."""
+        """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians, which
+        T and DP share.
+        """
         sigmas = (now.sinkage.sigma, now.slip.sigma, now.load.sigma)
         by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
         torque, pull = tuple(map(mul, by_torque, sigmas)), tuple(map(mul, by_pull, sigmas))
@@ -95,7 +105,9 @@ class Measurement:
     def sigmas(
         self, estimate: Estimate, now: WheelState, prediction: Prediction
     ) -> tuple[float, float, float]:
-        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's z, i and W."""
+        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's
+        z, i and W.
+        """
         torque, pull = self._nuisance_gradients(_sensitivity(now, prediction), now.columns)
         return (
             self._sigma(estimate, now, prediction.torque, torque),
@@ -141,7 +153,9 @@ def _sensed(
     context: Context,
     estimate: Estimate,
 ) -> WheelState:
-    """The window with one chain of effects; what wheel and testbed effects add is linear about the estimate."""
+    """The window with one chain of effects; what wheel and testbed effects add is linear about the
+    estimate.
+    """
     now = wheel_state(settings, snapshot, chain, context)
     if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
         return now
@@ -178,7 +192,9 @@ def _added(model: WheelModel, chain: Chain, now: WheelState, estimate: Estimate)
 
 
 def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
-    """T, DP and resistance of the rim in the soil under this window, and what effects add, along the estimate."""
+    """T, DP and resistance of the rim in the soil under this window, and what effects add, along
+    the estimate.
+    """
     ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
     prediction = model.predict(*ground, now.theta_1.value, now.slip.value, now.load.value)
     if now.here is not None:
@@ -207,7 +223,9 @@ def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
 
 
 def _by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity:
-    """Gradient with respect to the estimated soil, from that with respect to the soil under this window."""
+    """Gradient with respect to the estimated soil, from that with respect to the soil under this
+    window.
+    """
     k, k_here = soil(estimate)[2], soil_here(estimate, here)[2]
     return quantity._replace(
         by_c=quantity.by_c * here.c_slope,

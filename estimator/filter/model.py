@@ -1,4 +1,6 @@
-"""What the filter expects the sensors to say: the closed forms, with the configured effects applied to them."""
+"""What the filter expects the sensors to say: the closed forms, with the configured effects applied
+to them.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ class WheelModel:
     def load(
         self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float
     ) -> Measured:
-        """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli and of θ₁."""
+        """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli
+        and of θ₁.
+        """
         radius, soil = self._wheel.radius, self._soil
         depth = radius * (cos(theta_m) - cos(theta_1.value))
         if depth <= 0.0:

@@ -1,10 +1,13 @@
-"""Errors of the calibration that stay the same for the whole run: what the filter considers but never estimates.
+"""Errors of the calibration that stay the same for the whole run: what the filter considers but
+never estimates.
 
-Each nuisance is zero mean with the standard deviation stated in the configuration. Its gradient says how the
-prediction of the measured torque and drawbar pull changes with it. Nuisances of zero sigma are left out.
+Each nuisance is zero mean with the standard deviation stated in the configuration. Its gradient
+says how the prediction of the measured torque and drawbar pull changes with it. Nuisances of zero
+sigma are left out.
 
-A calibration has two: its zero (sigma of the offset) and its slope about that zero (sigma of the scale, as a share of
-the physical value). An amplifier that rests at 2.5 V is zeroed at rest, so its slope does not move the zero.
+A calibration has two: its zero (sigma of the offset) and its slope about that zero (sigma of the
+scale, as a share of the physical value). An amplifier that rests at 2.5 V is zeroed at rest, so its
+slope does not move the zero.
 """
 
 from __future__ import annotations

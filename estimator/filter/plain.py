@@ -1,8 +1,8 @@
 """The filter's algebra in plain floats: the engine of fast replay, equal to filterpy's to rounding.
 
-Only the rows of the state are touched, because a considered nuisance never changes. With M = P Hᵀ + C Gᵀ and
-N = Cᵀ Hᵀ + V Gᵀ, the covariances of state and nuisances with what is predicted, and S that of the innovations,
-Joseph's form reads, for any gain K,
+Only the rows of the state are touched, because a considered nuisance never changes. With M = P Hᵀ +
+C Gᵀ and N = Cᵀ Hᵀ + V Gᵀ, the covariances of state and nuisances with what is predicted, and S that
+of the innovations, Joseph's form reads, for any gain K,
 
     P − K Mᵀ + (K S − M) Kᵀ        and for the correlation with the nuisances        C − K Nᵀ
 """
@@ -22,7 +22,9 @@ from gritd.estimator.filter.estimate import (
 
 
 class PlainEngine:
-    """See filter.Engine. One or two measured components, written out: loops over two cost more than the algebra."""
+    """See filter.Engine. One or two measured components, written out: loops over two cost more than
+    the algebra.
+    """
 
     def __init__(self, nuisance_variances: Vector) -> None:
         self._variances = nuisance_variances

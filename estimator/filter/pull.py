@@ -1,7 +1,8 @@
-"""The largest drawbar pull the soil now offers at this load and sinkage: what a driver wants to know.
+"""The largest drawbar pull the soil now offers at this load and sinkage: what a driver wants to
+know.
 
-It takes DP at several slips. The search does one of them a tick, so that no tick bears them all, and starts from the
-latest update when it is not under way; its result is some ticks old.
+It takes DP at several slips. The search does one of them a tick, so that no tick bears them all,
+and starts from the latest update when it is not under way; its result is some ticks old.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ def _at(measurement: Measurement, search: Search, slip: float) -> tuple[WheelSta
 
 
 def best_slip(pulls: tuple[float, ...]) -> float:
-    """Slip of the largest drawbar pull, from its values at SLIPS: the best of them, refined by a parabola."""
+    """Slip of the largest drawbar pull, from its values at SLIPS: the best of them, refined by a
+    parabola.
+    """
     best = max(range(len(SLIPS)), key=pulls.__getitem__)
     if best in (0, len(SLIPS) - 1):
         return SLIPS[best]

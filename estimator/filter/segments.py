@@ -1,12 +1,15 @@
-"""What the filter remembers of the run: stretches of steady motion, each merged into one measurement.
+"""What the filter remembers of the run: stretches of steady motion, each merged into one
+measurement.
 
-An EKF linearises every measurement once, at the estimate it had then. Where the measurement is precise and the
-estimate still poor (k 10 % wrong, one load seen so far) the Jacobians of early windows point along a valley that later
-turns out to lie elsewhere, and the filter keeps the certainty it gained from them: c then comes out several σ wrong.
-So the windows are kept, merged as long as the condition stays the same, and whenever a stretch ends the filter is run
-again from its anchor over all of them with Jacobians at the present estimate. This is the iterated extended Kalman
-smoother (Bell 1994, SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory: the
-oldest stretch is absorbed into the anchor when there are more than CAPACITY.
+An EKF linearises every measurement once, at the estimate it had then. Where the measurement is
+precise and the estimate still poor (k 10 % wrong, one load seen so far) the Jacobians of early
+windows point along a valley that later
+turns out to lie elsewhere, and the filter keeps the certainty it gained from them: c then comes out
+several σ wrong. So the windows are kept, merged as long as the condition stays the same, and
+whenever a stretch ends the filter is run again from its anchor over all of them with Jacobians at
+the present estimate. This is the iterated extended Kalman smoother (Bell 1994, SIAM J. Optim. 4,
+626–636: it is Gauss-Newton on the whole record) with a bounded memory: the oldest stretch is
+absorbed into the anchor when there are more than CAPACITY.
 """
 
 from __future__ import annotations
@@ -28,7 +31,9 @@ SAME_ANGLE = 0.02  # relative change of θ₁
 
 
 class Stretch(NamedTuple):
-    """Windows of one condition, merged: the mean state, how many windows, which components were accepted."""
+    """Windows of one condition, merged: the mean state, how many windows, which components were
+    accepted.
+    """
 
     mean: WheelState
     windows: int

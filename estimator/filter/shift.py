@@ -1,10 +1,12 @@
-"""The on-line form of `stress_linearisation` and of the contact effects: what the true stresses add to A₁ … C₃.
+"""The on-line form of `stress_linearisation` and of the contact effects: what the true stresses add
+to A₁ … C₃.
 
-Eqs. (20)-(22) are linear in c, σₘ and σₘ tan φ, with eight integrals A₁ … C₃ over the contact as coefficients (see
-terramechanics/linear.py). The original stresses (3), (4), (7) obey the same three equations with eight other integrals,
-whatever c, tan φ and W are. What separates the two models is therefore eight functions of θ₁ and i for a soil of given
-k and n. They are tabulated once, as Chebyshev polynomials, together with their derivatives with respect to ln k and n:
-the filter stays exact in c, tan φ and W, and is first-order in ln k and n.
+Eqs. (20)-(22) are linear in c, σₘ and σₘ tan φ, with eight integrals A₁ … C₃ over the contact as
+coefficients (see terramechanics/linear.py). The original stresses (3), (4), (7) obey the same three
+equations with eight other integrals, whatever c, tan φ and W are. What separates the two models is
+therefore eight functions of θ₁ and i for a soil of given k and n. They are tabulated once, as
+Chebyshev polynomials, together with their derivatives with respect to ln k and n: the filter stays
+exact in c, tan φ and W, and is first-order in ln k and n.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ SLIP = (-0.1, 1.0)
 NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
-REMEMBERED = 256  # evaluated points: all stretches of the filter's memory, and the windows since they were last used
+# evaluated points: all stretches of the filter's memory, and the windows since they were last used
+REMEMBERED = 256
 INSIDE = 1.0 - 1e-12  # as near to an edge as sin t allows
 ORDER = 24  # quadrature nodes in each zone
 INTEGRALS = len(Integrals._fields)
@@ -38,7 +41,9 @@ PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part
 
 
 class Point(NamedTuple):
-    """The tables at one θ₁ and i: each (3, 8), the integrals' values and derivatives with respect to θ₁ and i."""
+    """The tables at one θ₁ and i: each (3, 8), the integrals' values and derivatives with respect
+    to θ₁ and i.
+    """
 
     plain: Array  # the shift at the soil's k and n
     by_ln_k: Array
@@ -49,8 +54,9 @@ class Point(NamedTuple):
 class IntegralShift:
     """The shift of A₁ … C₃ for one wheel, soil and set of effects.
 
-    share: 1 replaces the triangular stresses by the true ones, 0 keeps them; the effects' own part is always whole.
-    Soil effects count where they depend on slip alone (the exponent); what they do to c, tan φ and k is the caller's.
+    share: 1 replaces the triangular stresses by the true ones, 0 keeps them; the effects' own part
+    is always whole. Soil effects count where they depend on slip alone (the exponent); what they do
+    to c, tan φ and k is the caller's.
     """
 
     def __init__(
@@ -73,7 +79,9 @@ class IntegralShift:
         self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
     def at(self, k: float, theta_1: float, slip: float, exponent_error: float = 0.0) -> Shift:
-        """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's exponent n."""
+        """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's
+        exponent n.
+        """
         plain, by_ln_k, by_n, ln_k = self._table(theta_1, slip)
         found = plain + (log(k) - self._ln_k) * by_ln_k
         if exponent_error:
@@ -98,7 +106,8 @@ class IntegralShift:
 def true_integrals(
     wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array
 ) -> Integrals:
-    """A₁ … C₃ over θ₁ of the original stresses with the contact effects; θ₁, i and the results have one shape.
+    """A₁ … C₃ over θ₁ of the original stresses with the contact effects; θ₁, i and the results have
+    one shape.
 
     Forces are linear in c and σₘ, so three evaluations with unit soils pick the integrals out.
     """
@@ -174,7 +183,9 @@ def _steady(wheel: Wheel, soil: Soil, theta_1: Array, slip: Array) -> Situation:
 
 
 def _fitted(values: Array) -> Array:
-    """Chebyshev coefficients (quantities, DEGREE[0] + 1, DEGREE[1] + 1) of values at the nodes, by least squares."""
+    """Chebyshev coefficients (quantities, DEGREE[0] + 1, DEGREE[1] + 1) of values at the nodes, by
+    least squares.
+    """
     rows = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[0]), DEGREE[0])
     columns = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[1]), DEGREE[1])
     fitted: Array = np.einsum(
@@ -200,7 +211,9 @@ def _unit(x: float, span: tuple[float, float]) -> tuple[float, float]:
 
 
 def _polynomials(x: float, degree: int, slope: float) -> Array:
-    """(2, degree + 1): T₀ … T_degree at x = cos t, and their derivatives n sin(nt)/sin t times slope."""
+    """(2, degree + 1): T₀ … T_degree at x = cos t, and their derivatives n sin(nt)/sin t times
+    slope.
+    """
     angle = acos(min(max(x, -INSIDE), INSIDE))
     orders = np.arange(degree + 1)
     phase = orders * angle

@@ -1,7 +1,7 @@
 """One window after another into c, tan φ and k.
 
-`Tracker.step` takes a state and a snapshot and returns the next state and an account of what was done. It reads no
-clock and keeps nothing between calls.
+`Tracker.step` takes a state and a snapshot and returns the next state and an account of what was
+done. It reads no clock and keeps nothing between calls.
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
 CONSISTENCY_MEMORY = 2.0  # [s]
-# Mean normalised innovation squared above which the filter is reset. A wrong calibration, of the size the configuration
-# states, gives innovations of variance S that keep their sign for the whole run, so their mean square does not settle
+# Mean normalised innovation squared above which the filter is reset. A wrong calibration, of the
+# size the configuration
+# states, gives innovations of variance S that keep their sign for the whole run, so their mean
+# square does not settle
 # at 1: it exceeds 12 in 1 rig of 1,900 and 4 in 1 of 22 (chi-square, 1 degree of freedom).
 INCONSISTENT = 12.0
 MISMATCH = 4.0  # … and above which model and measurement are said to disagree
@@ -48,7 +50,9 @@ OUTLIER = (
     25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
 )
 PATIENCE = 5.0  # [s] after a reset before the next
-RELAPSE = 20.0  # [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time …
+# [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time
+# …
+RELAPSE = 20.0
 WIDEST = 6  # … so often
 
 ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {
@@ -109,7 +113,9 @@ class TrackState(NamedTuple):
 
     @property
     def consistency(self) -> float:
-        """Mean normalised innovation squared per component; 1 when the stated noise is the real one."""
+        """Mean normalised innovation squared per component; 1 when the stated noise is the real
+        one.
+        """
         return self.surprise / self.components if self.components > 0.0 else NOT_A_NUMBER
 
 
@@ -149,7 +155,9 @@ class Tracker:
         return Estimate(x, P, ((0.0,) * len(self.measurement.variances),) * STATES)
 
     def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
-        """Classify the window; when a whole new one has passed, and it is fit for it, update the filter."""
+        """Classify the window; when a whole new one has passed, and it is fit for it, update the
+        filter.
+        """
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
@@ -167,7 +175,9 @@ class Tracker:
     def _closed(
         self, state: TrackState, snapshot: Snapshot, now: WheelState, elapsed: float
     ) -> TrackState:
-        """A window has ended: remember what the next one is compared with, and what the effects remember."""
+        """A window has ended: remember what the next one is compared with, and what the effects
+        remember.
+        """
         recall = state.recall
         if now.situation is not None:
             recall = self.measurement.chain.remember(recall, elapsed, now.situation)
@@ -227,7 +237,9 @@ class Tracker:
     def _remember(
         self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
     ) -> TrackState:
-        """Add the window to the memory; when a new stretch begins and the state has moved, linearise all anew."""
+        """Add the window to the memory; when a new stretch begins and the state has moved,
+        linearise all anew.
+        """
         memory, begun = state.memory.extended(
             now, taken, self.measurement.chain.wheel.radius, elapsed
         )
@@ -251,7 +263,9 @@ class Tracker:
         )
 
     def _moved(self, before: Point | None, now: Point) -> bool:
-        """Whether the state is so far from where the memory was linearised that its Jacobians no longer serve."""
+        """Whether the state is so far from where the memory was linearised that its Jacobians no
+        longer serve.
+        """
         if before is None or before[0] != now[0]:
             return True
         steps = zip(before[1], now[1], self._prior_sigma, strict=True)
@@ -272,8 +286,9 @@ class Tracker:
         return self.engine.update(estimate, merged, not self.estimates_k(state))
 
     def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
-        """Keep the running consistency figure; back to the prior's covariance, or a wider one, when it is out of all
-        measure."""
+        """Keep the running consistency figure; back to the prior's covariance, or a wider one, when
+        it is out of all measure.
+        """
         keep = exp(-elapsed / CONSISTENCY_MEMORY)
         surprise = keep * state.surprise + sum(
             [min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids]
@@ -322,7 +337,9 @@ class Tracker:
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
-    """What the effects may know beside the snapshot: time, estimate, rates of change, their memory, the start."""
+    """What the effects may know beside the snapshot: time, estimate, rates of change, their memory,
+    the start.
+    """
     before = state.before
     acceleration = sinking = 0.0
     if before is not None and elapsed > 0.0:

@@ -1,7 +1,7 @@
 """What one tick says: the fields of /tick and /loop, in order, with units.
 
-`TickRecord` is a plain mapping by name while it is built and a tuple in this order when it is logged, so a reader of
-a recording and a reader of this file see the same list.
+`TickRecord` is a plain mapping by name while it is built and a tuple in this order when it is
+logged, so a reader of a recording and a reader of this file see the same list.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def _pair(name: str, unit: str, meaning: str) -> tuple[Field, Field]:
 
 
 def _aid_source(channel: str, unit: str) -> tuple[Field, ...]:
-    """The record every measurement update leaves (STYLE rule 6), zero-filled where there was no update."""
+    """The record every measurement update leaves (STYLE rule 6), zero-filled where there was no
+    update.
+    """
     return (
         (f"{channel}_z", "float64", f"measurement offered to the filter [{unit}]"),
         (f"{channel}_r", "float64", f"its variance, all known noise included [{unit}²]"),

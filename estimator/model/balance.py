@@ -12,7 +12,9 @@ from gritd.estimator.stages.situation import ContactLaw
 from gritd.estimator.terramechanics.original import Forces, forces
 from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
-ORDER = 8  # nodes a zone: W, DP and T/r within 3e-7 of W when driving, 2e-5 down to 10 % braking (test_forward.py)
+# nodes a zone: W, DP and T/r within 3e-7 of W when driving, 2e-5 down to 10 % braking
+# (test_forward.py)
+ORDER = 8
 TOLERANCE = 1e-9  # relative difference of W from the load at which θ₁ is accepted
 CHUNK = 1024  # samples solved together: their nodes stay in the processor's cache
 DEEPEST = 1.5  # [rad] a wheel sunk to its axle is bogged; θ₁ stops here and the sample is flagged
@@ -90,7 +92,9 @@ def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int
 
 
 def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balance:
-    """Secant steps on ln W against ln θ₁, which is nearly straight with slope 2n + 1, kept inside a bracket."""
+    """Secant steps on ln W against ln θ₁, which is nearly straight with slope 2n + 1, kept inside a
+    bracket.
+    """
     solution, overloaded = np.empty(guess.size), np.zeros(guess.size, dtype=bool)
     kept = np.empty((len(Forces._fields), guess.size))
     left = np.arange(guess.size)  # samples not yet solved
@@ -140,7 +144,9 @@ def _slope(slope: Array, step: Array, change: Array) -> Array:
 
 
 def bekker_entry_angle(wheel: Wheel, soil: Soil, load: Array) -> Array:
-    """First guess of θ₁ [rad] without shear: z = [3W/((3 − n) b K √(2r))]^(2/(2n + 1)), Bekker (1969)."""
+    """First guess of θ₁ [rad] without shear: z = [3W/((3 − n) b K √(2r))]^(2/(2n + 1)), Bekker
+    (1969).
+    """
     n = np.minimum(soil.exponent, 2.5)
     carried = (3.0 - n) * wheel.width * np.asarray(soil.modulus) * np.sqrt(2.0 * wheel.radius)
     sinkage = (3.0 * np.maximum(load, 0.0) / carried) ** (2.0 / (2.0 * n + 1.0))

@@ -1,8 +1,10 @@
-"""The forward model: measured motion, load, soil and effects in; sinkage, forces, current and readings out.
+"""The forward model: measured motion, load, soil and effects in; sinkage, forces, current and
+readings out.
 
     motion → soil → contact → load → vertical balance → wheel → testbed → drivetrain → sensors
 
-Every stage starts from the paper's model and passes through the effects in turn; without effects it is the paper's.
+Every stage starts from the paper's model and passes through the effects in turn; without effects it
+is the paper's.
 Arrays in, arrays out: all fields (n,), one run in order of time.
 """
 
@@ -120,7 +122,9 @@ def paper_contact(wheel: Wheel, situation: Situation) -> ContactLaw:
 
 
 def loaded(situation: Situation, wheel: Wheel, theta_1: Scalar, forces: Forces) -> Situation:
-    """The situation once the rim stresses are known; in reverse drawbar pull and torque change sign."""
+    """The situation once the rim stresses are known; in reverse drawbar pull and torque change
+    sign.
+    """
     return replace(
         situation,
         theta_1=theta_1,

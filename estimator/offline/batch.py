@@ -1,7 +1,9 @@
-"""A whole recording at once: the estimates the loop made of it, hundreds of times faster than it was recorded.
+"""A whole recording at once: the estimates the loop made of it, hundreds of times faster than it
+was recorded.
 
-The filter is updated at window ends only; the ticks in between publish. So the estimates of a recording need one
-snapshot a window, and those come from arrays (snapshots.py). From there on the tracker is that of the live loop.
+The filter is updated at window ends only; the ticks in between publish. So the estimates of a
+recording need one snapshot a window, and those come from arrays (snapshots.py). From there on the
+tracker is that of the live loop.
 """
 
 from __future__ import annotations
@@ -43,11 +45,12 @@ _DTYPES = {name: _KINDS.get(kind, "<i8") for name, kind, _ in TICK_FIELDS}
 
 
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
-    """What the filter makes of a recording: one row a window, shape (n,), fields ESTIMATES, each as in /tick.
+    """What the filter makes of a recording: one row a window, shape (n,), fields ESTIMATES, each as
+    in /tick.
 
-    The windows are those the loop updated the filter at: by the recording's own ticks where it has them, else by ticks
-    at the configured rate. Of `flags`, those that concern single ticks (late readings, counter jumps) are left out.
-    Raises RecordingError.
+    The windows are those the loop updated the filter at: by the recording's own ticks where it has
+    them, else by ticks at the configured rate. Of `flags`, those that concern single ticks (late
+    readings, counter jumps) are left out. Raises RecordingError.
     """
     pipeline = Pipeline(settings, engine)
     replayed = played(recording, pipeline.settings.rates.tick)
@@ -61,7 +64,8 @@ def estimates(settings: Settings, recording: Recording, engine: str = "plain") -
 
 
 def signals(settings: Settings, recording: Recording, every_tick: bool = False) -> Table:
-    """What the sensors say of the wheel, without a filter: shape (n,), fields SIGNALS, each as in /tick.
+    """What the sensors say of the wheel, without a filter: shape (n,), fields SIGNALS, each as in
+    /tick.
 
     One row a window, which share no reading; or one a tick, from overlapping windows.
     """
@@ -78,7 +82,9 @@ def signals(settings: Settings, recording: Recording, every_tick: bool = False) 
 
 
 def window_ends(ticks: Ints, length: int) -> Ints:
-    """Numbers of the ticks that end a window of `length` [ns]: the first, then each that comes a window later."""
+    """Numbers of the ticks that end a window of `length` [ns]: the first, then each that comes a
+    window later.
+    """
     stamps, ends, following = ticks.tolist(), [], 0
     while following < len(stamps):
         ends.append(following)

@@ -1,7 +1,8 @@
 """A recording on one time grid: measured motion and readings as arrays, calibrated, in SI.
 
-Every value is the mean of its channel over one window around the grid time, every speed the slope over it, so all
-channels see the same stretch of time. This is what the forward model is driven by and compared with.
+Every value is the mean of its channel over one window around the grid time, every speed the slope
+over it, so all channels see the same stretch of time. This is what the forward model is driven by
+and compared with.
 """
 
 from __future__ import annotations
@@ -63,10 +64,12 @@ def measured_run(
     window: float = WINDOW,
     origin: int | None = None,
 ) -> MeasuredRun:
-    """The recording at `rate` [Hz], each value over `window` [s]. Time runs from `origin` [ns], else the first reading.
+    """The recording at `rate` [Hz], each value over `window` [s]. Time runs from `origin` [ns],
+    else the first reading.
 
-    The load that drives the forward model is the wrench's where there is one, else the run's nominal load, else the
-    configured one. Raises RecordingError where an encoder is missing or too short for one window.
+    The load that drives the forward model is the wrench's where there is one, else the run's
+    nominal load, else the configured one. Raises RecordingError where an encoder is missing or too
+    short for one window.
     """
     raw, half = _raw(recording, settings), 0.5 * window
     if origin is None:
@@ -91,7 +94,9 @@ def measured_run(
 
 
 def _grid(recording: Recording, tracks: Mapping[str, Track], rate: float, half: float) -> Array:
-    """The times at which every channel has readings on both sides, `half` a window and more. Raises RecordingError."""
+    """The times at which every channel has readings on both sides, `half` a window and more. Raises
+    RecordingError.
+    """
     for name in ("wheel", "carriage"):
         if name not in tracks:
             raise RecordingError(
@@ -123,7 +128,8 @@ def _track(stamps: NDArray[np.int64], value: Array, origin: int) -> Track:
     return Track(time, value, np.concatenate(([0.0], np.cumsum(areas))))
 
 
-# ---- readings ------------------------------------------------------------------------------------------------------
+# ---- readings ------------------------------------------------------------------------------------
+# ------------------
 
 Stamped = tuple[NDArray[np.int64], Array]  # [ns], physical
 

@@ -1,7 +1,8 @@
 """A recording as the loop saw it: tick by tick, each with the readings it consumed.
 
-Where the recording holds ticks, file order tells which tick consumed which reading. Where it holds raw topics only
-(another rig's data), ticks are built at the configured rate from the first to the last receive time.
+Where the recording holds ticks, file order tells which tick consumed which reading. Where it holds
+raw topics only (another rig's data), ticks are built at the configured rate from the first to the
+last receive time.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ class Checkpoint(NamedTuple):
 
 
 class RecordedTick(NamedTuple):
-    """Time of a tick [ns], the readings it consumed, its logged fields and the checkpoint before it, if any."""
+    """Time of a tick [ns], the readings it consumed, its logged fields and the checkpoint before
+    it, if any.
+    """
 
     stamp: int
     readings: list[Reading]

@@ -1,8 +1,10 @@
-"""A recorded run taken through the pipeline again: ticks, and checkpoints where a part or a configuration begins.
+"""A recorded run taken through the pipeline again: ticks, and checkpoints where a part or a
+configuration begins.
 
-A checkpoint is met in one of two ways. Coming from the ticks before it, the state must be the logged one to the bit:
-the change of configuration is recomputed like everything else. Coming from nowhere (the first part kept, or messages
-lost before it) the logged state is where the course begins.
+A checkpoint is met in one of two ways. Coming from the ticks before it, the state must be the
+logged one to the bit: the change of configuration is recomputed like everything else. Coming from
+nowhere (the first part kept, or messages lost before it) the logged state is where the course
+begins.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from gritd.estimator.recording.run import RecordingError
 
 
 class Course:
-    """`settings_of` gives the run's settings from a configuration; `engine` replaces the configured one."""
+    """`settings_of` gives the run's settings from a configuration; `engine` replaces the configured
+    one.
+    """
 
     def __init__(
         self,
@@ -50,7 +54,9 @@ class Course:
         self._text = checkpoint.configuration
 
     def resume(self, checkpoint: Checkpoint) -> bool:
-        """Go on from the logged state; False if one that was known differs from it. Raises RecordingError."""
+        """Go on from the logged state; False if one that was known differs from it. Raises
+        RecordingError.
+        """
         self.reconfigure(checkpoint)
         same = not self.known or encode(self._state) == checkpoint.state
         try:

@@ -1,8 +1,9 @@
 """Snapshots of a whole recording at once: what `sync.Sync` would say at chosen ticks, from arrays.
 
-`Sync` takes one reading after another, because on line there is no other way. A recording has them all, and each of
-Sync's rules is a statement about a sorted array: late is what its tick consumed after the window had closed, a repeated
-reading is the second of one stamp, a window is a slice between two searches, a jump a difference of neighbours.
+`Sync` takes one reading after another, because on line there is no other way. A recording has them
+all, and each of Sync's rules is a statement about a sorted array: late is what its tick consumed
+after the window had closed, a repeated reading is the second of one stamp, a window is a slice
+between two searches, a jump a difference of neighbours.
 """
 
 from __future__ import annotations
@@ -359,7 +360,9 @@ class View:
 
 
 def _fitted(members: Members, noise: float) -> tuple[Array, Array, Array]:
-    """Mean, least-squares rate [raw/s] and its standard deviation in every window, each (m,); see sync.SlopeWindow."""
+    """Mean, least-squares rate [raw/s] and its standard deviation in every window, each (m,); see
+    sync.SlopeWindow.
+    """
     reading, window = members.reading, members.window
     origin = members.values[members.first]
     count = np.maximum(members.size, 1)
@@ -377,7 +380,9 @@ def _fitted(members: Members, noise: float) -> tuple[Array, Array, Array]:
 
 
 def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> int:
-    """Counts that the readings before a jump predict for the time elapsed [ns], in exact integers as Sync has them."""
+    """Counts that the readings before a jump predict for the time elapsed [ns], in exact integers
+    as Sync has them.
+    """
     count = len(stamp)
     if count < 3 or stamp[-1] - stamp[0] < shortest:
         return 0

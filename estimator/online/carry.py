@@ -1,6 +1,7 @@
 """A new configuration for a run that goes on: what may change, and what the state becomes.
 
-Calibration, noise, soil, load, effects and filter may change between two ticks. Devices, signals and rates belong to
+Calibration, noise, soil, load, effects and filter may change between two ticks. Devices, signals
+and rates belong to
 threads and buffers that already run: they need a restart.
 """
 
@@ -51,10 +52,10 @@ def _differing(path: str, old: object, new: object, names: Iterable[str]) -> Ite
 def carried(pipeline: Pipeline, state: State, before: Settings) -> State:
     """The state of `before` for the pipeline that takes over.
 
-    The windows begin empty: what stands in them was read with another calibration. The estimate is kept where the soil
-    section is the same, with the prior's uncertainty, because what made it certain was read with the old configuration;
-    a new soil section is a new prior. Counters, time, the encoders' baselines, the place where the run began and what
-    effects remember go on.
+    The windows begin empty: what stands in them was read with another calibration. The estimate is
+    kept where the soil section is the same, with the prior's uncertainty, because what made it
+    certain was read with the old configuration; a new soil section is a new prior. Counters, time,
+    the encoders' baselines, the place where the run began and what effects remember go on.
     """
     fresh = pipeline.start()
     fresh.sync.continued(state.sync)

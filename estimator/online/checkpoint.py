@@ -1,8 +1,9 @@
-"""The state between two ticks as text, and back, to the bit: what a part of a recording begins with.
+"""The state between two ticks as text, and back, to the bit: what a part of a recording begins
+with.
 
-JSON holds every float exactly (Python writes the shortest digits that read back the same). Named tuples and dataclasses
-stand as {"Name": [fields]}; the names that may occur are those a `State` is declared to be made of, so a text from
-outside builds nothing else.
+JSON holds every float exactly (Python writes the shortest digits that read back the same). Named
+tuples and dataclasses stand as {"Name": [fields]}; the names that may occur are those a `State` is
+declared to be made of, so a text from outside builds nothing else.
 """
 
 from __future__ import annotations
@@ -103,7 +104,9 @@ def _kinds() -> dict[str, Callable[..., Any]]:
 
 
 def _made_of(kind: Any, seen: set[Any]) -> Iterator[type]:
-    """The named tuples, dataclasses and flags that the type hints of `kind` lead to, itself included."""
+    """The named tuples, dataclasses and flags that the type hints of `kind` lead to, itself
+    included.
+    """
     if typing.get_origin(kind) is not None or isinstance(kind, UnionType):
         for part in typing.get_args(kind):
             yield from _made_of(part, seen)

@@ -1,4 +1,6 @@
-"""Readings in, one record a tick out. The daemon, replay and the simulator's checks are thin callers of `step`."""
+"""Readings in, one record a tick out. The daemon, replay and the simulator's checks are thin
+callers of `step`.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ TickRecord = tuple[float, ...]  # values in the order of record.TICK_FIELDS; tim
 
 @dataclass(frozen=True)
 class State:
-    """What one tick leaves for the next. The sync buffers move along with it: a state is stepped once."""
+    """What one tick leaves for the next. The sync buffers move along with it: a state is stepped
+    once.
+    """
 
     sync: Sync
     track: TrackState

@@ -1,8 +1,9 @@
 """Find what is intact in an MCAP file, closed or not, cut or damaged, ours or another writer's.
 
-The file is walked record by record from its start; the index at its end is used for cross-checks only. Every length is
-held against the lengths inside its record before it is believed. Where the walk finds no valid record it searches for
-the head of the next chunk. Memory and time are bounded whatever the bytes say.
+The file is walked record by record from its start; the index at its end is used for cross-checks
+only. Every length is held against the lengths inside its record before it is believed. Where the
+walk finds no valid record it searches for the head of the next chunk. Memory and time are bounded
+whatever the bytes say.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ class Damaged(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Records of messages and their definitions: a chunk, or a run of unchunked records (compression "", crc 0)."""
+    """Records of messages and their definitions: a chunk, or a run of unchunked records
+    (compression "", crc 0).
+    """
 
     start: int  # of the stored bytes in the file
     stored: int  # how many they are
@@ -160,7 +163,9 @@ class Walk:
         self.found.damage.append("byte 0: the file's magic is damaged")
 
     def _read_closing(self) -> None:
-        """Footer, magic and summary: trusted if the checksum holds, else the walk goes to the end of the file."""
+        """Footer, magic and summary: trusted if the checksum holds, else the walk goes to the end
+        of the file.
+        """
         tail = self._read(max(0, self._size - _CLOSING), _CLOSING)
         if len(tail) < _CLOSING or not tail.endswith(MAGIC):
             return
@@ -188,7 +193,9 @@ class Walk:
         self._limit = start - _DATA_END_SIZE
 
     def _step(self, position: int) -> int | None:
-        """The position after the record at `position`, or after what had to be skipped; None at the end."""
+        """The position after the record at `position`, or after what had to be skipped; None at the
+        end.
+        """
         head = self._read(position, RECORD_HEAD.size)
         try:
             if len(head) < RECORD_HEAD.size:
@@ -358,10 +365,12 @@ def _decompress(block: Block, data: bytes) -> bytes:
 def split(
     file: BinaryIO, block: Block, content: bytes
 ) -> tuple[Starts, list[tuple[int, int, int]]]:
-    """Where the message records begin in an unpacked block, shape (n,), and its definitions (opcode, start, end).
+    """Where the message records begin in an unpacked block, shape (n,), and its definitions
+    (opcode, start, end).
 
-    The message index saves walking the records, but only if the messages it names are proven to lie end to end from the
-    last definition to the end of the block. Raises Damaged where the records do not tile it.
+    The message index saves walking the records, but only if the messages it names are proven to lie
+    end to end from the last definition to the end of the block. Raises Damaged where the records do
+    not tile it.
     """
     hint = _indexed(file, block)
     if hint.size and _tile(content, hint):
@@ -414,7 +423,9 @@ def _indexed(file: BinaryIO, block: Block) -> Starts:
 
 
 def records(data: bytes, stop: int | None = None) -> Iterator[tuple[int, int, int]]:
-    """(opcode, start, end) of each record body in `data`, up to `stop`. Raises Damaged where they do not tile it."""
+    """(opcode, start, end) of each record body in `data`, up to `stop`. Raises Damaged where they
+    do not tile it.
+    """
     stop = len(data) if stop is None else stop
     position = 0
     while position < stop:

@@ -1,8 +1,9 @@
-"""Topics of a recording: their fields, their ros2msg schema text, and their bytes in little-endian CDR.
+"""Topics of a recording: their fields, their ros2msg schema text, and their bytes in little-endian
+CDR.
 
-CDR (OMG DDSI-RTPS 10.5, "plain CDR"): four bytes of encapsulation header, then the fields in order, each aligned to its
-own size counted from the byte after that header; nothing is padded at the end. A stamp is an integer of nanoseconds
-here and `int32 sec, uint32 nanosec` on disk.
+CDR (OMG DDSI-RTPS 10.5, "plain CDR"): four bytes of encapsulation header, then the fields in order,
+each aligned to its own size counted from the byte after that header; nothing is padded at the end.
+A stamp is an integer of nanoseconds here and `int32 sec, uint32 nanosec` on disk.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ TIME_SCHEMA = "=" * 80 + f"\nMSG: {TIME}\nint32 sec\nuint32 nanosec\n"
 class Topic:
     """A topic of fixed fields. `schema_name` is the ROS name, package/msg/Name.
 
-    Types: builtin_interfaces/Time (an int [ns] on our side), the ROS integers and floats, bool, and string. A topic
+    Types: builtin_interfaces/Time (an int [ns] on our side), the ROS integers and floats, bool, and
+        string. A topic
     without a string is flat: its messages all have one size, and its arrays can be read in bulk.
     """
 
@@ -74,7 +76,9 @@ class Topic:
 
 
 class Codec:
-    """Bytes of one message type. `format` is the struct format (standard sizes, explicit padding) of a flat one."""
+    """Bytes of one message type. `format` is the struct format (standard sizes, explicit padding)
+    of a flat one.
+    """
 
     def __init__(self, fields: Sequence[Field]) -> None:
         for name, kind, _ in fields:
@@ -107,7 +111,9 @@ class Codec:
         return [primitive for part in split for primitive in part]
 
     def encode(self, values: Values) -> bytes:
-        """One message, encapsulation header included. Raises struct.error where a value does not fit its type."""
+        """One message, encapsulation header included. Raises struct.error where a value does not
+        fit its type.
+        """
         if self.flat:
             return self._struct.pack(ENCAPSULATION, *self.flatten(values))
         out = bytearray()
@@ -140,7 +146,9 @@ class Codec:
         return values
 
     def record_dtype(self, start: int) -> np.dtype[np.void]:
-        """The primitives of a flat message whose encapsulation header stands `start` bytes into a record."""
+        """The primitives of a flat message whose encapsulation header stands `start` bytes into a
+        record.
+        """
         return np.dtype(
             {
                 "names": [name for name, _ in self._primitives],
@@ -157,7 +165,9 @@ class Codec:
         return [(name, "<" + code) for name, code in zip(self.names, kinds, strict=True)]
 
     def fill(self, table: Rows, records: Rows) -> None:
-        """Copy records of `record_dtype`, shape (n,), into the rows of `table`, shape (n,), by name."""
+        """Copy records of `record_dtype`, shape (n,), into the rows of `table`, shape (n,), by
+        name.
+        """
         for name in table.dtype.names or ():
             if self.kinds[self.names.index(name)] == TIME:
                 table[name] = (
@@ -193,7 +203,9 @@ def _primitives(name: str, kind: str) -> list[tuple[str, str]]:
 
 
 def _layout(codes: Sequence[str]) -> tuple[str, list[int], int]:
-    """Struct format with explicit padding, the offset of each primitive after the header, and the end."""
+    """Struct format with explicit padding, the offset of each primitive after the header, and the
+    end.
+    """
     text, offsets, end = "I", [], 0
     for code in codes:
         size = struct.calcsize("<" + code)

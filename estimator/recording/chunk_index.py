@@ -1,7 +1,8 @@
-"""The index of a file that is being written: where its chunks are, kept small in memory until the file is closed.
+"""The index of a file that is being written: where its chunks are, kept small in memory until the
+file is closed.
 
-A chunk every fifth of a second makes 18,000 ChunkIndex records an hour, 3 MB of them. What tells one from the record
-before it are a few small numbers; those, compressed, take a tenth.
+A chunk every fifth of a second makes 18,000 ChunkIndex records an hour, 3 MB of them. What tells
+one from the record before it are a few small numbers; those, compressed, take a tenth.
 """
 
 from __future__ import annotations
@@ -20,9 +21,8 @@ _CHANNEL = struct.Struct("<HQ")  # its number, length of its MessageIndex record
 TOGETHER = 100  # records
 PIECE = 1024  # [bytes] unpacked at once
 _MASK = (1 << 64) - 1  # differences wrap: a log_time may be anything
-_HEAD = (
-    9 + 8 + 8 + 8 + 4 + 4 + 8
-)  # [bytes] of a chunk record before its data, without the name of the compression
+# [bytes] of a chunk record before its data, without the name of the compression
+_HEAD = 9 + 8 + 8 + 8 + 4 + 4 + 8
 
 
 class ChunkIndexes:
@@ -43,7 +43,8 @@ class ChunkIndexes:
         size: int,
         indexes: Sequence[tuple[int, int]],
     ) -> None:
-        """A chunk record of `length` bytes at `start`, messages from times[0] to times[1] [ns], unpacked `size` bytes.
+        """A chunk record of `length` bytes at `start`, messages from times[0] to times[1] [ns],
+        unpacked `size` bytes.
 
         indexes: (channel, length) of the MessageIndex records that follow it.
         """

@@ -1,4 +1,6 @@
-"""From the bytes of a block to values: one channel's definition in the file, and the messages of one block."""
+"""From the bytes of a block to values: one channel's definition in the file, and the messages of
+one block.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ _CDR_LE = (
 
 @dataclass(frozen=True)
 class Source:
-    """One channel of the file as defined there, and how to decode it; `codec` is None where we cannot."""
+    """One channel of the file as defined there, and how to decode it; `codec` is None where we
+    cannot.
+    """
 
     schema: Schema | None
     channel: Channel
@@ -41,7 +45,9 @@ class Source:
         return self.codec.record_dtype(MESSAGE_HEAD.size)
 
     def fill(self, table: Rows, chunk: Chunk, own: Starts) -> None:
-        """Decode the messages numbered `own`, shape (n,), of a chunk into a table of n rows, by field name."""
+        """Decode the messages numbered `own`, shape (n,), of a chunk into a table of n rows, by
+        field name.
+        """
         assert self.codec is not None
         self.codec.fill(table, gather(chunk.content, chunk.starts[own], self.dtype))
 
@@ -59,7 +65,9 @@ class Source:
 
 @dataclass(frozen=True)
 class Chunk:
-    """The good messages of one block: where their records begin in `content`, and their heads, shape (n,)."""
+    """The good messages of one block: where their records begin in `content`, and their heads,
+    shape (n,).
+    """
 
     content: bytes
     starts: Starts
@@ -89,7 +97,9 @@ class Chunk:
 def select(
     content: bytes, starts: Starts, sources: Mapping[int, Source]
 ) -> tuple[Chunk, list[str]]:
-    """The messages that are of a known channel and as long as its fields, and one line for each kind of others."""
+    """The messages that are of a known channel and as long as its fields, and one line for each
+    kind of others.
+    """
     whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
     good = np.zeros(starts.shape, bool)
     complaints = []

@@ -1,8 +1,9 @@
-"""An MCAP file written chunk by chunk (mcap.dev/spec), each chunk readable without any other part of the file.
+"""An MCAP file written chunk by chunk (mcap.dev/spec), each chunk readable without any other part
+of the file.
 
-The mcap library's own Writer puts schemas and channels into the first chunk only, so one damaged block can take the
-whole of an unclosed file with it. Here every chunk repeats the definitions it needs, under its checksum; the library's
-record classes write everything that is not a message.
+The mcap library's own Writer puts schemas and channels into the first chunk only, so one damaged
+block can take the whole of an unclosed file with it. Here every chunk repeats the definitions it
+needs, under its checksum; the library's record classes write everything that is not a message.
 """
 
 from __future__ import annotations
@@ -59,7 +60,9 @@ Starts = NDArray[np.int64]
 
 
 class RecordingError(Exception):
-    """A recording cannot be written or read; the message is one line. `errno` is the system's, where it was asked."""
+    """A recording cannot be written or read; the message is one line. `errno` is the system's,
+    where it was asked.
+    """
 
     def __init__(self, message: str, number: int | None = None) -> None:
         super().__init__(message)
@@ -89,7 +92,8 @@ def sync(fileno: int) -> None:
 def gather(
     content: bytes | bytearray, starts: Starts, dtype: np.dtype[np.void]
 ) -> NDArray[np.void]:
-    """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy, shape (n,).
+    """Records of `dtype` that stand at byte offsets `starts`, shape (n,), in `content`: a copy,
+    shape (n,).
 
     Every record must lie inside: starts + dtype.itemsize <= len(content).
     """
@@ -110,8 +114,8 @@ def record_bytes(*records: McapRecord) -> bytes:
 class McapFile:
     """The file on disk: a valid prefix at every moment, an index once closed.
 
-    A write that fails takes back what it wrote in part, so the file ends at its last whole record and the same call can
-    be made again. Raises RecordingError.
+    A write that fails takes back what it wrote in part, so the file ends at its last whole record
+    and the same call can be made again. Raises RecordingError.
     """
 
     def __init__(self, path: Path, compression: str = "zstd", library: str = LIBRARY) -> None:
@@ -140,7 +144,9 @@ class McapFile:
 
     @contextmanager
     def beginning(self) -> Iterator[None]:
-        """What has to stand in the file before anybody may find it: it gets its name then, and none if that fails."""
+        """What has to stand in the file before anybody may find it: it gets its name then, and none
+        if that fails.
+        """
         with self._discarding():
             yield
             with reported(self.path, "create"):
@@ -159,11 +165,15 @@ class McapFile:
         return self._file.fileno()
 
     def expect(self, size: int) -> None:
-        """Let the compressor take now what chunks of up to so many bytes ask of it, not by and by for hours."""
+        """Let the compressor take now what chunks of up to so many bytes ask of it, not by and by
+        for hours.
+        """
         self._compress(random.Random(size).randbytes(size))
 
     def adopt(self, other: McapFile) -> None:
-        """Take over the compressor of a file that is about to be closed: its half megabyte stays where it is."""
+        """Take over the compressor of a file that is about to be closed: its half megabyte stays
+        where it is.
+        """
         self._compress = other._compress
 
     def define(self, schema: Schema | None, channel: Channel) -> None:
@@ -178,7 +188,9 @@ class McapFile:
         self._metadata_index.append(index)
 
     def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
-        """Write message records, concatenated in `messages`, that begin at `starts`, in this order, as one chunk."""
+        """Write message records, concatenated in `messages`, that begin at `starts`, in this order,
+        as one chunk.
+        """
         if len(starts) == 0:
             return
         heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
@@ -205,7 +217,9 @@ class McapFile:
             sync(self._file.fileno())
 
     def close(self) -> None:
-        """Write index and summary and close. Whatever fails, the file is closed and stays a valid prefix."""
+        """Write index and summary and close. Whatever fails, the file is closed and stays a valid
+        prefix.
+        """
         try:
             self.finish()
             self.sync()
@@ -256,7 +270,9 @@ class McapFile:
         )
 
     def _ending(self) -> Iterator[bytes]:
-        """What comes after the last chunk, in pieces: whole, an index of hours would leave its mark on the memory."""
+        """What comes after the last chunk, in pieces: whole, an index of hours would leave its mark
+        on the memory.
+        """
         data_end = record_bytes(DataEnd(self._crc))
         start = place = self._length + len(data_end)
         crc, offsets = 0, b""
@@ -299,7 +315,9 @@ class McapFile:
 
 
 def _compressor(kind: str) -> Callable[[bytes], bytes]:
-    """One for the whole file: a context for every chunk is half a megabyte, allocated and freed five times a second."""
+    """One for the whole file: a context for every chunk is half a megabyte, allocated and freed
+    five times a second.
+    """
     if kind == "zstd":
         return zstandard.ZstdCompressor(write_content_size=True).compress
     return lz4.frame.compress if kind == "lz4" else bytes
@@ -308,7 +326,9 @@ def _compressor(kind: str) -> Callable[[bytes], bytes]:
 def _message_index(
     channel: int, heads: NDArray[np.void], offsets: NDArray[np.uint64]
 ) -> tuple[int, bytes]:
-    """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the channel."""
+    """(channel, MessageIndex record): log_time and offset inside the chunk of each message of the
+    channel.
+    """
     own = heads["channel"] == channel
     entries = np.column_stack([heads["log_time"][own], offsets[own]]).astype("<u8").tobytes()
     head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(

@@ -1,7 +1,7 @@
 """Waiting for what should end soon, in a process that may be held up.
 
-Counted in looks, not by the clock: a process that was stopped or starved looks less often too, and must not take its
-own absence for another thread's delay.
+Counted in looks, not by the clock: a process that was stopped or starved looks less often too, and
+must not take its own absence for another thread's delay.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ LOOK = 0.01  # [s] between looks
 
 
 def waited(over: Callable[[], bool], seconds: float) -> float:
-    """Look until it is over, for so many seconds at most; what is left of them, 0 where it is not over."""
+    """Look until it is over, for so many seconds at most; what is left of them, 0 where it is not
+    over.
+    """
     looks = round(seconds / LOOK)
     for look in range(looks):
         if over():

@@ -1,4 +1,6 @@
-"""A cap on what the recordings of a folder take: the oldest closed ones go first, the open one never."""
+"""A cap on what the recordings of a folder take: the oldest closed ones go first, the open one
+never.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from gritd.estimator.recording.mcapfile import DRAFT, RecordingError
 def sweep(folder: Path) -> list[Path]:
     """Delete what a killed daemon had just begun: drafts, without a message in them.
 
-    A draft with messages had its name, and a power cut took it back: it gets it again. Those are returned.
+    A draft with messages had its name, and a power cut took it back: it gets it again. Those are
+        returned.
     """
     found = []
     for draft in sorted(folder.glob(f".*.mcap{DRAFT}")):
@@ -35,7 +38,8 @@ def _messages(draft: Path) -> bool:
 
 
 def trim(folder: Path, cap: float, open_files: Collection[Path]) -> list[Path]:
-    """Delete the oldest recordings until all of them take no more than `cap` [bytes]; what was deleted.
+    """Delete the oldest recordings until all of them take no more than `cap` [bytes]; what was
+    deleted.
 
     Raises OSError where the folder cannot be read or a file cannot be deleted.
     """

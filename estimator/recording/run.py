@@ -1,7 +1,8 @@
-"""The recording contract: topics of the raw channels, run metadata, and the writer of one run's file.
+"""The recording contract: topics of the raw channels, run metadata, and the writer of one run's
+file.
 
-File order is the order of the calls, and replay relies on it: the readings a tick consumed stand before that tick.
-See docs/recording.md.
+File order is the order of the calls, and replay relies on it: the readings a tick consumed stand
+before that tick. See docs/recording.md.
 """
 
 from __future__ import annotations
@@ -91,8 +92,9 @@ LOG_TOPIC = Topic(
 class RunInfo:
     """What one run was: kept in the metadata record `gritd.run`.
 
-    A recording has no gaps. Where messages had to be dropped (a full disk) a new file begins: `part` counts these, and
-    `lost_before` says how many messages are missing between the part before and this one.
+    A recording has no gaps. Where messages had to be dropped (a full disk) a new file begins:
+    `part` counts these, and `lost_before` says how many messages are missing between the part
+    before and this one.
     """
 
     name: str = ""
@@ -108,7 +110,9 @@ class RunInfo:
 
     @classmethod
     def from_entries(cls, entries: Mapping[str, str]) -> RunInfo:
-        """The inverse of `entries`; unknown keys are ignored. Raises ValueError naming a key that cannot be read."""
+        """The inverse of `entries`; unknown keys are ignored. Raises ValueError naming a key that
+        cannot be read.
+        """
         return cls(
             name=entries.get("name", ""),
             nominal_load=_number(entries, "nominal_load", float),
@@ -131,13 +135,17 @@ def _number(
 
 
 def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
-    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not pass for a setting."""
+    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not
+    pass for a setting.
+    """
     kept = {key: value for key, value in entries.items() if key != CHECKSUM}
     return {**kept, CHECKSUM: _checksum(name, kept)}
 
 
 def seal_holds(name: str, entries: Mapping[str, str], required: bool) -> bool:
-    """Whether the entries are as sealed; without a seal (another writer's), whether none is required."""
+    """Whether the entries are as sealed; without a seal (another writer's), whether none is
+    required.
+    """
     return sealed(name, entries) == entries if CHECKSUM in entries else not required
 
 
@@ -172,11 +180,12 @@ def parts(path: Path) -> list[Path]:
 class RunWriter:
     """One recording, written synchronously in the order of the calls.
 
-    `topics` come beside the raw topics and /log. The path must not exist yet. Messages gather in memory until `flush`,
-    or until a chunk is full. After an error the messages not yet written are kept, and `flush` may be called again.
+    `topics` come beside the raw topics and /log. The path must not exist yet. Messages gather in
+    memory until `flush`, or until a chunk is full. After an error the messages not yet written are
+    kept, and `flush` may be called again.
 
-    Raises RecordingError where the file cannot be created or written, ValueError where a message does not fit its
-    topic.
+    Raises RecordingError where the file cannot be created or written, ValueError where a message
+    does not fit its topic.
     """
 
     def __init__(
@@ -218,13 +227,17 @@ class RunWriter:
             self.write_out()
 
     def write_out(self) -> None:
-        """Close the chunk and hand it to the kernel: from here on it survives the death of this process."""
+        """Close the chunk and hand it to the kernel: from here on it survives the death of this
+        process.
+        """
         if self._pending.starts:
             self._file.add_chunk(self._pending.records, self._pending.starts)
             self._pending = _Pending()
 
     def flush(self) -> None:
-        """`write_out`, and wait until the medium has it: from here on it survives the loss of power."""
+        """`write_out`, and wait until the medium has it: from here on it survives the loss of
+        power.
+        """
         self.write_out()
         self._file.sync()
 
@@ -238,7 +251,9 @@ class RunWriter:
         self._file.close()
 
     def finish(self, sync: Callable[[int], None]) -> None:
-        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor and may keep a copy."""
+        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor and
+        may keep a copy.
+        """
         try:
             self.write_out()
             self._file.finish()
@@ -255,8 +270,9 @@ class RunWriter:
         self._file.expect(size)
 
     def adopt(self, other: RunWriter) -> None:
-        """Take over what `other` could not write, and its numbering; both must have been made with the same topics and
-        the same compression."""
+        """Take over what `other` could not write, and its numbering; both must have been made with
+        the same topics and the same compression.
+        """
         self._pending, other._pending = other._pending, self._pending
         self._encoders = other._encoders
         self._file.adopt(other._file)
@@ -278,7 +294,9 @@ class _Pending:
 
 
 class _Encoder:
-    """Message records of one channel: MCAP's head and the CDR body, packed in one call where the topic is flat."""
+    """Message records of one channel: MCAP's head and the CDR body, packed in one call where the
+    topic is flat.
+    """
 
     def __init__(self, channel: int, topic: Topic) -> None:
         self._channel = channel
@@ -315,7 +333,9 @@ class _Encoder:
 
 
 def _define(file: McapFile, topics: Iterable[Topic]) -> dict[str, _Encoder]:
-    """Schemas and channels of the topics, numbered in their order. Raises ValueError where two disagree on a schema."""
+    """Schemas and channels of the topics, numbered in their order. Raises ValueError where two
+    disagree on a schema.
+    """
     schemas: dict[str, Schema] = {}
     encoders: dict[str, _Encoder] = {}
     for number, topic in enumerate(topics, start=1):

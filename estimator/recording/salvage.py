@@ -1,7 +1,8 @@
 """Read a recording: closed or not, cut at any byte, with flipped bits, or written by somebody else.
 
-Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named in `damage`, one line
-each. What `messages` and `arrays` give afterwards comes from intact chunks only, in file order.
+Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named in
+`damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks only,
+in file order.
 """
 
 from __future__ import annotations
@@ -41,9 +42,8 @@ from gritd.estimator.recording.run import (
     seal_holds,
 )
 
-MAX_KEPT = (
-    64 << 20
-)  # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
+# [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
+MAX_KEPT = 64 << 20
 MAX_LINES = 100
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good
 
@@ -117,9 +117,10 @@ class Recording:
     def arrays(self, topic: str) -> Rows:
         """All messages of a topic as one structured array, shape (n,), in file order.
 
-        Fields: log_time [ns]; order, the place of the message among all of the file, which tells what came before what;
-        then the topic's, a stamp as int64 [ns]. Without messages it is empty. Raises RecordingError for a topic whose
-        messages are not of fixed size or not decoded.
+        Fields: log_time [ns]; order, the place of the message among all of the file, which tells
+        what came before what; then the topic's, a stamp as int64 [ns]. Without messages it is
+        empty. Raises RecordingError for a topic whose messages are not of fixed size or not
+        decoded.
         """
         known = self.topics.get(topic) or next((t for t in RAW_TOPICS if t.name == topic), None)
         if known is None or not known.codec.flat:
@@ -156,8 +157,9 @@ def _table(
 def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
     """Open a recording and check all of it.
 
-    `topics` are those whose fields the caller relies on; all others are taken as the file defines them.
-    Raises RecordingError if there is no such file, it is no MCAP file, or one of `topics` lacks a field in it.
+    `topics` are those whose fields the caller relies on; all others are taken as the file defines
+    them. Raises RecordingError if there is no such file, it is no MCAP file, or one of `topics`
+    lacks a field in it.
     """
     path = Path(path)
     with reported(path, "read"), open(path, "rb", buffering=1 << 18) as file:
@@ -203,7 +205,9 @@ def _with_metadata(recording: Recording, contents: Contents) -> Recording:
 
 
 class _Check:
-    """The one pass that decides what is good: fills in a Recording's sources, blocks, counts and damage."""
+    """The one pass that decides what is good: fills in a Recording's sources, blocks, counts and
+    damage.
+    """
 
     def __init__(self, recording: Recording, known: dict[str, Topic]) -> None:
         self._recording = recording
@@ -257,7 +261,9 @@ class _Check:
             entry[1:] = [int(numbers[-1]), entry[2] + len(numbers)]
 
     def _summary(self, summary: bytes) -> dict[int, int]:
-        """Take the definitions of the summary; return its count of messages by channel, if it has one."""
+        """Take the definitions of the summary; return its count of messages by channel, if it has
+        one.
+        """
         expected: dict[int, int] = {}
         try:
             for opcode, start, end in records(summary):
@@ -287,8 +293,9 @@ class _Check:
             self._recording.damage.insert(0, f"{lost} messages are missing")
 
     def _define(self, opcode: int, body: bytes) -> None:
-        """A schema or a channel. Raises Damaged where it contradicts an earlier one, RecordingError where it lacks a
-        field that the caller relies on."""
+        """A schema or a channel. Raises Damaged where it contradicts an earlier one, RecordingError
+        where it lacks a field that the caller relies on.
+        """
         if (opcode, body) in self._seen:
             return
         fields = Texts(body)

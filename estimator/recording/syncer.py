@@ -12,7 +12,9 @@ from gritd.estimator.recording.patience import waited
 
 
 class Syncer:
-    """Waits for the medium in its own thread; a request made while one is waiting is covered by it or by the next."""
+    """Waits for the medium in its own thread; a request made while one is waiting is covered by it
+    or by the next.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -31,7 +33,9 @@ class Syncer:
         self._thread.start()
 
     def stop(self, timeout: float) -> bool:
-        """Sync what is asked for and end; False if that has not happened after `timeout` [s]: a disk may hang."""
+        """Sync what is asked for and end; False if that has not happened after `timeout` [s]: a
+        disk may hang.
+        """
         self._stopped = True
         self._wake.set()
         if self._thread.ident is None:
@@ -50,7 +54,9 @@ class Syncer:
         self._wake.set()
 
     def raise_error(self, path: Path) -> None:
-        """Raises RecordingError if a sync failed since the last call: the medium may lack what it was given."""
+        """Raises RecordingError if a sync failed since the last call: the medium may lack what it
+        was given.
+        """
         with self._lock:
             error, self._error = self._error, None
         if error:

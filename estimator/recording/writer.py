@@ -1,9 +1,11 @@
-"""The writer thread: takes messages off the loop's hands and gets them onto the disk every fifth of a second.
+"""The writer thread: takes messages off the loop's hands and gets them onto the disk every fifth of
+a second.
 
-What has been written out survives the death of the process; a second thread waits for the medium (fdatasync), so that a
-slow card delays nobody. A full or failing disk never reaches the loop: messages queue, then the oldest are dropped and
-counted, and writing resumes when it can. A file never has a gap: after a loss the next part begins (run.1.mcap, …), a
-recording of its own with the same metadata. A part also begins where a PartStart stands in the queue.
+What has been written out survives the death of the process; a second thread waits for the medium
+(fdatasync), so that a slow card delays nobody. A full or failing disk never reaches the loop:
+messages queue, then the oldest are dropped and counted, and writing resumes when it can. A file
+never has a gap: after a loss the next part begins (run.1.mcap, …), a recording of its own with the
+same metadata. A part also begins where a PartStart stands in the queue.
 """
 
 from __future__ import annotations
@@ -31,9 +33,8 @@ from gritd.estimator.recording.syncer import Syncer
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
-LARGEST = (
-    1 << 17
-)  # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
+# [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
+LARGEST = 1 << 17
 RETRY = 1.0  # [s] between attempts at a disk that failed
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -59,7 +60,8 @@ class WriterStatus:
     error: str  # the last one, kept after recovery; empty if there was none
     accepted: int  # messages handed in
     written: int  # handed to the kernel
-    dropped: int  # lost: the queue was full, the message did not fit its topic, or the disk failed to the end
+    # lost: the queue was full, the message did not fit its topic, or the disk failed to the end
+    dropped: int
     queued: int  # waiting, or being written
     files: tuple[Path, ...]  # the run's parts so far
 
@@ -67,8 +69,8 @@ class WriterStatus:
 class WriterThread:
     """Writes one run. Made, started and stopped by the daemon, fed by the loop.
 
-    Making it raises RecordingError if the first file cannot be created, ValueError if topics contradict each other;
-    afterwards nothing is raised, `status` tells.
+    Making it raises RecordingError if the first file cannot be created, ValueError if topics
+    contradict each other; afterwards nothing is raised, `status` tells.
     """
 
     def __init__(
@@ -108,7 +110,9 @@ class WriterThread:
     def put(
         self, readings: Iterable[Reading], messages: Iterable[tuple[str, int, Values]] = ()
     ) -> None:
-        """Hand over the readings that one tick consumed, then its messages. Never waits for the disk, never raises."""
+        """Hand over the readings that one tick consumed, then its messages. Never waits for the
+        disk, never raises.
+        """
         self._queue.put([*readings, *messages])
 
     def begin_part(self, config_yaml: str, message: Message) -> None:
@@ -128,14 +132,16 @@ class WriterThread:
 
     @property
     def unconfirmed(self) -> float:
-        """How long the medium has not confirmed what it was last asked to keep [s]; 0 where nothing is asked."""
+        """How long the medium has not confirmed what it was last asked to keep [s]; 0 where nothing
+        is asked.
+        """
         return self._sync.waiting()
 
     def stop(self, timeout: float = 2.0) -> WriterStatus:
         """Write what is queued, close the file with its index, and return the final counters.
 
-        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or an error says that the
-        medium has not confirmed what it was given.
+        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or an
+        error says that the medium has not confirmed what it was given.
         """
         self._stopping.set()
         if self._thread.ident is None:  # never started
@@ -268,8 +274,9 @@ class _Queue:
         return 1 + len(self._items) // BATCH + self._starts
 
     def take(self) -> tuple[list[Item], int, str]:
-        """The next messages, how many were dropped before them since the last take, and the configuration of a
-        PartStart among those. A PartStart comes first in its batch."""
+        """The next messages, how many were dropped before them since the last take, and the
+        configuration of a PartStart among those. A PartStart comes first in its batch.
+        """
         with self._lock:
             batch = list(self._leading())
             self._taken += len(batch)
@@ -328,7 +335,8 @@ class _Parts:
         self._sync_name(path)
 
     def next(self, lost: int, config_yaml: str = "") -> None:
-        """Go on in a new file, with what the old one could not take, and with another configuration if one is given.
+        """Go on in a new file, with what the old one could not take, and with another configuration
+        if one is given.
 
         Raises RecordingError, and nothing has changed.
         """
@@ -345,7 +353,9 @@ class _Parts:
         self._sync_name(path)
 
     def _sync_name(self, path: Path) -> None:
-        """A file's name is its folder's: without this, a power cut may leave the file under the name of its draft."""
+        """A file's name is its folder's: without this, a power cut may leave the file under the
+        name of its draft.
+        """
         with suppress(OSError):  # a folder that may be written but not read
             folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
             try:

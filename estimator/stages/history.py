@@ -1,4 +1,6 @@
-"""What depends on a whole run: derivatives, delays and things that remember. Arrays (n,) in order of time."""
+"""What depends on a whole run: derivatives, delays and things that remember. Arrays (n,) in order
+of time.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
 
 
 def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
-    """Time derivative of a measured quantity, smoothed over `span` [s]; 0 where there are not enough instants."""
+    """Time derivative of a measured quantity, smoothed over `span` [s]; 0 where there are not
+    enough instants.
+    """
     if np.ndim(value) == 0 or np.size(value) < 3:
         return np.zeros(np.shape(value))
     rate: Array = np.gradient(smoothed(time, value, span), time)
@@ -35,14 +39,18 @@ def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
 
 
 def delayed(time: Scalar, value: Scalar, delay: float) -> Scalar:
-    """The value `delay` [s] earlier, linear between samples, held before the first and after the last."""
+    """The value `delay` [s] earlier, linear between samples, held before the first and after the
+    last.
+    """
     if delay == 0.0 or np.ndim(value) == 0:
         return value
     return np.interp(np.asarray(time) - delay, time, value)
 
 
 def relaxed(time: Scalar, drive: Scalar, duration: float) -> Array:
-    """y with duration · dy/dt = drive − y and y = 0 at the start; exact for a drive constant between samples."""
+    """y with duration · dy/dt = drive − y and y = 0 at the start; exact for a drive constant
+    between samples.
+    """
     return _relax(drive, -np.expm1(-np.diff(time, prepend=np.ravel(time)[:1]) / duration), 0.0)
 
 

@@ -1,6 +1,8 @@
-"""What the stages of the forward model pass on: the motion, the situation of the wheel, and what is felt and read.
+"""What the stages of the forward model pass on: the motion, the situation of the wheel, and what is
+felt and read.
 
-Every field is a float (one instant, as the loop has it) or an array (n,) of one run in order of time.
+Every field is a float (one instant, as the loop has it) or an array (n,) of one run in order of
+time.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ CREEP = 2e-4  # [m/s] slower than this the wheel neither drives nor brakes: soil
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion as the encoders tell it, the weights on the axle, and where and when the run takes place."""
+    """The motion as the encoders tell it, the weights on the axle, and where and when the run takes
+    place.
+    """
 
     time: Scalar  # [s] since the first run of the campaign began
     wheel_angle: Scalar  # [rad]
@@ -132,8 +136,9 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
 def signed_slip(rim_speed: Scalar, carriage_speed: Scalar) -> tuple[Scalar, Scalar]:
     """Slip i and direction of travel from rω and v [m/s].
 
-    Along the direction of travel i = (rω − v)/rω when driving and (rω − v)/v when braking, so the faster of the two
-    divides. Opposed motions saturate at ±1; at rest both results go to 0 smoothly.
+    Along the direction of travel i = (rω − v)/rω when driving and (rω − v)/v when braking, so the
+    faster of the two divides. Opposed motions saturate at ±1; at rest both results go to 0
+    smoothly.
     """
     direction = np.tanh((rim_speed + carriage_speed) / (2.0 * CREEP))
     fastest = np.maximum(np.maximum(np.abs(rim_speed), np.abs(carriage_speed)), CREEP)

@@ -1,18 +1,21 @@
 """The linear model, Eqs. (11)-(22): triangular stresses, and forces in closed form.
 
-The printed paper has misprints in (6), (18) and (22); the forms here are right (docs/physics.md). With
+The printed paper has misprints in (6), (18) and (22); the forms here are right (docs/physics.md).
+With
 
-    σ(θ) = σₘ·hat(θ), the triangle of (11), (12);     τ(θ) = (c + σ tan φ) g(θ),   g = 1 − e^(−f(θ₁ − θ))
+    σ(θ) = σₘ·hat(θ), the triangle of (11), (12);     τ(θ) = (c + σ tan φ) g(θ),   g = 1 − e^(−f(θ₁
+    − θ))
 
 the integrals (15)-(17) are linear in c, σₘ and σₘ tan φ:
 
-    T  = r²b [c·A₁ + σₘ tan φ·A₂]                    (22)    A₁ = ∫ g dθ           A₂ = ∫ hat g dθ
-    W  = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]              (21)    B₁ = ∫ hat cos θ dθ   B₂, B₃ = ∫ {1, hat} g sin θ dθ
-    DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]              (20)    C₁, C₂ = ∫ {1, hat} g cos θ dθ   C₃ = ∫ hat sin θ dθ
+    T  = r²b [c·A₁ + σₘ tan φ·A₂]                    (22)    A₁ = ∫ g dθ           A₂ = ∫ hat g dθ W
+    = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]              (21)    B₁ = ∫ hat cos θ dθ   B₂, B₃ = ∫ {1, hat}
+    g sin θ dθ DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]              (20)    C₁, C₂ = ∫ {1, hat} g cos θ
+    dθ   C₃ = ∫ hat sin θ dθ
 
-`predict` eliminates σₘ through (21), so a wheel of known load needs neither n nor K. Where f < 0 (braking) the shear
-stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤ 1. The functions take numbers;
-`predict_batch` takes arrays, and the others do too when given `ARRAYS`.
+`predict` eliminates σₘ through (21), so a wheel of known load needs neither n nor K. Where f < 0
+(braking) the shear stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤ 1.
+The functions take numbers; `predict_batch` takes arrays, and the others do too when given `ARRAYS`.
 """
 
 from __future__ import annotations
@@ -54,7 +57,9 @@ class Exponent(NamedTuple):
 
 
 class Shift(NamedTuple):
-    """What another stress distribution adds to A₁ … C₃, and its derivatives (see estimator/filter/shift.py)."""
+    """What another stress distribution adds to A₁ … C₃, and its derivatives (see
+    estimator/filter/shift.py).
+    """
 
     value: Integrals
     theta_1: Integrals
@@ -94,10 +99,11 @@ def predict(
     maths: Maths = NUMBERS,
     shift: Shift | None = None,
 ) -> Prediction:
-    """T, DP, resistance and σₘ under a load W, with gradients with respect to GRADIENT. Eqs. (20)-(22), (19), (5).
+    """T, DP, resistance and σₘ under a load W, with gradients with respect to GRADIENT. Eqs.
+    (20)-(22), (19), (5).
 
-    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are those of the stresses it
-    stands for.
+    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are those
+    of the stresses it stands for.
     """
     ratio, ratio_slip = _peak_ratio(wheel, slip, maths)
     exponent = shear_exponent(wheel, k, theta_1, slip, maths)
@@ -134,7 +140,9 @@ def predict(
 def predict_batch(
     wheel: Wheel, c: Scalar, tan_phi: Scalar, k: Scalar, theta_1: Scalar, slip: Scalar, load: Scalar
 ) -> Prediction:
-    """`predict` for arrays: every argument a float or (n,); every field, and every entry of a gradient, (n,)."""
+    """`predict` for arrays: every argument a float or (n,); every field, and every entry of a
+    gradient, (n,).
+    """
     c, tan_phi, k, theta_1, slip, load = np.broadcast_arrays(c, tan_phi, k, theta_1, slip, load)
     prediction = predict(wheel, c, tan_phi, k, theta_1, slip, load, ARRAYS)
     shape = np.shape(c)
@@ -183,8 +191,8 @@ def shear_exponent(
 ) -> Exponent:
     """f of (19): (r/2k)[(1 + i) − (1 − i) cos θ₁], the mean of −dj/dθ / k at θ = 0 and θ = θ₁.
 
-    With the velocity ratio v/(rω) = 1 − lag in place of 1 − i it holds for braking too; it is written so that it
-    keeps its digits as i and θ₁ go to zero.
+    With the velocity ratio v/(rω) = 1 − lag in place of 1 − i it holds for braking too; it is
+    written so that it keeps its digits as i and θ₁ go to zero.
     """
     q = maths.clip(1.0 + slip, LOCKED, 1.0)  # 1 when driving, 1 + i when braking
     lag = slip / q
@@ -214,9 +222,11 @@ def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scal
 def triangular_shear_stress(
     theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar
 ) -> Array:
-    """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom dead centre.
+    """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom dead
+    centre.
 
-    The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g with σ triangular.
+    The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g
+    with σ triangular.
     """
     front = tau_m * np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m)
     rear = tau_0 + (tau_m - tau_0) * np.divide(theta, theta_m)
@@ -362,7 +372,8 @@ class _At(NamedTuple):
     def response(
         self, support: Value, torque: Value, pull: Value, resistance: Value
     ) -> tuple[Value, Value, Value]:
-        """Change of T, DP and resistance, in units of rb (T: r²b), from their own terms and through s.
+        """Change of T, DP and resistance, in units of rb (T: r²b), from their own terms and through
+        s.
 
         support: what (21) leaves for s·(B₁ + tan φ B₃) to carry, changed.
         """
@@ -377,7 +388,9 @@ class _At(NamedTuple):
         )
 
     def along(self, c: Value, cohesive: Integrals, dx: Integrals) -> tuple[Value, Value, Value]:
-        """`response` to a change of the integrals: `cohesive` that of θ₁x, which c multiplies, and dx that of x."""
+        """`response` to a change of the integrals: `cohesive` that of θ₁x, which c multiplies, and
+        dx that of x.
+        """
         s, friction = self.s, self.tan_phi * self.s
         return self.response(
             -c * cohesive.b2 - s * dx.b1 - friction * dx.b3,

@@ -1,10 +1,13 @@
 """The original model, Eqs. (1)-(10): stresses on the rim, integrated by Gauss-Legendre quadrature.
 
-Angles θ [rad] are measured from bottom dead centre, positive forward: entry θ₁, peak of normal stress θₘ, exit θ₂.
-Samples run along the last axis: every argument is a float or an array (n,), and the results have that shape.
-Angles inside the contact carry the quadrature nodes on the axis before it. Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤ 1.
+Angles θ [rad] are measured from bottom dead centre, positive forward: entry θ₁, peak of normal
+stress θₘ, exit θ₂.
+Samples run along the last axis: every argument is a float or an array (n,), and the results have
+that shape. Angles inside the contact carry the quadrature nodes on the axis before it. Valid for 0
+≤ θ₁ ≤ π/2, −1 < i ≤ 1.
 
-The pieces can be called apart: `contact` gives σ and τ at the nodes, `integrate` sums whatever stands there.
+The pieces can be called apart: `contact` gives σ and τ at the nodes, `integrate` sums whatever
+    stands there.
 """
 
 from __future__ import annotations
@@ -34,7 +37,9 @@ class Arc(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Stresses at the nodes, rear zone first; each field (2·order, n), or (2·order,) for one sample."""
+    """Stresses at the nodes, rear zone first; each field (2·order, n), or (2·order,) for one
+    sample.
+    """
 
     points: Arc
     weight: Array  # quadrature weight times dθ [rad]
@@ -59,7 +64,8 @@ def theta_m(wheel: Wheel, slip: Scalar, theta_1: Scalar) -> Scalar:
 def velocity_ratio(slip: Scalar) -> Array:
     """Carriage speed over rim speed, v/(rω): 1 − i when driving, 1/(1 + i) when braking.
 
-    Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with the same slope.
+    Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with
+    the same slope.
     """
     q = np.clip(
         1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0
@@ -68,7 +74,9 @@ def velocity_ratio(slip: Scalar) -> Array:
 
 
 def arc(theta_1: Scalar, theta: Scalar) -> Arc:
-    """Angles of a point θ on the rim; differences of sines and cosines keep their digits however small the angles."""
+    """Angles of a point θ on the rim; differences of sines and cosines keep their digits however
+    small the angles.
+    """
     turned = np.subtract(theta_1, theta)
     u = np.tan(0.5 * turned)  # one tangent instead of sine and cosine: numpy vectorises it
     q = 2.0 * u / (1.0 + u * u)  # sin(θ₁ − θ)
@@ -86,7 +94,9 @@ def front_stress(wheel: Wheel, soil: Soil, front: Arc) -> Array:
 def rear_stress(
     wheel: Wheel, soil: Soil, theta_1: Scalar, theta_m: Scalar, theta: Scalar, theta_2: Scalar = 0.0
 ) -> Array:
-    """Normal stress σ [Pa] between θ₂ and θₘ, Eq. (4): the front zone's, mirrored and stretched about θₘ."""
+    """Normal stress σ [Pa] between θ₂ and θₘ, Eq. (4): the front zone's, mirrored and stretched
+    about θₘ.
+    """
     mirrored = theta_1 - (theta - theta_2) * (theta_1 - theta_m) / (theta_m - theta_2)
     return front_stress(wheel, soil, arc(theta_1, mirrored))
 
@@ -94,15 +104,17 @@ def rear_stress(
 def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
     """Shear displacement j [m] of the soil, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ − sin θ)].
 
-    The rim moves past the soil at rω − v cos θ while θ falls from θ₁ at the rate ω, so j = r∫(1 − (v/rω) cos θ) dθ.
-    Written with v/(rω) it holds for driving and braking; j < 0 where the soil has been dragged forward.
+    The rim moves past the soil at rω − v cos θ while θ falls from θ₁ at the rate ω, so j = r∫(1 −
+    (v/rω) cos θ) dθ. Written with v/(rω) it holds for driving and braking; j < 0 where the soil has
+    been dragged forward.
     """
     displacement: Array = wheel.radius * (points.turned - velocity_ratio(slip) * points.advance)
     return displacement
 
 
 def janosi(x: Array) -> Array:
-    """Share of the shear strength mobilised at x = j/k, Eq. (2): 1 − e^(−x); odd, so that τ has the sign of j.
+    """Share of the shear strength mobilised at x = j/k, Eq. (2): 1 − e^(−x); odd, so that τ has the
+    sign of j.
 
     Janosi and Hanamoto (1961).
     """
@@ -168,7 +180,9 @@ def forces(
     mobilisation: Mobilisation = janosi,
     order: int = ORDER,
 ) -> Forces:
-    """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the paper."""
+    """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the
+    paper.
+    """
     stresses = contact(
         wheel,
         soil,
@@ -193,9 +207,11 @@ def _dot(a: Array, b: Array) -> Array:
 
 @cache
 def _nodes(order: int) -> tuple[Array, Array]:
-    """Nodes and weights on s ∈ [0, 1], where s = 0 is the stress-free end of a zone and s = 1 is θₘ.
+    """Nodes and weights on s ∈ [0, 1], where s = 0 is the stress-free end of a zone and s = 1 is
+    θₘ.
 
-    Gauss-Legendre in t with s = t³: stress starts as sⁿ, which is t³ⁿ and so smooth enough for any n of a soil.
+    Gauss-Legendre in t with s = t³: stress starts as sⁿ, which is t³ⁿ and so smooth enough for any
+    n of a soil.
     """
     t, weight = np.polynomial.legendre.leggauss(order)
     t = 0.5 * (t + 1.0)

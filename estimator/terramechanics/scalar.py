@@ -1,12 +1,16 @@
-"""`linear.predict` for one sample, spelled out: the loop and the replay spend most of their time here.
+"""`linear.predict` for one sample, spelled out: the loop and the replay spend most of their time
+here.
 
-With v = (θ₁ − θ)/θ₁ from 0 at entry to 1 at bottom dead centre, and hat(v) the triangle of (11), (12) with its peak at
-v = α = 1 − λ, λ = θₘ/θ₁, the integrals of (20)-(22) are values of two Laplace transforms,
+With v = (θ₁ − θ)/θ₁ from 0 at entry to 1 at bottom dead centre, and hat(v) the triangle of (11),
+(12) with its peak at v = α = 1 − λ, λ = θₘ/θ₁, the integrals of (20)-(22) are values of two Laplace
+transforms,
 
-    E(s) = ∫₀¹ e^(−sv) dv = (1 − e^(−s))/s       H(s) = ∫₀¹ hat(v) e^(−sv) dv = [1/α − e^(−αs)/(αλ) + e^(−s)/λ]/s²
+    E(s) = ∫₀¹ e^(−sv) dv = (1 − e^(−s))/s       H(s) = ∫₀¹ hat(v) e^(−sv) dv = [1/α − e^(−αs)/(αλ)
+    + e^(−s)/λ]/s²
 
-at s = η = fθ₁, iθ₁ and η + iθ₁, because cos θ + i sin θ = e^(iθ₁) e^(−iθ₁v). They lose digits as s → 0 and as θₘ nears
-an end of the contact, and f < 0 is braking: there `linear`, stable in every limit, gives the answer.
+at s = η = fθ₁, iθ₁ and η + iθ₁, because cos θ + i sin θ = e^(iθ₁) e^(−iθ₁v). They lose digits as s
+→ 0 and as θₘ nears an end of the contact, and f < 0 is braking: there `linear`, stable in every
+limit, gives the answer.
 """
 
 from __future__ import annotations
@@ -39,7 +43,9 @@ def predict(
     load: float,
     shift: Shift | None = None,
 ) -> Prediction:
-    """T, DP, resistance and σₘ under a load W, with gradients: arguments and result are those of `linear.predict`."""
+    """T, DP, resistance and σₘ under a load W, with gradients: arguments and result are those of
+    `linear.predict`.
+    """
     lam = wheel.c1 + wheel.c2 * slip
     rise, scale = sin(0.5 * theta_1) ** 2, wheel.radius / k
     f = scale * (slip + (1.0 - slip) * rise)  # Eq. (19)
@@ -55,7 +61,9 @@ def predict(
     friction = s * tan_phi
 
     def forces(a1: float, a2: float, bare: complex, one: complex, hat: complex) -> Change:
-        """Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same formulas."""
+        """Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the
+        same formulas.
+        """
         drag = area * s * bare.imag
         return (
             arm * (cohesion * a1 + friction * a2),
@@ -144,7 +152,9 @@ def _added(x: Integrals, change: linear.Integrals, factor: float) -> Integrals:
 
 
 def _integrals(theta_1: float, eta: float, lam: float) -> tuple[Integrals, Integrals, Integrals]:
-    """A₁, A₂, B₁ + iC₃, C₁ + iB₂, C₂ + iB₃ of linear.py, and their derivatives by ln θ₁, at fixed f, and by ln f."""
+    """A₁, A₂, B₁ + iC₃, C₁ + iB₂, C₂ + iB₃ of linear.py, and their derivatives by ln θ₁, at fixed
+    f, and by ln f.
+    """
     turning, both = 1j * theta_1, complex(eta, theta_1)
     alpha, ahead = 1.0 - lam, turn(turning)
     e0, h0, e0_s, h0_s = _transforms(eta, exp(-eta), exp(-eta * alpha), lam)

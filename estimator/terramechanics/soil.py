@@ -46,7 +46,9 @@ class PressureSinkage:
 
 @dataclass(frozen=True)
 class Soil:
-    """Soil under one wheel. Fields are floats, or arrays of one shape (n,) where the soil varies by sample."""
+    """Soil under one wheel. Fields are floats, or arrays of one shape (n,) where the soil varies by
+    sample.
+    """
 
     cohesion: Scalar  # c [Pa]
     tan_phi: Scalar  # tangent of the internal friction angle [-]

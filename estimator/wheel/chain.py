@@ -1,8 +1,9 @@
 """The configured effects as the on-line filter uses them: one window at a time, in floats.
 
-Sensor and drivetrain effects are undone before the update, wheel and testbed effects are added to what is predicted,
-soil effects turn the estimated soil into the soil under this window, and contact effects act through the shift of the
-eight integrals (shift.py). Everything an effect does stands in its own file; here it is only put in order.
+Sensor and drivetrain effects are undone before the update, wheel and testbed effects are added to
+what is predicted, soil effects turn the estimated soil into the soil under this window, and contact
+effects act through the shift of the eight integrals (shift.py). Everything an effect does stands in
+its own file; here it is only put in order.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ class Context(NamedTuple):
 
 
 class Here(NamedTuple):
-    """The soil under this window from the estimated one: slope and offset of c [Pa], tan φ and k [m]."""
+    """The soil under this window from the estimated one: slope and offset of c [Pa], tan φ and k
+    [m].
+    """
 
     c_slope: float = 1.0
     c_offset: float = 0.0
@@ -50,7 +53,9 @@ class Here(NamedTuple):
 
 
 class Added(NamedTuple):
-    """What wheel and testbed effects add to rim torque [N·m] and pull [N], linear in c [Pa], tan φ and k [m]."""
+    """What wheel and testbed effects add to rim torque [N·m] and pull [N], linear in c [Pa], tan φ
+    and k [m].
+    """
 
     torque: float = 0.0
     torque_by_c: float = 0.0
@@ -89,7 +94,9 @@ class Chain:
         self._modulus = soil.pressure_sinkage.modulus(settings.wheel.width)
 
     def undo(self, snapshot: Snapshot, load: float, context: Context) -> Undone:
-        """Undo the sensor and drivetrain effects of a window and work out the others; load: W measured or assumed."""
+        """Undo the sensor and drivetrain effects of a window and work out the others; load: W
+        measured or assumed.
+        """
         wheel, situation = self._situation(snapshot, load, context)
         read = Sensed(
             snapshot.sinkage.value,
@@ -121,7 +128,9 @@ class Chain:
     def felt(
         self, situation: Situation, torque: float, pull: float, soil: tuple[float, float, float]
     ) -> tuple[float, float]:
-        """Axle torque [N·m] and drawbar pull [N] where the rim gives `torque` and `pull` in a soil (c, tan φ, k)."""
+        """Axle torque [N·m] and drawbar pull [N] where the rim gives `torque` and `pull` in a soil
+        (c, tan φ, k).
+        """
         c, tan_phi, k = soil
         situation = replace(
             situation,
@@ -224,7 +233,9 @@ class Chain:
 
 
 def variants(settings: Settings) -> list[tuple[Effect, ...]]:
-    """The configured effects with one uncertain parameter moved by its sigma, for each such parameter in turn."""
+    """The configured effects with one uncertain parameter moved by its sigma, for each such
+    parameter in turn.
+    """
     found = []
     for effect in settings.effects:
         for name, value in effect.parameters.items():
@@ -244,7 +255,9 @@ def _moved(
 
 
 def with_latencies(settings: Settings) -> Settings:
-    """The settings with a configured sensor latency in the channels' own, and a horizon that waits for the slowest."""
+    """The settings with a configured sensor latency in the channels' own, and a horizon that waits
+    for the slowest.
+    """
     delays = {
         key: value.value
         for effect in settings.effects

@@ -1,6 +1,8 @@
-"""Slip, entry angle and angle of maximum stress, each with its variance. Plain floats in, plain floats out.
+"""Slip, entry angle and angle of maximum stress, each with its variance. Plain floats in, plain
+floats out.
 
-Slip is positive when the wheel turns faster than it travels (driving) and negative when it is pushed (braking):
+Slip is positive when the wheel turns faster than it travels (driving) and negative when it is
+pushed (braking):
 
     i = (rω − v) / rω     rω ≥ v        i = (rω − v) / v     rω < v
 
@@ -25,7 +27,8 @@ class Slip(NamedTuple):
 
 
 def slip(rim_speed: float, travel_speed: float) -> Slip:
-    """Slip i from the rim speed rω and the travel speed v, both [m/s] along the direction of travel; 0 at rest.
+    """Slip i from the rim speed rω and the travel speed v, both [m/s] along the direction of
+    travel; 0 at rest.
 
     NaN of NaN. Defined for rω ≥ 0 or v ≥ 0; opposed motions saturate at ±1 with zero derivatives.
     """
@@ -79,9 +82,10 @@ def slope_sigma(scatter: float, spread: float, readings: int, counts_moved: floa
     readings:     number of readings n in the window
     counts_moved: counts moved within the window m [raw]
 
-    Quantisation errors are independent only while the count changes between readings. A count that moves by m edges
-    in the window is worth about (m + 1)² independent readings, never more than n: a bound found by simulation (the
-    test repeats it); with no edge at all it is one count over the window.
+    Quantisation errors are independent only while the count changes between readings. A count that
+    moves by m edges in the window is worth about (m + 1)² independent readings, never more than n:
+    a bound found by simulation (the test repeats it); with no edge at all it is one count over the
+    window.
     """
     independent = min(readings, (int(counts_moved) + 1) ** 2)
     return scatter / spread * sqrt(readings / independent)

@@ -1,9 +1,11 @@
-"""Readings in, one calibrated snapshot a tick out: all channels over the same window, 50 ms behind the present.
+"""Readings in, one calibrated snapshot a tick out: all channels over the same window, 50 ms behind
+the present.
 
-Each channel keeps its readings sorted by stamp. A tick at t closes the window at t − horizon: readings up to there
-move in, readings older than the window move out. A reading that comes later than the horizon allows is counted and
-dropped, one that comes twice is counted and dropped, one that comes out of order but in time changes nothing: the
-result is that of the sorted stream, bit for bit.
+Each channel keeps its readings sorted by stamp. A tick at t closes the window at t − horizon:
+readings up to there move in, readings older than the window move out. A reading that comes later
+than the horizon allows is counted and
+dropped, one that comes twice is counted and dropped, one that comes out of order but in time
+changes nothing: the result is that of the sorted stream, bit for bit.
 """
 
 from __future__ import annotations
@@ -131,8 +133,8 @@ class MeanWindow(Window):
 class SlopeWindow(Window):
     """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
 
-    max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken out by a shift of
-    the baseline, so neither position nor speed shows it.
+    max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken
+    out by a shift of the baseline, so neither position nor speed shows it.
     """
 
     max_rate: float = inf
@@ -197,7 +199,9 @@ NOTHING = Measured(float("nan"), 0.0)
 
 
 class Snapshot(NamedTuple):
-    """All channels over one window, calibrated, SI. Quantities of an absent optional sensor are NaN ± 0."""
+    """All channels over one window, calibrated, SI. Quantities of an absent optional sensor are NaN
+    ± 0.
+    """
 
     evaluated: int  # centre of the window [ns]
     ready: bool  # every required channel has a value
@@ -216,7 +220,9 @@ class Snapshot(NamedTuple):
 
 
 class Sync:
-    """The sorted windows of all channels. `push` takes readings, `snapshot` closes the windows for one tick."""
+    """The sorted windows of all channels. `push` takes readings, `snapshot` closes the windows for
+    one tick.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -271,7 +277,9 @@ class Sync:
             window.counters = self.counters
 
     def continued(self, before: Sync) -> None:
-        """Begin with empty windows where another sync ends: its counters and its encoders' baselines go on."""
+        """Begin with empty windows where another sync ends: its counters and its encoders'
+        baselines go on.
+        """
         self.received = before.received
         self.counters = before.counters
         for name, window in self._slopes.items():
@@ -306,9 +314,8 @@ class Sync:
         ) or isnan(value[2]):
             self.counters.invalid += 1
             return
-        repeated = (
-            Counters()
-        )  # the three axes share one stamp: count a late or repeated reading once
+        # the three axes share one stamp: count a late or repeated reading once
+        repeated = Counters()
         for axis, component in (("fx", value[0]), ("ty", value[4])):
             if not isnan(component):  # an axis that is not measured
                 self._wrench[axis].insert(reading.stamp, component, repeated)
@@ -373,7 +380,9 @@ class Sync:
         return Measured(mean.value * scale + calibration.offset.value, mean.sigma * abs(scale))
 
     def _stale(self, t: int) -> int:
-        """Bits of channels whose last bytes came longer ago than they may; a channel never heard of counts too."""
+        """Bits of channels whose last bytes came longer ago than they may; a channel never heard of
+        counts too.
+        """
         return sum(
             CHANNEL_BITS[name]
             for name, limit in self._stale_after.items()
@@ -383,9 +392,10 @@ class Sync:
     def _stuck(self, wheel: Measured, carriage: Measured) -> int:
         """Bits of channels whose value does not change at all while the others show motion.
 
-        An encoder is stuck when the other encoder moves and it does not change; a wheel that really stands still
-        while the carriage moves is dragged, which no update survives either. A potentiometer, shunt or wrench is stuck
-        when the wheel turns and not one digit of noise shows, of the wrench on any axis.
+        An encoder is stuck when the other encoder moves and it does not change; a wheel that really
+        stands still while the carriage moves is dragged, which no update survives either. A
+        potentiometer, shunt or wrench is stuck when the wheel turns and not one digit of noise
+        shows, of the wrench on any axis.
         """
         turning, travelling = _moves(wheel), _moves(carriage)
         bits = 0

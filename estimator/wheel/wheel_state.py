@@ -1,4 +1,6 @@
-"""What the wheel is doing: slip, entry angle and the reason, if any, why this window teaches nothing about the soil."""
+"""What the wheel is doing: slip, entry angle and the reason, if any, why this window teaches
+nothing about the soil.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,8 @@ from gritd.estimator.wheel.geometry import (
 )
 from gritd.estimator.wheel.sync import Measured, Snapshot
 
-BRAKING_SLIP = (
-    -0.05
-)  # the linearised shear displacement changes sign along the contact below about this slip
+# the linearised shear displacement changes sign along the contact below about this slip
+BRAKING_SLIP = -0.05
 STALL_SLIP = 0.95
 SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁

@@ -1,4 +1,5 @@
-"""What in_guest_player.py plays: a simulated run as bytes for both wires, thinned for an emulated processor.
+"""What in_guest_player.py plays: a simulated run as bytes for both wires, thinned for an emulated
+processor.
 
 python -m tests.boot.record FILE
 """

@@ -1,4 +1,6 @@
-"""What the driver tests share: settings for any wiring, pseudo-terminals that can be unplugged, waiting."""
+"""What the driver tests share: settings for any wiring, pseudo-terminals that can be unplugged,
+waiting.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,9 @@ class Ticking:
 
 
 class Plug:
-    """A serial device on a pseudo-terminal behind a fixed path; it can be unplugged and plugged in again."""
+    """A serial device on a pseudo-terminal behind a fixed path; it can be unplugged and plugged in
+    again.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -1,6 +1,8 @@
-"""Readers on CAN buses that need no hardware: udp_multicast on loopback, slcan over a pseudo-terminal, virtual.
+"""Readers on CAN buses that need no hardware: udp_multicast on loopback, slcan over a
+pseudo-terminal, virtual.
 
-True bus-off and a vanishing controller cannot be brought about without hardware; a bus whose recv raises stands in.
+True bus-off and a vanishing controller cannot be brought about without hardware; a bus whose recv
+raises stands in.
 """
 
 from __future__ import annotations
@@ -165,7 +167,8 @@ def test_a_lost_half_of_the_wrench_is_counted_not_mixed(virtual):
     assert virtual.reader.stats().incomplete == 1
 
 
-# ---- floods --------------------------------------------------------------------------------------------------------
+# ---- floods --------------------------------------------------------------------------------------
+# ------------------
 
 
 def unwanted(n):
@@ -173,7 +176,9 @@ def unwanted(n):
 
 
 def test_paced_flood_of_unwanted_ids_loses_no_wanted_frame(multicast):
-    """Unwanted messages at about 5000 a second, a wanted one among every twenty; lost time is not made up for."""
+    """Unwanted messages at about 5000 a second, a wanted one among every twenty; lost time is not
+    made up for.
+    """
     start = time.monotonic()
     for n in range(5000):
         start = max(start, time.monotonic() - n / 5000 - 0.01)
@@ -210,7 +215,8 @@ def test_burst_loses_nothing_uncounted(multicast):
     print(f"burst: {stats.frames} received, {stats.lost} lost and counted")
 
 
-# ---- hostile input -------------------------------------------------------------------------------------------------
+# ---- hostile input
+# -------------------------------------------------------------------------------------------------
 
 
 def hostile_datagrams(rng, count):
@@ -251,7 +257,8 @@ def test_hostile_datagrams_are_counted_and_ignored(multicast, count):
     assert stats.bad > count / 3
 
 
-# ---- slcan ---------------------------------------------------------------------------------------------------------
+# ---- slcan ---------------------------------------------------------------------------------------
+# ------------------
 
 
 @pytest.fixture
@@ -312,7 +319,8 @@ def test_slcan_unplugged_and_back_without_losing_a_descriptor(slcan):
     assert slcan.reader.stats().reopened == 10
 
 
-# ---- a failing bus -------------------------------------------------------------------------------------------------
+# ---- a failing bus
+# -------------------------------------------------------------------------------------------------
 
 
 class FailingBus:

@@ -22,7 +22,9 @@ def device_us(t: float, ppm: float = 0.0) -> int:
 
 
 def jittery(seconds, jitter, ppm, rate=250.0, seed=1):
-    """Single frames, each held back by a random delay of up to `jitter` [s]: (sample times, receive time) each."""
+    """Single frames, each held back by a random delay of up to `jitter` [s]: (sample times, receive
+    time) each.
+    """
     rng = random.Random(seed)
     latest = 0.0
     for k in range(int(seconds * rate)):
@@ -90,7 +92,9 @@ def test_stamps_grow_with_the_device_time():
 
 
 def test_an_adapter_that_gets_quicker_makes_no_sample_jump():
-    """Chunks of 16 ms come 7 ms earlier than all before: the line is pushed down, below what was stamped already."""
+    """Chunks of 16 ms come 7 ms earlier than all before: the line is pushed down, below what was
+    stamped already.
+    """
     clock, last, gaps = DeviceClock(), None, []
     for number in range(200):
         times = [0.016 * number + 0.001 * k for k in range(16)]

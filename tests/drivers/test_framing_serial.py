@@ -1,4 +1,6 @@
-"""Both serial framings: what is sent arrives, damage costs at most one more frame, every byte is accounted for."""
+"""Both serial framings: what is sent arrives, damage costs at most one more frame, every byte is
+accounted for.
+"""
 
 from __future__ import annotations
 

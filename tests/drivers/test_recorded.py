@@ -31,7 +31,9 @@ def decoder(framing="cobs"):
 
 
 def drive(framing, seconds=3.0, seed=7):
-    """A wheel that turns forward through the rollover of sixteen bits and back, chunks cut and delayed at random."""
+    """A wheel that turns forward through the rollover of sixteen bits and back, chunks cut and
+    delayed at random.
+    """
     rng = random.Random(seed)
     wire = SerialWire(serial_device(framing=framing))
     chunks, waiting, truth = [], b"", []

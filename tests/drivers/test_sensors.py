@@ -27,7 +27,8 @@ def frame(*values, key="k", sequence=None):
     return Frame(key, sequence, None, values)
 
 
-# ---- the folder ----------------------------------------------------------------------------------------------------
+# ---- the folder ----------------------------------------------------------------------------------
+# ------------------
 
 
 def test_every_channel_has_its_sensor_and_every_sensor_its_channel():
@@ -68,7 +69,8 @@ def test_a_frame_with_the_wrong_number_of_values_is_quarantined(name):
     assert sensor.quarantined == 1
 
 
-# ---- encoders ------------------------------------------------------------------------------------------------------
+# ---- encoders ------------------------------------------------------------------------------------
+# ------------------
 
 
 @FUZZ
@@ -125,7 +127,8 @@ def test_a_count_that_the_counter_cannot_show_is_quarantined(count):
     assert sensor.value(frame(10)) == 10 and sensor.value(frame(12)) == 12
 
 
-# ---- analogue ------------------------------------------------------------------------------------------------------
+# ---- analogue ------------------------------------------------------------------------------------
+# ------------------
 
 
 @FUZZ
@@ -138,7 +141,8 @@ def test_analog_passes_what_is_in_range_and_nothing_else(value):
     assert sensor.quarantined == (not valid)
 
 
-# ---- wrench --------------------------------------------------------------------------------------------------------
+# ---- wrench --------------------------------------------------------------------------------------
+# ------------------
 
 
 def two_part():

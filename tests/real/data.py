@@ -1,4 +1,6 @@
-"""The real recordings beside the repository; they belong to others, and a test without them is skipped."""
+"""The real recordings beside the repository; they belong to others, and a test without them is
+skipped.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ def needs(rig: str) -> pytest.MarkDecorator:
 
 
 class Physical:
-    """An imported recording through its own calibration: seconds since its first reading, and SI values."""
+    """An imported recording through its own calibration: seconds since its first reading, and SI
+    values.
+    """
 
     def __init__(self, path: Path) -> None:
         self.recording = salvage.read(path)

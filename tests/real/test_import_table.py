@@ -52,7 +52,9 @@ def test_the_soils_strength_is_hidden_unless_asked_for(tmp_path: Path) -> None:
 
 @needs("emps")
 def test_the_drive_keeps_its_published_parameters(tmp_path: Path) -> None:
-    """Least squares on the imported recording: mass, viscous and Coulomb friction within 3 % of the benchmark's."""
+    """Least squares on the imported recording: mass, viscous and Coulomb friction within 3 % of the
+    benchmark's.
+    """
     assert main(["emps", str(REAL / "emps"), "-o", str(tmp_path)]) == 0
     drive = Physical(tmp_path / "data-emps.mcap")
     assert len(drive.time("wheel_encoder")) == 24841

@@ -1,1 +1,3 @@
-"""Every fault of the list gritd must survive, one scenario a row, each with three seeds and a measured figure."""
+"""Every fault of the list gritd must survive, one scenario a row, each with three seeds and a
+measured figure.
+"""

@@ -1,4 +1,6 @@
-"""Figures: a scenario states what it measured; `python -m gritd.tools.dev.reliability` makes docs/reliability.md from them."""
+"""Figures: a scenario states what it measured; `python -m gritd.tools.dev.reliability` makes
+docs/reliability.md from them.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ FIGURES = "GRITD_FIGURES"  # file that collects what is measured, one JSON line 
 
 
 def pytest_generate_tests(metafunc):
-    """A scenario that takes a seed is run with three; where it needs the daemon, two of them count as slow."""
+    """A scenario that takes a seed is run with three; where it needs the daemon, two of them count
+    as slow.
+    """
     if "seed" in metafunc.fixturenames:
         others = SEEDS[1:] if getattr(metafunc.module, "QUICK", False) else map(slow, SEEDS[1:])
         metafunc.parametrize("seed", [SEEDS[0], *others])
@@ -24,11 +28,14 @@ def slow(seed):
 
 @pytest.fixture
 def figure(request):
-    """figure(row, level, name, value, unit, limit, real): print what was measured, keep it, hold it to its limit.
+    """figure(row, level, name, value, unit, limit, real): print what was measured, keep it, hold it
+    to its limit.
 
-    row: the fault, as the list names it. level: what ran, and what was simulated. limit: largest value allowed;
-    real: a time in the real world, which a machine that stalls decides as well as we do. A test that fails for it says
-    nothing, so it is stated, and `python -m gritd.tools.dev.reliability` holds it to its limit.
+    row: the fault, as the list names it. level: what ran, and what was simulated. limit: largest
+        value allowed;
+    real: a time in the real world, which a machine that stalls decides as well as we do. A test
+    that fails for it says nothing, so it is stated, and `python -m gritd.tools.dev.reliability`
+    holds it to its limit.
     """
 
     def state(row, level, name, value, unit="", limit=None, real=False):

@@ -1,4 +1,6 @@
-"""The real daemon process on real wires: pseudo-terminals and a loopback CAN bus, driven by the simulated testbed."""
+"""The real daemon process on real wires: pseudo-terminals and a loopback CAN bus, driven by the
+simulated testbed.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ WIRES = "daemon on wires"
 
 @lru_cache(maxsize=4)
 def driven(seconds, seed, skip=0.0):
-    """Readings of a simulated run, stamps and arrivals from zero [ns]; `skip` [s] of them left out at the start."""
+    """Readings of a simulated run, stamps and arrivals from zero [ns]; `skip` [s] of them left out
+    at the start.
+    """
     readings = in_transit(experiment(TESTBED, seconds, "linear", seed).run.readings, seed)
     start = int(skip * 1e9)
     return [
@@ -60,7 +64,9 @@ def driven(seconds, seed, skip=0.0):
 
 
 class PluggedDevice:
-    """A serial device behind a fixed path, that can be unplugged; a FarEnd of gritd.tools.testbed.wires."""
+    """A serial device behind a fixed path, that can be unplugged; a FarEnd of
+    gritd.tools.testbed.wires.
+    """
 
     def __init__(self, device, folder):
         self.plug = Plug(folder / device.name)
@@ -101,7 +107,9 @@ class PluggedBus:
 
 
 class Wires(Rig):
-    """The testbed's wires with the encoders on a plug, the configuration for a daemon on them, and a player."""
+    """The testbed's wires with the encoders on a plug, the configuration for a daemon on them, and
+    a player.
+    """
 
     def __init__(self, folder, bus=BUS, **changes):
         super().__init__(TESTBED.settings, bus)
@@ -143,7 +151,9 @@ class Wires(Rig):
 
 
 class Manager:
-    """The service manager's socket, always read: it holds only a few messages, and what does not fit is lost."""
+    """The service manager's socket, always read: it holds only a few messages, and what does not
+    fit is lost.
+    """
 
     def __init__(self, path):
         self.path = path
@@ -159,7 +169,9 @@ class Manager:
             self._heard.append((time.monotonic(), text))
 
     def after(self, words):
-        """[when] the next message with these words came, of those not yet asked for; [] if none has."""
+        """[when] the next message with these words came, of those not yet asked for; [] if none
+        has.
+        """
         for number in range(self._seen, len(self._heard)):
             if words in self._heard[number][1]:
                 self._seen = number + 1
@@ -186,8 +198,10 @@ class Manager:
 class DaemonProcess:
     """`gritd run` as a service manager sees it: its messages, its signals, its exit.
 
-    prelude: Python that is run in the daemon's process before the command, to bring a fault about from inside.
-    user: the user it becomes once Python has loaded the code, which may lie where only its owner can read it.
+    prelude: Python that is run in the daemon's process before the command, to bring a fault about
+        from inside.
+    user: the user it becomes once Python has loaded the code, which may lie where only its owner
+        can read it.
     """
 
     def __init__(self, config, *arguments, prelude="", watchdog=0.0, user=None):
@@ -271,7 +285,9 @@ class DaemonProcess:
         return self._manager.count("WATCHDOG=1") - before
 
     def datagrams(self, port):
-        """Of the daemon's socket on a UDP port: bytes that wait in it, datagrams that the kernel threw away."""
+        """Of the daemon's socket on a UDP port: bytes that wait in it, datagrams that the kernel
+        threw away.
+        """
         held = {
             os.path.basename(name) for name in map(link_of, Path(f"/proc/{self.pid}/fd").iterdir())
         }
@@ -311,7 +327,9 @@ class DaemonProcess:
         return time.monotonic()
 
     def descriptors(self):
-        """How many are open for long: the fewest of some looks, for a file that is being synced counts twice."""
+        """How many are open for long: the fewest of some looks, for a file that is being synced
+        counts twice.
+        """
         return min(
             len(os.listdir(f"/proc/{self.pid}/fd")) for _ in range(20) if not time.sleep(0.02)
         )

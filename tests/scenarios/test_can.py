@@ -64,7 +64,9 @@ def daemon_ids():
 
 @multicast
 def test_error_frames_are_counted_and_survived(tmp_path, seed, figure):
-    """python-can filters this bus itself and takes an error frame for a message: so they carry a wanted id."""
+    """python-can filters this bus itself and takes an error frame for a message: so they carry a
+    wanted id.
+    """
     frames, wanted = 50, daemon_ids()[0]
     with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
@@ -89,7 +91,9 @@ def test_error_frames_are_counted_and_survived(tmp_path, seed, figure):
 
 
 def dropped(wires, daemon):
-    """Datagrams the kernel threw away before the daemon could read them, on a computer that was too slow."""
+    """Datagrams the kernel threw away before the daemon could read them, on a computer that was too
+    slow.
+    """
     return daemon.datagrams(wires.bus.device.options["port"])[1]
 
 
@@ -149,7 +153,9 @@ GOOD = good_datagram()
 @multicast
 @pytest.mark.parametrize(("rate", "seconds"), [(5_000, 3.0), (12_000, 1.0)])
 def test_bus_flood(tmp_path, seed, rate, seconds, figure):
-    """Unwanted frames between the wanted ones: paced, none of those is lost; in a burst every loss is counted."""
+    """Unwanted frames between the wanted ones: paced, none of those is lost; in a burst every loss
+    is counted.
+    """
     with service(tmp_path, driven(40.0, seed, skip=2.0), bus="udp_multicast") as (wires, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         sent = flood(wires.bus._bus, rate, seconds)
@@ -172,7 +178,9 @@ def test_bus_flood(tmp_path, seed, rate, seconds, figure):
 
 
 def flood(bus, rate, seconds):
-    """Frames of an id that nobody wants, in packets of 5 ms; time that the sender lost is not made up for. How many."""
+    """Frames of an id that nobody wants, in packets of 5 ms; time that the sender lost is not made
+    up for. How many.
+    """
     message = can.Message(arbitration_id=UNWANTED, data=bytes(8), is_extended_id=False)
     end, before, due, sent = time.monotonic() + seconds, time.monotonic(), 0.0, 0
     while (now := time.monotonic()) < end:

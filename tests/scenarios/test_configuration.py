@@ -56,7 +56,9 @@ def broken(text, rng):
 
 
 def test_a_hundred_bad_files_change_nothing(tmp_path, seed, figure):
-    """34 a seed: each refused in one line with its place, the estimates as if nothing had been asked."""
+    """34 a seed: each refused in one line with its place, the estimates as if nothing had been
+    asked.
+    """
     rng, cases = random.Random(seed), 34
     with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
         good = wires.config.read_text()
@@ -96,7 +98,9 @@ def readable(text, folder):
 
 
 def test_a_good_file_is_taken_over_between_two_ticks(tmp_path, seed, figure):
-    """Another calibration and another prior: a new part with the new configuration, verified through the change."""
+    """Another calibration and another prior: a new part with the new configuration, verified
+    through the change.
+    """
     with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
         daemon.wait_status(
             lambda report: report["status"] == "TRACKING" and report["tick"]["updates"] > 5

@@ -19,7 +19,9 @@ GARBAGE = "serial garbage, bad CRC, truncated frame"
 
 
 def unplug_and_back(wires, daemon, rng, cycles):
-    """Pull the encoders' plug again and again; when it was pulled and put back [ns since the epoch]."""
+    """Pull the encoders' plug again and again; when it was pulled and put back [ns since the
+    epoch].
+    """
     pulled, back = [], []
     for cycle in range(cycles):
         time.sleep(rng.uniform(0.25, 0.4))
@@ -36,7 +38,9 @@ def unplug_and_back(wires, daemon, rng, cycles):
 
 
 def delays(ticks, moments, condition):
-    """From each moment [ns] to the first tick after it that fulfils the condition, by the daemon's own clock [s]."""
+    """From each moment [ns] to the first tick after it that fulfils the condition, by the daemon's
+    own clock [s].
+    """
     stamps = ticks["stamp"][condition]
     return [(stamps[np.searchsorted(stamps, moment)] - moment) * 1e-9 for moment in moments]
 

@@ -107,7 +107,9 @@ m.WriterThread.__init__.__kwdefaults__["capacity"] = 3000
 
 
 def test_disk_full_for_longer_than_the_queue_holds(tmp_path, small_disk, seed, figure):
-    """The oldest messages are dropped and counted; a new part goes on, and is verified from its checkpoint on."""
+    """The oldest messages are dropped and counted; a new part goes on, and is verified from its
+    checkpoint on.
+    """
     wiring = tmp_path / "wires"
     wiring.mkdir()
     changes = {"logging": {"directory": str(small_disk)}, "prelude": SMALL_QUEUE}
@@ -148,7 +150,9 @@ def copied(daemon, folder):
 
 @as_root
 def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
-    """Refused before anything heavy is loaded, which nobody could not: the code may lie where only root can read."""
+    """Refused before anything heavy is loaded, which nobody could not: the code may lie where only
+    root can read.
+    """
     nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
     loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, gritd.tools.cli.main, gritd.tools.commands.run"
     becoming = f"os.setgroups([]); os.setgid({nobody}); os.setuid({nobody})"
@@ -169,7 +173,9 @@ def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
 
 @as_root
 def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
-    """Its permissions are taken away: the open part goes on, a new one cannot begin; said, and repaired when back."""
+    """Its permissions are taken away: the open part goes on, a new one cannot begin; said, and
+    repaired when back.
+    """
     nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
     logs.mkdir()
     changes = {"directory": str(logs), "part_time": "2 s"}
@@ -216,7 +222,8 @@ def parts_asked(path):
     ]
 
 
-# --- the process dies -------------------------------------------------------------------------------------------------
+# --- the process dies
+# -------------------------------------------------------------------------------------------------
 
 
 def test_killed_while_logging(tmp_path, seed, figure):
@@ -275,8 +282,10 @@ PART = Topic("/part", "gritd_msgs/msg/Part", (("stamp", TIME, "when"),))
     ("kind", "kills"), [("logging", KILLS), ("rotating", 150), ("closing", 150)]
 )
 def test_many_kills(tmp_path, kind, kills, figure):
-    """The writer in a process of its own, killed at a random time: in the middle of a run, while a part begins every
-    0.1 s, or within the few milliseconds in which it closes. What was lost counts from what had been handed over."""
+    """The writer in a process of its own, killed at a random time: in the middle of a run, while a
+    part begins every 0.1 s, or within the few milliseconds in which it closes. What was lost counts
+    from what had been handed over.
+    """
     command = [sys.executable, "-c", WRITER, str(tmp_path), kind, str(kills)]
     parent, rng = subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT), random.Random(1)
     for _ in range(kills):
@@ -297,7 +306,9 @@ def test_many_kills(tmp_path, kind, kills, figure):
 
 
 def survived(path, shared):
-    """How much of what had been handed over is missing at the end [s]; None if not all before it is there, in order."""
+    """How much of what had been handed over is missing at the end [s]; None if not all before it is
+    there, in order.
+    """
     count, last = struct.unpack("<qq", shared.read_bytes())
     if not count:
         return 0.0  # killed before it had begun
@@ -383,7 +394,8 @@ def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
     assert verified(part)
 
 
-# --- SIGTERM ----------------------------------------------------------------------------------------------------------
+# --- SIGTERM --------------------------------------------------------------------------------------
+# --------------------
 
 
 def test_sigterm_under_load(tmp_path, seed, figure):
@@ -427,7 +439,9 @@ m.sync = waiting
 
 
 def test_sigterm_while_the_medium_hangs(tmp_path, seed, figure):
-    """It is not waited for: the kernel has everything, and the last line says that the medium has not confirmed it."""
+    """It is not waited for: the kernel has everything, and the last line says that the medium has
+    not confirmed it.
+    """
     with service(tmp_path, driven(40.0, seed, skip=1.0), prelude=SLOW_MEDIUM) as (_, daemon):
         time.sleep(3.0)
         took = daemon.stop()
@@ -437,7 +451,9 @@ def test_sigterm_while_the_medium_hangs(tmp_path, seed, figure):
 
 
 def test_the_open_part_is_never_deleted(tmp_path, figure):
-    """Parts of a second under a cap of 1 MB: the oldest go first, what remains is verified part by part."""
+    """Parts of a second under a cap of 1 MB: the oldest go first, what remains is verified part by
+    part.
+    """
     old = tmp_path / "old.mcap"
     old.write_bytes(bytes(990_000))
     os.utime(old, (0, 0))

@@ -28,7 +28,8 @@ STARVED = "CPU starvation"
 DIES = "a thread dies"
 
 
-# --- wall clock ------------------------------------------------------------------------------------------------------
+# --- wall clock -----------------------------------------------------------------------------------
+# -------------------
 
 
 class SimulatedTime:
@@ -147,7 +148,8 @@ def test_a_step_in_the_running_daemon_is_annotated(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- queue -----------------------------------------------------------------------------------------------------------
+# --- queue ----------------------------------------------------------------------------------------
+# -------------------
 
 
 class Stalled:
@@ -238,7 +240,8 @@ def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- starvation ------------------------------------------------------------------------------------------------------
+# --- starvation -----------------------------------------------------------------------------------
+# -------------------
 
 
 def unreported(path):
@@ -296,7 +299,8 @@ def test_stopped_for_a_while(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- threads ---------------------------------------------------------------------------------------------------------
+# --- threads --------------------------------------------------------------------------------------
+# -------------------
 
 DYING = """
 import time
@@ -385,7 +389,8 @@ def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, seed, figure):
         assert not daemon.status()["healthy"]
 
 
-# --- garbage collection ----------------------------------------------------------------------------------------------
+# --- garbage collection
+# ----------------------------------------------------------------------------------------------
 
 COLLECTING = """
 import gc, threading, time

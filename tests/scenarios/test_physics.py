@@ -1,4 +1,6 @@
-"""What the wheel may do that the filter must not learn from; the plant is simulated, the whole pipeline runs."""
+"""What the wheel may do that the filter must not learn from; the plant is simulated, the whole
+pipeline runs.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def test_zero_slip(seed, figure):
 
 
 def test_negative_slip(seed, figure):
-    """The carriage pushes the wheel, up to where the closed forms have no balance any more: braking, no update."""
+    """The carriage pushes the wheel, up to where the closed forms have no balance any more:
+    braking, no update.
+    """
     rng = random.Random(seed)
     accepted = 0
     for slip in (-0.1, -0.2, -0.3, -rng.uniform(0.1, 0.35)):
@@ -163,7 +167,9 @@ def held(reading, frozen):
 
 
 def test_vanishing_entry_angle_and_exponent(figure):
-    """θ₁ from 0.1 down to 1e-300 and 0, f → 0 with slip → −1: finite, and continuous down to nothing."""
+    """θ₁ from 0.1 down to 1e-300 and 0, f → 0 with slip → −1: finite, and continuous down to
+    nothing.
+    """
     angles = [10.0**-power for power in range(1, 301)] + [0.0]
     jump = 0.0
     for slip in (0.3, 0.0, -0.999999, -1.0 + 1e-15):

@@ -41,7 +41,9 @@ def shifted(readings):
 
 
 def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
-    """Every tick over readings in order of arrival, as a structured array, or as the bytes that are logged."""
+    """Every tick over readings in order of arrival, as a structured array, or as the bytes that are
+    logged.
+    """
     pipeline = Pipeline(settings, "plain")
     state, records, due = pipeline.start(), [], 0
     end = max(r.received for r in readings)
@@ -57,13 +59,16 @@ def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
     return {name: np.array([record[i] for record in records]) for i, name in enumerate(TICK_NAMES)}
 
 
-# --- encoder rollover ------------------------------------------------------------------------------------------------
+# --- encoder rollover
+# ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bits", [16, 32])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_encoder_rollover(seed, bits, direction, figure):
-    """The same motion far from the edge and across it, as bytes through the real framing: the same speed to the bit."""
+    """The same motion far from the edge and across it, as bytes through the real framing: the same
+    speed to the bit.
+    """
     rng = random.Random(seed)
     steps = [rng.randrange(30) for _ in range(250)]
     far, near = ((1 << bits) // 2, (1 << bits) - 1500 if direction > 0 else 1500)
@@ -100,7 +105,8 @@ def with_bits(bits):
     return replace(SETTINGS, channels=channels)
 
 
-# --- jumps, stuck, impossible values ---------------------------------------------------------------------------------
+# --- jumps, stuck, impossible values
+# ---------------------------------------------------------------------------------
 
 
 def test_encoder_counter_jump(seed, figure):
@@ -171,8 +177,10 @@ AXES = 6
 
 
 def test_not_a_number_infinity_and_out_of_range(seed, figure):
-    """Every analogue field in turn with every impossible value and just beyond its limits, among good readings: as
-    bytes on the wire, where the driver must stop what is no number, and past the drivers, where the pipeline must."""
+    """Every analogue field in turn with every impossible value and just beyond its limits, among
+    good readings: as bytes on the wire, where the driver must stop what is no number, and past the
+    drivers, where the pipeline must.
+    """
     rng = random.Random(seed)
     cases = [*impossible()] * 3
     rng.shuffle(cases)
@@ -244,12 +252,15 @@ def impossible():
     yield "wrench", (0.1, math.nan, 0.1, 0.1, 0.1, 0.1)
 
 
-# --- order -----------------------------------------------------------------------------------------------------------
+# --- order ----------------------------------------------------------------------------------------
+# -------------------
 
 
 def test_duplicate_late_and_reordered_stamps(seed, figure):
-    """Delays of up to 40 ms, one reading in ten twice: inside the horizon the same bits as the sorted run, in every
-    tick after the first 0.2 s and every field but those that tell when readings came."""
+    """Delays of up to 40 ms, one reading in ten twice: inside the horizon the same bits as the
+    sorted run, in every tick after the first 0.2 s and every field but those that tell when
+    readings came.
+    """
     rng = random.Random(seed)
     clean = shifted(driven(8.0, seed))
     delayed = [r._replace(received=r.stamp + rng.randrange(40_000_000)) for r in clean]

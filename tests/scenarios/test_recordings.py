@@ -52,7 +52,9 @@ def original(tmp_path_factory):
 
 
 def test_flipped_bits(original, tmp_path, seed, figure):
-    """40 copies with up to ten flipped bits: nothing is returned that was not written, and the exit code says so."""
+    """40 copies with up to ten flipped bits: nothing is returned that was not written, and the exit
+    code says so.
+    """
     rng = random.Random(seed)
     data, written = original.read_bytes(), set(map(repr, read(original).messages()))
     wrong, silent = 0, 0

@@ -1,4 +1,6 @@
-"""The unit, the udev rules and the installation, as far as they can be checked without a booted system."""
+"""The unit, the udev rules and the installation, as far as they can be checked without a booted
+system.
+"""
 
 from __future__ import annotations
 

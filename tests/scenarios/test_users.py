@@ -56,7 +56,9 @@ def test_second_instance(tmp_path, seed, figure):
 
 
 def test_nobody_listens_any_more(tmp_path, figure):
-    """What it says goes into a pipe whose other end is closed: it runs on, and closes its log when it is told to."""
+    """What it says goes into a pipe whose other end is closed: it runs on, and closes its log when
+    it is told to.
+    """
     command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
         daemon = subprocess.Popen(
@@ -78,7 +80,9 @@ def test_nobody_listens_any_more(tmp_path, figure):
 
 
 def test_somebody_does_not_read(tmp_path, figure):
-    """What it says goes into a pipe that is full and stays open: it ends when it is told to, all the same."""
+    """What it says goes into a pipe that is full and stays open: it ends when it is told to, all
+    the same.
+    """
     command = [sys.executable, "-m", "gritd", "run", "--status", "0.1", "--config"]
     with Wires(tmp_path) as wires:
         daemon = subprocess.Popen(

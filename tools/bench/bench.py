@@ -1,7 +1,9 @@
-"""`gritd bench`: what a tick, a replay, a force, a filter update and a message cost on this machine.
+"""`gritd bench`: what a tick, a replay, a force, a filter update and a message cost on this
+machine.
 
-Everything is measured in one run on one seeded, simulated recording. Times are processor time, so that what other
-programs take meanwhile is not counted; they still slow the caches, so the ratios are what to compare between runs.
+Everything is measured in one run on one seeded, simulated recording. Times are processor time, so
+that what other programs take meanwhile is not counted; they still slow the caches, so the ratios
+are what to compare between runs.
 """
 
 from __future__ import annotations
@@ -105,7 +107,8 @@ def _subject(sizes: Sizes, folder: Path) -> Subject:
     return subject
 
 
-# ---- sections ------------------------------------------------------------------------------------------------------
+# ---- sections ------------------------------------------------------------------------------------
+# ------------------
 
 
 def tick(subject: Subject) -> Figures:
@@ -128,7 +131,9 @@ def tick(subject: Subject) -> Figures:
 
 
 def replay(subject: Subject) -> Figures:
-    """From the file to the estimates of every window, as multiples of real time; engines take turns."""
+    """From the file to the estimates of every window, as multiples of real time; engines take
+    turns.
+    """
 
     def run(engine: str) -> None:
         estimates(subject.configuration.settings, read(subject.path), engine)
@@ -144,7 +149,9 @@ def replay(subject: Subject) -> Figures:
 
 
 def forces(subject: Subject) -> Figures:
-    """Closed forms (20)-(22) against quadrature of (8)-(10): one sample, gradients included, and one of a batch."""
+    """Closed forms (20)-(22) against quadrature of (8)-(10): one sample, gradients included, and
+    one of a batch.
+    """
     settings, samples = subject.configuration.settings, subject.sizes.samples
     wheel, ground = settings.wheel, soil_of(settings)
     rng = np.random.default_rng(SEED)
@@ -249,7 +256,8 @@ def _timed(run: Callable[[], object]) -> float:
     return process_time() - start
 
 
-# ---- command -------------------------------------------------------------------------------------------------------
+# ---- command -------------------------------------------------------------------------------------
+# ------------------
 
 
 def main(argv: Sequence[str]) -> int:

@@ -1,4 +1,5 @@
-"""How fast the forward model is: simulated seconds a second, and the balance against a scalar root finder.
+"""How fast the forward model is: simulated seconds a second, and the balance against a scalar root
+finder.
 
 `python -m gritd.tools.bench.forward` prints it; `gritd bench` shows the same figures.
 """
@@ -62,7 +63,9 @@ def simulated_seconds_per_second(duration: float = 180.0, effects: tuple[str, ..
 
 
 def balance_speed(samples: int = 8192, seed: int = 0) -> BalanceSpeed:
-    """The vectorised balance against scipy's brentq on scipy's quad, to the same tolerance, on drawn samples."""
+    """The vectorised balance against scipy's brentq on scipy's quad, to the same tolerance, on
+    drawn samples.
+    """
     settings = config.load(packaged()).settings
     wheel, soil = settings.wheel, soil_of(settings)
     rng = np.random.default_rng(seed)
@@ -90,7 +93,9 @@ def _best(run: Callable[[], object]) -> float:
 
 
 def _scalar(wheel: Wheel, soil: Soil, slip: float, load: float) -> float:
-    """θ₁ [rad] by brentq on the integral (9) by quad, relative tolerance as in estimator/model/balance.py."""
+    """θ₁ [rad] by brentq on the integral (9) by quad, relative tolerance as in
+    estimator/model/balance.py.
+    """
 
     def miss(theta_1: float) -> float:
         theta_m = 0.5 * theta_1
@@ -107,7 +112,9 @@ def _scalar(wheel: Wheel, soil: Soil, slip: float, load: float) -> float:
 
 
 def _vertical(theta: float, wheel: Wheel, soil: Soil, slip: float, theta_1: float) -> float:
-    """Integrand of (9), τ sin θ + σ cos θ, from (3), (4), (6), (7) in plain floats; driving, θₘ = θ₁/2."""
+    """Integrand of (9), τ sin θ + σ cos θ, from (3), (4), (6), (7) in plain floats; driving, θₘ =
+    θ₁/2.
+    """
     front = theta if theta >= 0.5 * theta_1 else theta_1 - theta
     drop = max(cos(front) - cos(theta_1), 0.0)
     sigma = float(soil.modulus) * (wheel.radius * drop) ** float(soil.exponent)

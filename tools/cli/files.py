@@ -1,4 +1,6 @@
-"""The files of a command line, with one exit code for one mistake: 2 where a name is wrong, 3 where a content is."""
+"""The files of a command line, with one exit code for one mistake: 2 where a name is wrong, 3 where
+a content is.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ WRONG_NAME = (
 
 
 def recording(path: Path) -> Recording:
-    """A recording to read. Raises CommandError, 2 where there is no such file, 3 where it is no recording."""
+    """A recording to read. Raises CommandError, 2 where there is no such file, 3 where it is no
+    recording.
+    """
     try:
         return read(path)
     except RecordingError as error:
@@ -35,7 +39,9 @@ def unread(path: Path, error: RecordingError) -> CommandError:
 
 
 def vacant(path: Path) -> Path:
-    """The name of a file to be made. Raises CommandError where there is one already or none can be made there."""
+    """The name of a file to be made. Raises CommandError where there is one already or none can be
+    made there.
+    """
     if path.exists() or path.is_symlink():
         raise CommandError(f"{path}: is there already; expected the name of a new file", USAGE)
     if not path.parent.is_dir():

@@ -1,4 +1,6 @@
-"""`gritd`: one table of commands, each a module of tools with `main(argv)`, imported when it is asked for."""
+"""`gritd`: one table of commands, each a module of tools with `main(argv)`, imported when it is
+asked for.
+"""
 
 from __future__ import annotations
 
@@ -88,8 +90,9 @@ def guarded(command: Callable[[], int | None]) -> int:
 
 
 def _speak_as_the_terminal_does() -> None:
-    """A terminal that knows no Greek gets a question mark, and a closed one nothing: no command fails for it, least of
-    all the daemon."""
+    """A terminal that knows no Greek gets a question mark, and a closed one nothing: no command
+    fails for it, least of all the daemon.
+    """
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 - or a recording takes its place
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
@@ -98,7 +101,9 @@ def _speak_as_the_terminal_does() -> None:
 
 
 def _calculate_alike_everywhere() -> None:
-    """One thread for linear algebra: sums in another order end in other digits; commands have their own `--jobs`."""
+    """One thread for linear algebra: sums in another order end in other digits; commands have their
+    own `--jobs`.
+    """
     for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(threads, "1")
 

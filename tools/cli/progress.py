@@ -1,4 +1,6 @@
-"""Progress on standard error for whatever takes longer than two seconds: a line rewritten on a terminal, else none."""
+"""Progress on standard error for whatever takes longer than two seconds: a line rewritten on a
+terminal, else none.
+"""
 
 from __future__ import annotations
 

@@ -16,7 +16,9 @@ from gritd.tools.cli.command import FAILED, USAGE, CommandError
 
 @contextmanager
 def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
-    """Where work is done, and by how many at a time. Raises CommandError where the cluster cannot be had."""
+    """Where work is done, and by how many at a time. Raises CommandError where the cluster cannot
+    be had.
+    """
     if scheduler is None:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for the workers: they run side by side
         with _processes(jobs) as pool:
@@ -28,7 +30,9 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
 
 @contextmanager
 def _processes(jobs: int) -> Iterator[Executor]:
-    """Workers in process groups of their own: when we are stopped, what they started stops with them."""
+    """Workers in process groups of their own: when we are stopped, what they started stops with
+    them.
+    """
     ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         with ProcessPoolExecutor(

@@ -32,7 +32,9 @@ Rows = list[tuple[str, ...]]
 
 
 def main(argv: Sequence[str]) -> int:
-    """Print the summary, or the effective YAML. Raises ConfigError or CommandError for a file that cannot work."""
+    """Print the summary, or the effective YAML. Raises ConfigError or CommandError for a file that
+    cannot work.
+    """
     parser = Parser(
         prog="gritd check-config", description="Check a configuration and show what it implies."
     )
@@ -55,12 +57,15 @@ def main(argv: Sequence[str]) -> int:
 
 
 def check_devices(settings: Settings) -> None:
-    """Raise DeviceSettingsError unless every used device can be built and every channel finds its signals in it."""
+    """Raise DeviceSettingsError unless every used device can be built and every channel finds its
+    signals in it.
+    """
     for device in used_devices(settings):
         build_link(device, build_decoder(settings, device).framing, time.monotonic_ns)
 
 
-# ---- the summary ---------------------------------------------------------------------------------------------------
+# ---- the summary ---------------------------------------------------------------------------------
+# ------------------
 
 
 def summary(settings: Settings) -> str:

@@ -1,4 +1,6 @@
-"""`gritd compare`: the forward simulation drawn over recordings, channel by channel, with the residual below."""
+"""`gritd compare`: the forward simulation drawn over recordings, channel by channel, with the
+residual below.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,9 @@ def compare(
     fitted: bool,
     command: Sequence[str] = (),
 ) -> Comparison:
-    """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing can be compared."""
+    """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing
+    can be compared.
+    """
     settings = configuration.settings
     rig = WheelRig([signals(recording, settings, RATE) for recording in read_all(paths)], settings)
     stack = Stack(rig)

@@ -1,4 +1,6 @@
-"""`gritd demo`: the daemon against the simulated testbed, as a user would run it, and a verdict on what it found."""
+"""`gritd demo`: the daemon against the simulated testbed, as a user would run it, and a verdict on
+what it found.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ DEVICES = 2  # of the packaged testbed
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0 if every target is met, 1 with the reason if not. Raises CommandError where a process fails."""
+    """Exit 0 if every target is met, 1 with the reason if not. Raises CommandError where a process
+    fails.
+    """
     arguments = _parser().parse_args(argv)
     folder = Path(arguments.output or Path("runs") / time.strftime("demo-%Y%m%d-%H%M%S"))
     folder.mkdir(parents=True, exist_ok=True)
@@ -72,12 +76,15 @@ def _parser() -> Parser:
     return parser
 
 
-# --- the run --------------------------------------------------------------------------------------------------------
+# --- the run --------------------------------------------------------------------------------------
+# ------------------
 
 
 @contextmanager
 def interruptible() -> Iterator[Ending]:
-    """What SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is lost."""
+    """What SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is
+    lost.
+    """
     stop = Ending()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
@@ -154,7 +161,8 @@ def live_line() -> Iterator[Callable[[str], None]]:
 
 
 class Child:
-    """A Python module run as a process of its own, and what it says. Leaving the block ends it, whatever happened.
+    """A Python module run as a process of its own, and what it says. Leaving the block ends it,
+    whatever happened.
 
     While `stop` is set, waiting for it raises KeyboardInterrupt.
     """
@@ -208,7 +216,9 @@ class Child:
         return self._said[-1]
 
     def check(self) -> None:
-        """Raises CommandError, with its last line, if it has ended; KeyboardInterrupt if we are to stop."""
+        """Raises CommandError, with its last line, if it has ended; KeyboardInterrupt if we are to
+        stop.
+        """
         if self._stop.is_set():
             raise KeyboardInterrupt
         if self._process.poll() is not None and self._lines.empty():
@@ -246,7 +256,8 @@ class Child:
         return self._said[before:]
 
 
-# --- the verdict ----------------------------------------------------------------------------------------------------
+# --- the verdict ----------------------------------------------------------------------------------
+# ------------------
 
 
 def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:

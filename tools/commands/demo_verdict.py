@@ -80,7 +80,9 @@ def _findings(
 
 
 def without_correction(recording: Recording, truth: Mapping[str, float]) -> list[str]:
-    """What the paper's closed forms alone would have learned from the same readings; empty where they were used."""
+    """What the paper's closed forms alone would have learned from the same readings; empty where
+    they were used.
+    """
     settings = loads(recording.config_yaml or "", str(recording.path)).settings
     others = tuple(effect for effect in settings.effects if effect.name != LINEARISATION)
     if len(others) == len(settings.effects):

@@ -1,4 +1,6 @@
-"""`gritd diagnose`: recordings and a configuration in; verdict, JSON, report and the improved configuration out."""
+"""`gritd diagnose`: recordings and a configuration in; verdict, JSON, report and the improved
+configuration out.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of what was whole.
+    """Exit 0; 2 for usage and configuration; 3 if a recording is damaged: then the result is of
+    what was whole.
 
     With --redo, 1 if it comes out otherwise.
     """

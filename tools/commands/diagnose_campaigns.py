@@ -1,7 +1,9 @@
-"""`gritd diagnose --campaigns DIR`: every campaign in a folder, side by side on local processes or on a cluster.
+"""`gritd diagnose --campaigns DIR`: every campaign in a folder, side by side on local processes or
+on a cluster.
 
-A campaign is a folder in DIR with recordings (*.mcap) and one configuration (*.yaml). Its result and its report are
-written beside them; like `make`, a campaign whose result is newer than its files is not diagnosed again.
+A campaign is a folder in DIR with recordings (*.mcap) and one configuration (*.yaml). Its result
+and its report are written beside them; like `make`, a campaign whose result is newer than its files
+is not diagnosed again.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ class Campaign:
 
 
 def found(folder: Path) -> list[Campaign]:
-    """The campaigns of a folder, by name. Raises CommandError where there is none, or one without a configuration."""
+    """The campaigns of a folder, by name. Raises CommandError where there is none, or one without a
+    configuration.
+    """
     if not folder.is_dir():
         raise CommandError(
             f"--campaigns {folder}: found no folder; expected one that holds a folder a campaign",

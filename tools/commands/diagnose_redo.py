@@ -1,4 +1,6 @@
-"""A diagnosis done again: from its JSON or its report, on the same files by their hash, and compared."""
+"""A diagnosis done again: from its JSON or its report, on the same files by their hash, and
+compared.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ class Record:
 
     @classmethod
     def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
-        """Of the JSON; files that are not found under their name are looked for in a folder. Raises KeyError, …"""
+        """Of the JSON; files that are not found under their name are looked for in a folder. Raises
+        KeyError, …
+        """
         redo, hypotheses = document["redo"], document["hypotheses"]
         named = {Path(name): str(value) for name, value in redo["files"].items()}
         return cls(

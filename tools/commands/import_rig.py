@@ -1,4 +1,6 @@
-"""`gritd import RIG PATH… -o OUTDIR`: other rigs' public data to recordings and the configuration that fits them."""
+"""`gritd import RIG PATH… -o OUTDIR`: other rigs' public data to recordings and the configuration
+that fits them.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from gritd.tools.importers.registry import rigs
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Exit code 0. Raises CommandError where a file is not what the importer expects or cannot be written."""
+    """Exit code 0. Raises CommandError where a file is not what the importer expects or cannot be
+    written.
+    """
     args = _parser().parse_args(argv)
     try:
         written = rigs()[args.rig].run(args, lambda line: print(line, flush=True))

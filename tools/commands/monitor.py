@@ -58,7 +58,8 @@ def main(argv: Sequence[str]) -> int:
     return DONE
 
 
-# --- the terminal -----------------------------------------------------------------------------------------------------
+# --- the terminal ---------------------------------------------------------------------------------
+# --------------------
 
 
 def redrawable() -> bool:
@@ -88,11 +89,13 @@ def _fitting(line: str, columns: int) -> str:
     return f"{BOLD}{cut}{PLAIN}" if line.startswith(TROUBLE) else cut
 
 
-# --- the picture ------------------------------------------------------------------------------------------------------
+# --- the picture ----------------------------------------------------------------------------------
+# --------------------
 
 
 def lines(report: Report) -> Iterator[str]:
-    """The picture, trouble first: estimates with σ, how far to believe them, channels, devices, loop and log.
+    """The picture, trouble first: estimates with σ, how far to believe them, channels, devices,
+    loop and log.
 
     Without trouble it fits into a terminal of 80 by 24.
     """

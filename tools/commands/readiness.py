@@ -1,4 +1,6 @@
-"""Why the filter never began on a recording: the required channels that have no value in any window."""
+"""Why the filter never began on a recording: the required channels that have no value in any
+window.
+"""
 
 from __future__ import annotations
 

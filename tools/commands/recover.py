@@ -1,4 +1,6 @@
-"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of all that a damaged or unclosed one still holds."""
+"""`gritd recover FILE [-o OUT]`: a clean, indexed recording of all that a damaged or unclosed one
+still holds.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,8 @@ def main(argv: Sequence[str]) -> int:
 def recover(recording: Recording, target: Path) -> None:
     """Write every intact message, in file order, and every intact metadata record to a new file.
 
-    Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises RecordingError where
-    the file cannot be written; it is then removed.
+    Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises
+    RecordingError where the file cannot be written; it is then removed.
     """
     file = McapFile(target, library=LIBRARY)
     with file.beginning():

@@ -31,7 +31,9 @@ SHOWN = 5  # differing fields named in full
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0; 1 if a verified replay differs; 2 for usage and configuration; 3 if a recording is damaged."""
+    """Exit 0; 1 if a verified replay differs; 2 for usage and configuration; 3 if a recording is
+    damaged.
+    """
     arguments = _parser().parse_args(argv)
     if arguments.verify and (arguments.config or arguments.output or arguments.engine):
         raise CommandError(
@@ -78,7 +80,8 @@ def _configuration(recording: Recording, path: str | None) -> Configuration:
     return loads(recording.config_yaml, f"{recording.path}: gritd.config")
 
 
-# --- verification ---------------------------------------------------------------------------------------------------
+# --- verification ---------------------------------------------------------------------------------
+# ------------------
 
 
 def _verify(recordings: list[Recording], configuration: Configuration) -> int:
@@ -151,13 +154,16 @@ class Differences:
         return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])
 
 
-# --- recomputation --------------------------------------------------------------------------------------------------
+# --- recomputation
+# --------------------------------------------------------------------------------------------------
 
 
 def _recompute(
     recordings: list[Recording], configuration: Configuration, arguments: Namespace
 ) -> None:
-    """Print what the filter makes of the recording; window by window, unless every tick is asked for."""
+    """Print what the filter makes of the recording; window by window, unless every tick is asked
+    for.
+    """
     first = recordings[0]
     reloaded = first.counts["/checkpoint"] > 1 and not arguments.config
     if arguments.output or len(recordings) > 1 or reloaded:
@@ -214,7 +220,9 @@ def _target(arguments: Namespace, path: Path) -> Path:
 def _course(
     recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool
 ) -> Course:
-    """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was silent, not absent."""
+    """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was
+    silent, not absent.
+    """
     first = recordings[0]
     recorded = first if not as_it_ran or not first.counts["/tick"] else None
     _told(first, configuration, recorded)

@@ -1,7 +1,8 @@
 """`gritd reproduce`: the figures of Shibly, Iagnemma and Dubowsky (2005) beside ours.
 
-The paper prints percentages without saying how they are formed, and its Tables 2 and 3 could not be had. So every
-comparison names the soil and the definition it used, and several definitions stand side by side.
+The paper prints percentages without saying how they are formed, and its Tables 2 and 3 could not be
+had. So every comparison names the soil and the definition it used, and several definitions stand
+side by side.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ DRAWS = 2_000
 Lines = Iterator[str]
 
 
-# What the simulations draw from: the box around Table 1 in place of Table 2, which could not be had.
+# What the simulations draw from: the box around Table 1 in place of Table 2, which could not be
+# had.
 RANGES = {
     "exponent": (0.5, 1.6),
     "k_c": (0.9e3, 13.2e3),  # [Pa/m^(n−1)]
@@ -95,7 +97,8 @@ def main(argv: Sequence[str]) -> int:
     return DONE
 
 
-# ---- closed forms against quadrature --------------------------------------------------------------------------------
+# ---- closed forms against quadrature
+# --------------------------------------------------------------------------------
 
 
 def closed_forms(seed: int) -> Lines:
@@ -130,14 +133,17 @@ def closed_form_differences(seed: int) -> dict[str, Array]:
 def triangular_contact(
     theta_1: Array, slip: Array, f: Array, sigma_m: Array, c: Array, tan_phi: Array
 ) -> original.Contact:
-    """The stresses of the linear model at quadrature nodes: triangular σ, and τ with the exponent f(θ₁ − θ)."""
+    """The stresses of the linear model at quadrature nodes: triangular σ, and τ with the exponent
+    f(θ₁ − θ).
+    """
     any_soil = Soil(0.0, 0.0, 1.0, 1.0, 1.0)
     nodes = contact(WHEEL, any_soil, theta_1, slip, order=48)
     sigma = linear.normal_stress(theta_1, 0.5 * theta_1, sigma_m, theta_1 - nodes.points.turned)
     return nodes._replace(sigma=sigma, tau=(c + sigma * tan_phi) * janosi(f * nodes.points.turned))
 
 
-# ---- Fig. 3 ---------------------------------------------------------------------------------------------------------
+# ---- Fig. 3 --------------------------------------------------------------------------------------
+# -------------------
 
 
 def figure_3() -> Lines:
@@ -165,7 +171,8 @@ def exponents(slip: float, theta_1: float = np.pi / 4) -> tuple[Array, Array]:
     return exact, linear.shear_exponent(WHEEL, k, theta_1, slip).f * points.turned
 
 
-# ---- Table 3 and the simulations ------------------------------------------------------------------------------------
+# ---- Table 3 and the simulations
+# ------------------------------------------------------------------------------------
 
 
 def table_3() -> Lines:
@@ -220,7 +227,9 @@ class Row(NamedTuple):
 
 
 def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[Row]:
-    """Closed forms with σₘ from W by (21), and with σₘ of (3) at θₘ, against the original's DP and T."""
+    """Closed forms with σₘ from W by (21), and with σₘ of (3) at θₘ, against the original's DP and
+    T.
+    """
     exact = original.forces(WHEEL, soil, theta_1, slip)
     state = (soil.cohesion, soil.tan_phi, soil.shear_modulus, theta_1, slip)
     peak = front_stress(WHEEL, soil, arc(theta_1, original.theta_m(WHEEL, slip, theta_1)))
@@ -264,7 +273,8 @@ def _header(label: str) -> str:
     return f"  {label:<14}{'σₘ':<9}{names}\n  {'':<23}{units}"
 
 
-# ---- what the closed forms can and cannot tell ------------------------------------------------------------------
+# ---- what the closed forms can and cannot tell
+# ------------------------------------------------------------------
 
 
 def separability() -> Lines:
@@ -297,7 +307,9 @@ LOW_COHESION = (
 
 
 def fitted_soil() -> Lines:
-    """c and tan φ that the closed forms find in forces of the original model, bare and with the true stresses."""
+    """c and tan φ that the closed forms find in forces of the original model, bare and with the
+    true stresses.
+    """
     yield "(20)-(22) fitted to T and DP of the original model, loads 30-105 N, slips 5-60 %, no noise"
     columns = f"{'bare':>8}{'shifted':>9}{'prior off':>11}"
     yield f"  {'':<12}{'c [Pa]':>8}{columns}    {'tan φ':>6}{columns}"

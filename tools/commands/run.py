@@ -21,7 +21,9 @@ SOCKET = "gritd.sock"
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the configuration."""
+    """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the
+    configuration.
+    """
     arguments = _parser().parse_args(argv)
     try:
         with ExitStack() as held:
@@ -31,8 +33,10 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _run(arguments: Namespace, held: ExitStack) -> int:
-    """Lock the log folder and serve. A folder that is there is locked before the rest of the program is loaded, which
-    takes half a second: whoever is refused need not wait for it."""
+    """Lock the log folder and serve. A folder that is there is locked before the rest of the
+    program is loaded, which
+    takes half a second: whoever is refused need not wait for it.
+    """
     named = _folder_named(arguments)
     early = named if named and named.is_dir() else None
     if early:
@@ -51,7 +55,9 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
 
 
 def _folder_named(arguments: Namespace) -> Path | None:
-    """Where logs go by the command line, or by the configuration as it is written; None where neither says so."""
+    """Where logs go by the command line, or by the configuration as it is written; None where
+    neither says so.
+    """
     if arguments.directory:
         return Path(arguments.directory)
     tree = compose(read_text(Path(arguments.config)), arguments.config)

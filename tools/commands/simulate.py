@@ -1,4 +1,6 @@
-"""`gritd simulate`: the forward model alone, from a schedule to a recording, with the truth in files beside it."""
+"""`gritd simulate`: the forward model alone, from a schedule to a recording, with the truth in
+files beside it.
+"""
 
 from __future__ import annotations
 
@@ -36,9 +38,8 @@ NS = 1_000_000_000
 TRANSPORT = 1_000_000  # [ns] from a stamp to its receipt
 ADC_STEPS = 1 << 16  # over the channel's valid range
 AMBIENT = 21.0  # [°C]
-ROUNDING = (
-    1.0 / 12.0
-)  # [count²] variance of rounding to whole counts; the stated noise of an encoder includes it
+# [count²] variance of rounding to whole counts; the stated noise of an encoder includes it
+ROUNDING = 1.0 / 12.0
 SPARSE = 250  # samples from one temperature to the next
 SOIL_VALUES = {  # with the bounds that they have in a configuration
     "cohesion": Quantity("Pa", low=0.0, high=1e6),
@@ -82,13 +83,16 @@ def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> S
     return replace(soil, **changed)
 
 
-# ---- sensors -------------------------------------------------------------------------------------------------------
+# ---- sensors -------------------------------------------------------------------------------------
+# ------------------
 
 
 def readings(
     settings: Settings, motion: Motion, response: Response, rng: np.random.Generator
 ) -> list[Reading]:
-    """What the channels send, in order of receipt: calibration undone, latency, noise, counts and ADC steps."""
+    """What the channels send, in order of receipt: calibration undone, latency, noise, counts and
+    ADC steps.
+    """
     values = {
         "wheel_encoder": np.asarray(motion.wheel_angle),
         "carriage_encoder": np.asarray(motion.carriage_position) / settings.pulley_radius,
@@ -160,7 +164,8 @@ def _stamps(time: Array, latency: float) -> list[int]:
     return stamps
 
 
-# ---- files ---------------------------------------------------------------------------------------------------------
+# ---- files ---------------------------------------------------------------------------------------
+# ------------------
 
 
 def write(path: Path, configuration: config.Configuration, info: RunInfo, run: Run) -> None:
@@ -191,7 +196,8 @@ def write_truth(
     np.savez_compressed(path.with_suffix(".truth.npz"), **kept)
 
 
-# ---- command -------------------------------------------------------------------------------------------------------
+# ---- command -------------------------------------------------------------------------------------
+# ------------------
 
 
 def main(argv: Sequence[str]) -> int:
@@ -218,7 +224,9 @@ def main(argv: Sequence[str]) -> int:
 def _motion(
     arguments: argparse.Namespace, configuration: config.Configuration
 ) -> tuple[Motion, RunInfo]:
-    """The motion of a recording if one is given, else that of the schedule; and what the run is called."""
+    """The motion of a recording if one is given, else that of the schedule; and what the run is
+    called.
+    """
     settings, driven = (
         configuration.settings,
         recorded(arguments.motion) if arguments.motion else None,
@@ -313,7 +321,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
-    """Configured effects that act on the testbed, with the values of the command line in their place."""
+    """Configured effects that act on the testbed, with the values of the command line in their
+    place.
+    """
     values = {
         e.name: {name: value.value for name, value in e.parameters.items()}
         for e in settings.effects

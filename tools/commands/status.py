@@ -1,4 +1,6 @@
-"""`gritd status`: one report of the running daemon, for people, for scripts (--json) or for Prometheus."""
+"""`gritd status`: one report of the running daemon, for people, for scripts (--json) or for
+Prometheus.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +93,8 @@ def _text(arguments: Namespace, report: Report) -> str:
     return "\n".join(prometheus(report)) if arguments.prometheus else "\n".join(summary(report))
 
 
-# --- the socket -----------------------------------------------------------------------------------------------------
+# --- the socket -----------------------------------------------------------------------------------
+# ------------------
 
 
 def connected(given: str | None) -> socket.socket:
@@ -144,7 +147,8 @@ def _parsed(line: bytes) -> Report:
     return report
 
 
-# --- the forms ------------------------------------------------------------------------------------------------------
+# --- the forms ------------------------------------------------------------------------------------
+# ------------------
 
 
 def looked_up(report: Report, path: str) -> Any:

@@ -1,4 +1,6 @@
-"""Writes the key reference of docs/configuration.md from the format's tables: `python -m gritd.tools.dev.config_reference`."""
+"""Writes the key reference of docs/configuration.md from the format's tables: `python -m
+gritd.tools.dev.config_reference`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""`python -m gritd.tools.dev.effect_figures`: docs/effects.md and a picture of every effect, before and after."""
+"""`python -m gritd.tools.dev.effect_figures`: docs/effects.md and a picture of every effect, before
+and after.
+"""
 
 from __future__ import annotations
 
@@ -59,11 +61,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-# ---- pictures ------------------------------------------------------------------------------------------------------
+# ---- pictures ------------------------------------------------------------------------------------
+# ------------------
 
 
 def draw(effect: type[Effect], path: Path) -> None:
-    """The channel against the covariate where the effect shows most: off, half and typical strength."""
+    """The channel against the covariate where the effect shows most: off, half and typical
+    strength.
+    """
     channel, covariate, _ = effect.fingerprint
     label, unit, scale = LABELS[channel]
     motion, x = sweep(covariate, turns=TEETH / _order(effect))
@@ -119,7 +124,9 @@ def _order(effect: type[Effect]) -> float:
 
 
 def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
-    """A motion in which the covariate varies and as little else as possible, and the x axis that shows it."""
+    """A motion in which the covariate varies and as little else as possible, and the x axis that
+    shows it.
+    """
     time, ramp = np.linspace(0.0, 60.0, N), np.linspace(0.0, 1.0, N)
     load, slip, speed = np.full(N, LOAD), np.full(N, SLIP), np.full(N, SPEED)
     passes = np.ones(N)
@@ -173,7 +180,8 @@ def _driven(time: Array, load: Array, slip: Array, speed: Array, passes: Array) 
     )
 
 
-# ---- the page ------------------------------------------------------------------------------------------------------
+# ---- the page ------------------------------------------------------------------------------------
+# ------------------
 
 
 def page() -> str:

@@ -1,7 +1,8 @@
-"""Inputs that nobody meant, at every place where bytes or values come in: `python -m gritd.tools.dev.fuzz [--share 0.01]`.
+"""Inputs that nobody meant, at every place where bytes or values come in: `python -m
+gritd.tools.dev.fuzz [--share 0.01]`.
 
-Seeded and bounded. Each target makes a case from a random generator, hands it over, and says in a line what is wrong
-with the answer; an exception that is not the stated one is wrong too.
+Seeded and bounded. Each target makes a case from a random generator, hands it over, and says in a
+line what is wrong with the answer; an exception that is not the stated one is wrong too.
 """
 
 from __future__ import annotations
@@ -125,11 +126,14 @@ def mutated(data: bytes, rng: random.Random, most: int = 8) -> bytes:
     return data
 
 
-# --- bytes of sensors -------------------------------------------------------------------------------------------------
+# --- bytes of sensors
+# -------------------------------------------------------------------------------------------------
 
 
 def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], bytes]) -> Case:
-    """A few frames, damaged, cut into chunks: survived, and afterwards an intact frame is still read."""
+    """A few frames, damaged, cut into chunks: survived, and afterwards an intact frame is still
+    read.
+    """
     probe = [encode(Frame("wheel", number, 7, (1234,))) for number in range(2)]
 
     def case(rng: random.Random) -> str:
@@ -153,7 +157,9 @@ def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], byte
 
 
 def can_messages(_: Path) -> Case:
-    """Wanted and unwanted ids with any payload and length, through framing, clock and sensors, one decoder for all."""
+    """Wanted and unwanted ids with any payload and length, through framing, clock and sensors, one
+    decoder for all.
+    """
     settings = config.load(packaged()).settings
     decoder = build_decoder(settings, settings.devices["bus"])
     ids = [0x110, 0x111, 0x112, 0x120, 0x121, 0x7FF]
@@ -190,7 +196,8 @@ def databases(folder: Path) -> Case:
     return case
 
 
-# --- configuration ----------------------------------------------------------------------------------------------------
+# --- configuration --------------------------------------------------------------------------------
+# --------------------
 
 
 def configurations(_: Path) -> Case:
@@ -208,7 +215,8 @@ def configurations(_: Path) -> Case:
     return case
 
 
-# --- recordings -------------------------------------------------------------------------------------------------------
+# --- recordings -----------------------------------------------------------------------------------
+# --------------------
 
 
 def small_recording(path: Path) -> list[str]:
@@ -259,16 +267,18 @@ def truncations(folder: Path) -> Case:
     return case
 
 
-# --- the filter -------------------------------------------------------------------------------------------------------
+# --- the filter -----------------------------------------------------------------------------------
+# --------------------
 
 WILD = (0.0, -0.0, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 1e-9, 5.0, -5.0)
 
 
 def wild_inputs(_: Path) -> Case:
-    """Twelve ticks of anything: values, stamps, orders, gaps. Estimates stay finite, sure of nothing false, in bounds.
-    The engines take turns.
+    """Twelve ticks of anything: values, stamps, orders, gaps. Estimates stay finite, sure of
+    nothing false, in bounds. The engines take turns.
 
-    One run in four goes on from the one before, so that the filter is met in every state it can be brought into.
+    One run in four goes on from the one before, so that the filter is met in every state it can be
+    brought into.
     """
     settings = quick(config.load(packaged()).settings)
     pipelines = cycle(Pipeline(settings, engine) for engine in ENGINES)
@@ -342,7 +352,9 @@ def wild_value(
 
 
 def unfit(record: Sequence[float], state: State, settings: Settings) -> str:
-    """What is wrong with a tick: a non-finite estimate, one out of bounds, a covariance that is none."""
+    """What is wrong with a tick: a non-finite estimate, one out of bounds, a covariance that is
+    none.
+    """
     if not all(math.isfinite(record[place]) for place in (*ESTIMATE, *SIGMAS)):
         return f"not finite: {[record[place] for place in (*ESTIMATE, *SIGMAS)]}"
     bounds = settings.filter

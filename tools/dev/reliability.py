@@ -1,4 +1,6 @@
-"""docs/reliability.md from what the scenarios measure: `python -m gritd.tools.dev.reliability [--quick]`."""
+"""docs/reliability.md from what the scenarios measure: `python -m gritd.tools.dev.reliability
+[--quick]`.
+"""
 
 from __future__ import annotations
 
@@ -60,8 +62,9 @@ Figure = dict[str, Any]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run every scenario and write the page. Exit 1 if one fails or a fault is missing, without a page, or if a figure
-    is above its limit."""
+    """Run every scenario and write the page. Exit 1 if one fails or a fault is missing, without a
+    page, or if a figure is above its limit.
+    """
     parser = Parser(
         prog="python -m gritd.tools.dev.reliability",
         description="Run the scenarios and write docs/reliability.md.",

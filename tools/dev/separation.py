@@ -1,8 +1,10 @@
-"""Which experiment tells two effects apart: a campaign with it against the same campaign without it.
+"""Which experiment tells two effects apart: a campaign with it against the same campaign without
+it.
 
-What an effect changes is fitted by the soil, within its prior, and by the other effect. What is left over, in standard
-deviations, is what a diagnosis has to tell the two by. `python -m gritd.tools.dev.separation` prints it for every pair that an
-effect's file names; experiments that need another instrument or another wheel are not simulated.
+What an effect changes is fitted by the soil, within its prior, and by the other effect. What is
+left over, in standard deviations, is what a diagnosis has to tell the two by. `python -m
+gritd.tools.dev.separation` prints it for every pair that an effect's file names; experiments that
+need another instrument or another wheel are not simulated.
 """
 
 from __future__ import annotations
@@ -48,13 +50,17 @@ Have = tuple[str, ...]
 
 
 def separation(effect: str, rival: str, experiment: str) -> tuple[float, float]:
-    """What is left of the effect when soil and rival have fitted it [σ]: without and with the experiment."""
+    """What is left of the effect when soil and rival have fitted it [σ]: without and with the
+    experiment.
+    """
     without = tuple(name for name in PLAIN if name != experiment)
     return left_over(effect, rival, without), left_over(effect, rival, (*without, experiment))
 
 
 def left_over(effect: str, rival: str, have: Have) -> float:
-    """Root of the smallest misfit and strain with which soil and rival imitate the effect at its typical strength."""
+    """Root of the smallest misfit and strain with which soil and rival imitate the effect at its
+    typical strength.
+    """
     soil, other = _soil_columns(have), _strength_columns(rival, have)
     columns = np.stack((*soil, *other), axis=1)
     strain = np.diag([1.0] * len(soil) + [LOOSE**-2] * len(other))

@@ -60,7 +60,9 @@ READ = [
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Exit 1 if memory grows, a descriptor or thread stays, an estimate fails or a loss is not reported."""
+    """Exit 1 if memory grows, a descriptor or thread stays, an estimate fails or a loss is not
+    reported.
+    """
     parser = Parser(
         prog="python -m gritd.tools.dev.soak", description="Run for long, and look at what grows."
     )
@@ -106,7 +108,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return FAILED if failures else DONE
 
 
-# --- the pipeline -----------------------------------------------------------------------------------------------------
+# --- the pipeline ---------------------------------------------------------------------------------
+# --------------------
 
 
 def simulated(arguments: Namespace) -> list[str]:
@@ -202,7 +205,8 @@ def growth(memory: Sequence[tuple[float, float]]) -> float:
     return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0]) if len(settled) > 2 else 0.0
 
 
-# --- the daemon -------------------------------------------------------------------------------------------------------
+# --- the daemon -----------------------------------------------------------------------------------
+# --------------------
 
 
 def on_wires(arguments: Namespace) -> list[str]:
@@ -239,7 +243,9 @@ def on_wires(arguments: Namespace) -> list[str]:
 
 
 def shorten_parts(path: Path, minutes: float) -> None:
-    """Let a part of the recording end after so long: what the end of a part needs has then settled when it counts."""
+    """Let a part of the recording end after so long: what the end of a part needs has then settled
+    when it counts.
+    """
     text, found = re.subn(
         r"(?m)^( +part_time:).*$", rf"\g<1> {minutes:g} min", path.read_text(encoding="utf-8")
     )
@@ -298,7 +304,9 @@ def look(path: Path) -> dict[str, Any]:
 
 
 def unreported(last: dict[str, Any], played: dict[str, Any]) -> list[str]:
-    """What was sent and neither received nor counted as lost at either end; a reading is a message or more."""
+    """What was sent and neither received nor counted as lost at either end; a reading is a message
+    or more.
+    """
     devices = last["devices"].values()
     known = sum(device["lost"] + device["bad"] for device in devices) + sum(played["lost"].values())
     received = last["queue"]["received"]
@@ -336,7 +344,9 @@ def judged(
 
 
 def more(what: str, looks: Sequence[dict[str, Any]]) -> int:
-    """How many more there are in the last third than in the one after settling; a file being synced counts twice."""
+    """How many more there are in the last third than in the one after settling; a file being synced
+    counts twice.
+    """
     third = len(looks) // 3
     return int(min(look[what] for look in looks[-third:])) - int(
         min(look[what] for look in looks[third : 2 * third])

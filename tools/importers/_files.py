@@ -20,14 +20,18 @@ Table = dict[str, list[str]]
 
 
 class RigFileError(CommandError):
-    """A file is not what the importer expects, or (USAGE) its name is wrong; the message is one line naming it."""
+    """A file is not what the importer expects, or (USAGE) its name is wrong; the message is one
+    line naming it.
+    """
 
     def __init__(self, message: str, code: int = DAMAGED) -> None:
         super().__init__(message, code)
 
 
 def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re.Match[str]]]:
-    """Files whose name matches, in the folders and among the files given, sorted. Raises RigFileError."""
+    """Files whose name matches, in the folders and among the files given, sorted. Raises
+    RigFileError.
+    """
     files = sorted(
         {file for path in paths for file in _below(path)}, key=lambda file: (file.name, str(file))
     )
@@ -58,7 +62,9 @@ def read_text(path: Path) -> str:
 
 
 def read_table(path: Path, columns: Sequence[str]) -> Table:
-    """The named columns of a CSV file with a header, as text, at least one row. Raises RigFileError."""
+    """The named columns of a CSV file with a header, as text, at least one row. Raises
+    RigFileError.
+    """
     reader = csv.DictReader(line for line in read_text(path).splitlines() if line.strip())
     missing = [name for name in columns if name not in (reader.fieldnames or ())]
     if missing:
@@ -97,7 +103,8 @@ def number(path: Path, where: str, text: str) -> float:
 
 
 def matrix(path: Path, columns: int, skip: int = 0) -> Array:
-    """Rows of comma-separated finite numbers without a header, shape (n, columns); more columns are ignored.
+    """Rows of comma-separated finite numbers without a header, shape (n, columns); more columns are
+    ignored.
 
     Raises RigFileError naming the row.
     """
@@ -127,7 +134,8 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
 
 
 def increasing(path: Path, what: str, values: Array, first: int = 2) -> Array:
-    """The values, shape (n,), if there are two or more and they only rise; `first` is the row they begin in.
+    """The values, shape (n,), if there are two or more and they only rise; `first` is the row they
+    begin in.
 
     Raises RigFileError.
     """

@@ -1,4 +1,6 @@
-"""From a rig's arrays to a recording: the same readings a daemon would have logged, in the order of their stamps."""
+"""From a rig's arrays to a recording: the same readings a daemon would have logged, in the order of
+their stamps.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measur
 
 @dataclass(frozen=True)
 class Stream:
-    """The readings of one channel: stamps [ns since the epoch], shape (n,); raw values, shape (n,), wrench (n, 6)."""
+    """The readings of one channel: stamps [ns since the epoch], shape (n,); raw values, shape (n,),
+    wrench (n, 6).
+    """
 
     channel: str
     stamps: NDArray[np.int64]
@@ -44,17 +48,20 @@ def stamps(start: int, seconds: Array) -> NDArray[np.int64]:
 
 
 def counts(seconds: Array, speed: Array, per_count: float) -> NDArray[np.int64]:
-    """Encoder counts that a measured speed implies: its trapezoidal integral in units of `per_count`, shape (n,).
+    """Encoder counts that a measured speed implies: its trapezoidal integral in units of
+    `per_count`, shape (n,).
 
-    With `per_count` the quantum of the speed times the sampling interval, a count is the least travel the rig's log
-    can tell, so that the integral claims no resolution the log does not have.
+    With `per_count` the quantum of the speed times the sampling interval, a count is the least
+    travel the rig's log can tell, so that the integral claims no resolution the log does not have.
     """
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(seconds)
     return np.round(np.concatenate(([0.0], np.cumsum(steps))) / per_count).astype(np.int64)
 
 
 def configuration(template: str, output: Path, name: str, **values: str) -> config.Configuration:
-    """Fill a template of config/ and write it into the output folder; returns it as loaded. Raises RigFileError."""
+    """Fill a template of config/ and write it into the output folder; returns it as loaded. Raises
+    RigFileError.
+    """
     text = Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(values)
     path = output / name
     try:
@@ -71,7 +78,8 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
 def write(
     path: Path, streams: Sequence[Stream], configured: config.Configuration, run: RunInfo
 ) -> Path:
-    """One recording of raw topics, readings by stamp and then by the order of the channels. Replaces an earlier import.
+    """One recording of raw topics, readings by stamp and then by the order of the channels.
+    Replaces an earlier import.
 
     Raises RecordingError.
     """

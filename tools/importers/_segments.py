@@ -1,9 +1,12 @@
-"""Steady-state tables as recordings: every condition a segment of constant speed, a short silence between segments.
+"""Steady-state tables as recordings: every condition a segment of constant speed, a short silence
+between segments.
 
-A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of a normal
-distribution, a tenth of a second each, in an order that differs by channel, segment and run: the segment has mean and
-deviation exactly, and its mean is as uncertain as that of INDEPENDENT readings. Did they change faster, all scatter
-would average out, and a comparison would take the mean for exact.
+A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of a
+normal
+distribution, a tenth of a second each, in an order that differs by channel, segment and run: the
+segment has mean and deviation exactly, and its mean is as uncertain as that of INDEPENDENT
+readings. Did they change faster, all scatter would average out, and a comparison would take the
+mean for exact.
 """
 
 from __future__ import annotations
@@ -50,12 +53,16 @@ class Counting:
 
 
 def scatter_of_mean(value: float, sigma: float) -> Uncertain:
-    """A tabulated value whose own standard deviation is sigma, as readings whose mean is as uncertain."""
+    """A tabulated value whose own standard deviation is sigma, as readings whose mean is as
+    uncertain.
+    """
     return Uncertain(value, sigma * INDEPENDENT**0.5)
 
 
 def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> list[Stream]:
-    """The segments one after the other, as the channels of a recording. Scatter has another order in every run."""
+    """The segments one after the other, as the channels of a recording. Scatter has another order
+    in every run.
+    """
     seconds = np.arange(round(RATE * DURATION)) / RATE
     spacing = DURATION + PAUSE
     times = np.concatenate(

@@ -1,8 +1,9 @@
-"""CMU: a smooth and a grousered wheel in dry sand (Pavlov and Johnson, robomechanics/3d-terramechanics).
+"""CMU: a smooth and a grousered wheel in dry sand (Pavlov and Johnson,
+robomechanics/3d-terramechanics).
 
-Four campaigns, a folder each: the steady-state tables of either wheel (motion, sinkage, forces; one condition a
-segment) and its raw logs (motion and sinkage). The plates and wheels that were pressed into the sand become one table,
-penetration.csv. Only straight driving, steering angle 0, is taken.
+Four campaigns, a folder each: the steady-state tables of either wheel (motion, sinkage, forces; one
+condition a segment) and its raw logs (motion and sinkage). The plates and wheels that were pressed
+into the sand become one table, penetration.csv. Only straight driving, steering angle 0, is taken.
 """
 
 from __future__ import annotations
@@ -36,9 +37,11 @@ from gritd.tools.importers.registry import Progress
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
 
-COUNT = 1e-6  # [m] of rim and of carriage travel; 0.01 mm/s, the speeds' last digit, over a sample is 0.14 of it
+# [m] of rim and of carriage travel; 0.01 mm/s, the speeds' last digit, over a sample is 0.14 of it
+COUNT = 1e-6
 START_HEIGHT = 31.5  # [mm] of the wheel above the sand where a log begins
-REPEATABLE = 0.7e-3  # [m] by which the sinkage of the smooth wheel's repeats differs, far more than within one
+# [m] by which the sinkage of the smooth wheel's repeats differs, far more than within one
+REPEATABLE = 0.7e-3
 TRUSTED_MATCH = 0.4  # residual under which a log is known to belong to a table row
 CONTACT = 2.0  # [N] force at which a plate has met the sand
 
@@ -91,7 +94,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
-    """Recordings by wheel and kind, one configuration, penetration.csv. Raises RigFileError, RecordingError."""
+    """Recordings by wheel and kind, one configuration, penetration.csv. Raises RigFileError,
+    RecordingError.
+    """
     wheels = [args.wheel] if args.wheel else ["smooth", "grouser"]
     tables, logs, pressed = (find(args.paths, pattern) for pattern in (TABLE, LOG, PRESSED))
     if not (tables or logs or pressed):
@@ -118,7 +123,8 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     return written
 
 
-# ---- steady-state tables -------------------------------------------------------------------------------------------
+# ---- steady-state tables
+# -------------------------------------------------------------------------------------------
 
 
 def _import_table(
@@ -195,7 +201,8 @@ def _row(name: str, condition: Condition) -> str:
     )
 
 
-# ---- raw logs ------------------------------------------------------------------------------------------------------
+# ---- raw logs ------------------------------------------------------------------------------------
+# ------------------
 
 
 def _loads(path: Path) -> dict[str, float]:
@@ -213,10 +220,12 @@ def _loads(path: Path) -> dict[str, float]:
 def _import_log(
     path: Path, wheel: str, loads: dict[str, float], output: Path, configured: config.Configuration
 ) -> Path:
-    """X [mm], Vx, Vry [mm/s], angle [deg], Z [mm], clock [ms], unix time [s] become motion and height.
+    """X [mm], Vx, Vry [mm/s], angle [deg], Z [mm], clock [ms], unix time [s] become motion and
+    height.
 
-    The carriage's travel is the integral of Vx. X by the log's clock is 2.8 % faster than Vx in every log: the
-    controller underestimates its period, and both speeds with it. Their ratio, and so the slip, is right.
+    The carriage's travel is the integral of Vx. X by the log's clock is 2.8 % faster than Vx in
+    every log: the controller underestimates its period, and both speeds with it. Their ratio, and
+    so the slip, is right.
     """
     rows = matrix(path, 7)
     clock = increasing(path, "the clock", rows[:, 5] / 1000, first=1)
@@ -237,12 +246,15 @@ def _import_log(
     return write(output / f"{wheel}-logs" / f"{name}.mcap", logged, configured, info)
 
 
-# ---- penetration tests ---------------------------------------------------------------------------------------------
+# ---- penetration tests
+# ---------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Penetration:
-    """One body pressed down: force [N] and depth [mm] below the height of contact, arrays of shape (n,)."""
+    """One body pressed down: force [N] and depth [mm] below the height of contact, arrays of shape
+    (n,).
+    """
 
     name: str
     body: str
@@ -251,7 +263,9 @@ class Penetration:
 
 
 def _import_pressed(tests: list[tuple[Path, str, str]], output: Path) -> Path:
-    """penetration.csv: test, body, depth below contact [mm], force [N], up to the largest force, 20 rows a second."""
+    """penetration.csv: test, body, depth below contact [mm], force [N], up to the largest force, 20
+    rows a second.
+    """
     lines = ["test,body,depth_mm,force_N"]
     for file, series, which in tests:
         test = read_penetration(file, series, which)

@@ -1,8 +1,10 @@
-"""EMPS: a motor drive with friction and no soil, a public identification benchmark (Janot, Gautier, Brunot 2019).
+"""EMPS: a motor drive with friction and no soil, a public identification benchmark (Janot, Gautier,
+Brunot 2019).
 
-Position becomes the wheel encoder of a wheel of 1 m, so that its angle is the position, and the control voltage the
-motor shunt, so that torque constant times current is the force. The gate `pulses_N` of DATA_EMPS_PULSES is left out:
-the pulses it marks are in the control voltage already, which steps by 5 V at every edge of the gate.
+Position becomes the wheel encoder of a wheel of 1 m, so that its angle is the position, and the
+control voltage the motor shunt, so that torque constant times current is the force. The gate
+`pulses_N` of DATA_EMPS_PULSES is left out: the pulses it marks are in the control voltage already,
+which steps by 5 V at every edge of the gate.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """MGST: a smooth wheel in GRC-1 lunar simulant, one slip a trial (Daca, Tremblay, Skonieczny 2023).
 
-A trial is two files on two clocks: the rig's log (100 Hz: speeds, current, potentiometer) and the authors' processed
-force/torque log (about 277 Hz). Their time zeros are unrelated: the first is the start of the log, the second the
-first steep rise of the drawbar pull. The processed file carries the rig's current too, but interpolated as if the
-zeros were one, so it says nothing of the lag; what both clocks do see is the axle torque, by current and by sensor.
+A trial is two files on two clocks: the rig's log (100 Hz: speeds, current, potentiometer) and the
+authors' processed force/torque log (about 277 Hz). Their time zeros are unrelated: the first is the
+start of the log, the second the first steep rise of the drawbar pull. The processed file carries
+the rig's current too, but interpolated as if the zeros were one, so it says nothing of the lag;
+what both clocks do see is the axle torque, by current and by sensor.
 """
 
 from __future__ import annotations
@@ -131,7 +132,8 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     return written
 
 
-# ---- reading -------------------------------------------------------------------------------------------------------
+# ---- reading -------------------------------------------------------------------------------------
+# ------------------
 
 
 def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
@@ -205,15 +207,17 @@ def _midnight(path: Path, date: str) -> int:
         ) from None
 
 
-# ---- the two clocks ------------------------------------------------------------------------------------------------
+# ---- the two clocks
+# ------------------------------------------------------------------------------------------------
 
 
 def find_lag(trial: Trial) -> tuple[float, float]:
     """Lag [s] of the force/torque log's zero behind the rig's, and the correlation there.
 
-    Where motor torque (rig) and axle torque (sensor) agree best in steady driving, over 0.2 to 1 s: both smoothed over
-    60 ms and freed of what changes over more than 1.2 s. The start is left out, since drivetrain friction delays the
-    torque there. The peak is as broad as the fluctuations are slow: about ± 0.1 s.
+    Where motor torque (rig) and axle torque (sensor) agree best in steady driving, over 0.2 to 1 s:
+    both smoothed over 60 ms and freed of what changes over more than 1.2 s. The start is left out,
+    since drivetrain friction delays the torque there. The peak is as broad as the fluctuations are
+    slow: about ± 0.1 s.
     """
     grid = np.arange(0.0, min(trial.rig.t[-1], trial.sensor.t[-1]), 0.01)
     motor = _fluctuation(np.interp(grid, trial.rig.t, trial.rig.current))
@@ -237,13 +241,16 @@ def _fluctuation(values: Array) -> Array:
     return smooth - trend
 
 
-# ---- writing -------------------------------------------------------------------------------------------------------
+# ---- writing -------------------------------------------------------------------------------------
+# ------------------
 
 
 def _streams(
     trial: Trial, lag: float, begin: float, pull: str, concealed: set[str]
 ) -> list[Stream]:
-    """The channels from `begin` (0 is the start of the wheel, a little before the first force) to where a log ends."""
+    """The channels from `begin` (0 is the start of the wheel, a little before the first force) to
+    where a log ends.
+    """
     rig, sensor = trial.rig, trial.sensor
     shared = (rig.t >= begin) & (rig.t <= lag + sensor.t[-1])
     times = stamps(rig.start, rig.t)[shared]
@@ -283,7 +290,8 @@ def _info(trial: Trial, lag: float, pull: str, concealed: list[str]) -> RunInfo:
     )
 
 
-# ---- what the table shows ------------------------------------------------------------------------------------------
+# ---- what the table shows
+# ------------------------------------------------------------------------------------------
 
 HEADER = "means from 3 s on     slip   W [N]  DP [N]  DP raw  T axle  T motor  differ [N·m]  z - z0 [mm]  lag [s]     r"
 

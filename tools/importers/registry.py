@@ -1,4 +1,6 @@
-"""Importers of other rigs' public data, one file a rig. A module here with the names of `Rig` is found by itself."""
+"""Importers of other rigs' public data, one file a rig. A module here with the names of `Rig` is
+found by itself.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ Progress = Callable[[str], None]
 
 
 class Rig(Protocol):
-    """What a module of this folder offers. `run` gets `paths` and `output` beside its own arguments."""
+    """What a module of this folder offers. `run` gets `paths` and `output` beside its own
+    arguments.
+    """
 
     NAME: str
     SUMMARY: str
@@ -31,7 +35,9 @@ class Rig(Protocol):
 
     @staticmethod
     def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
-        """Write the recordings and their configuration; returns what was written. Raises RigFileError."""
+        """Write the recordings and their configuration; returns what was written. Raises
+        RigFileError.
+        """
 
 
 def rigs() -> dict[str, Rig]:

@@ -1,8 +1,9 @@
-"""A table of steady states, one condition a row: slip, load, drawbar pull, sinkage and torque, as papers print them.
+"""A table of steady states, one condition a row: slip, load, drawbar pull, sinkage and torque, as
+papers print them.
 
-The columns are those of the public roverdevkit repository's digitised experiments (Ding et al. 2011 among them). Torque
-at the axle stands as the current of a drive of 1 N·m/A, so that the on-line filter runs on it. A table has no speed, so
-one is assumed; nothing in Eqs. (1)–(22) depends on it.
+The columns are those of the public roverdevkit repository's digitised experiments (Ding et al. 2011
+among them). Torque at the axle stands as the current of a drive of 1 N·m/A, so that the on-line
+filter runs on it. A table has no speed, so one is assumed; nothing in Eqs. (1)–(22) depends on it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Simulation over recording without a diagnosis: as configured and, where asked for, with the soil fitted."""
+"""Simulation over recording without a diagnosis: as configured and, where asked for, with the soil
+fitted.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,8 @@ NOTE = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """Traces by channel, then run: `before` as configured, `after` with the soil fitted (the same where it was not).
+    """Traces by channel, then run: `before` as configured, `after` with the soil fitted (the same
+    where it was not).
 
     soil: known and fitted, None without a fit.
     """
@@ -57,7 +60,9 @@ class Comparison:
         return list(dict.fromkeys(trace.run for trace in self.traces))
 
     def rms(self, channel: str, run: str | None, which: str) -> float:
-        """Root mean square residual [the channel's unit] of a run, or of all; NaN where nothing was compared."""
+        """Root mean square residual [the channel's unit] of a run, or of all; NaN where nothing was
+        compared.
+        """
         of = [t for t in self.traces if t.channel == channel and run in (None, t.run)]
         counts = np.array([sum(t.used) for t in of], dtype=float)
         squares = np.nan_to_num([figures.rms(t, which) ** 2 for t in of])

@@ -1,4 +1,6 @@
-"""The report of a diagnosis: verdict first, then the pictures, then the tables, then what it takes to redo it."""
+"""The report of a diagnosis: verdict first, then the pictures, then the tables, then what it takes
+to redo it.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,8 @@ def paragraph(*content: Child) -> Markup:
     return tag("p", *content)
 
 
-# ---- verdict -------------------------------------------------------------------------------------------------------
+# ---- verdict -------------------------------------------------------------------------------------
+# ------------------
 
 
 def _verdict(found: Diagnosis) -> Markup:
@@ -186,7 +189,8 @@ def _change(found: Diagnosis, channel: str) -> tuple[str, str]:
     return f"{change} {seen}".rstrip(), with_unit(found.fit.noise_floor.get(channel), unit, 2)
 
 
-# ---- pictures ------------------------------------------------------------------------------------------------------
+# ---- pictures ------------------------------------------------------------------------------------
+# ------------------
 
 
 def _simulation(found: Diagnosis) -> Markup | None:
@@ -292,7 +296,8 @@ def _fitted(found: Diagnosis) -> dict[str, str]:
     }
 
 
-# ---- the end -------------------------------------------------------------------------------------------------------
+# ---- the end -------------------------------------------------------------------------------------
+# ------------------
 
 
 def _caveats(found: Diagnosis) -> Markup | None:

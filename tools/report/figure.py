@@ -1,4 +1,6 @@
-"""A run on one page: what was measured and predicted, what was learned, and whether the innovations are honest."""
+"""A run on one page: what was measured and predicted, what was learned, and whether the innovations
+are honest.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,8 @@ SOUGHT = (
 def draw(path: Path, ticks: Rows, title: str, truth: Mapping[str, float] | None = None) -> None:
     """Write the page as PNG.
 
-    ticks: /tick as an array (n,) by field name. truth: cohesion [Pa], tan_phi and shear_modulus [m], where known.
+    ticks: /tick as an array (n,) by field name. truth: cohesion [Pa], tan_phi and shear_modulus
+        [m], where known.
     """
     figure = Figure(figsize=SIZE, dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.04))
     left, right = figure.subfigures(1, 2, squeeze=False)[0]

@@ -1,4 +1,6 @@
-"""The pictures of a report: time traces with their residual, residual against a covariate, estimates side by side."""
+"""The pictures of a report: time traces with their residual, residual against a covariate,
+estimates side by side.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +72,8 @@ def legend(entries: Mapping[str, str]) -> Markup:
     )
 
 
-# ---- traces --------------------------------------------------------------------------------------------------------
+# ---- traces --------------------------------------------------------------------------------------
+# ------------------
 
 
 def differs(trace: Trace | Scatter) -> bool:
@@ -81,7 +84,9 @@ def differs(trace: Trace | Scatter) -> bool:
 
 
 def rms(trace: Trace, which: str) -> float:
-    """Root mean square residual [the trace's unit] over the samples compared; NaN where there are none."""
+    """Root mean square residual [the trace's unit] over the samples compared; NaN where there are
+    none.
+    """
     used = np.asarray(trace.used, dtype=bool)
     residual = (np.asarray(trace.measured, float) - np.asarray(getattr(trace, which), float))[used]
     residual = residual[np.isfinite(residual)]
@@ -89,7 +94,9 @@ def rms(trace: Trace, which: str) -> float:
 
 
 def traces(of: Sequence[Trace], most: int) -> Markup:
-    """A panel a run: the `most` with the largest error in view and in their order, the others folded."""
+    """A panel a run: the `most` with the largest error in view and in their order, the others
+    folded.
+    """
     ranked = sorted(range(len(of)), key=lambda i: -np.nan_to_num(rms(of[i], "before")))
     first, rest = sorted(ranked[:most]), sorted(ranked[most:])
     seen = panels(trace_panel(of[i]) for i in first)
@@ -153,11 +160,14 @@ def _known(sigma: float) -> float:
     return sigma if np.isfinite(sigma) else 0.0
 
 
-# ---- residual against a covariate ----------------------------------------------------------------------------------
+# ---- residual against a covariate
+# ----------------------------------------------------------------------------------
 
 
 def drawn_against(of: Scatter) -> str:
-    """The covariate a scatter is drawn against: of a product the first; what is the same everywhere, run by run."""
+    """The covariate a scatter is drawn against: of a product the first; what is the same
+    everywhere, run by run.
+    """
     first = of.covariate.split("·")[0]
     return "run" if first == "constant" else first
 
@@ -167,7 +177,8 @@ def scatter(
 ) -> Markup:
     """Residuals without and with the explanation, on one scale; their mean through them.
 
-    changes: values of the covariate at which the misfit starts or stops; of runs, the number of the first run beyond.
+    changes: values of the covariate at which the misfit starts or stops; of runs, the number of the
+        first run beyond.
     """
     unit, factor = shown(of.unit)
     sides = [(f"without {explanation}", "before")] + (
@@ -261,11 +272,14 @@ def running_mean(x: Array, y: Array) -> tuple[Array, Array]:
     return sums[0], sums[1]
 
 
-# ---- estimates -----------------------------------------------------------------------------------------------------
+# ---- estimates -----------------------------------------------------------------------------------
+# ------------------
 
 
 def soil(of: SoilFit) -> Markup:
-    """Each soil parameter: known before, fitted without, fitted with the explanation; ±1σ thick, ±2σ thin."""
+    """Each soil parameter: known before, fitted without, fitted with the explanation; ±1σ thick,
+    ±2σ thin.
+    """
     known = ("known before", of.prior, "prior")
     rows = [known, ("fitted without", of.before, "before"), ("fitted with", of.after, "after")]
     if of.before == of.after:

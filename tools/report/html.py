@@ -1,4 +1,5 @@
-"""HTML as nested calls: whatever is not Markup is escaped, so no text from outside can become markup.
+"""HTML as nested calls: whatever is not Markup is escaped, so no text from outside can become
+markup.
 
 The output is well-formed XML as well as HTML.
 """
@@ -13,7 +14,8 @@ from typing import TypeAlias
 
 SHORT = 16  # letters that are never broken in a table
 VOID = frozenset(("meta", "br", "path", "line", "rect", "circle"))
-# Controls, lone surrogates (from file names that are not UTF-8) and marks that turn the direction of writing.
+# Controls, lone surrogates (from file names that are not UTF-8) and marks that turn the direction
+# of writing.
 UNPRINTABLE = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
 )
@@ -48,7 +50,9 @@ def join(*children: Child) -> Markup:
 
 
 def tag(name: str, /, *children: Child, **attributes: str | float | None) -> Markup:
-    """`<name …>children</name>`. In attribute names `class_` is class and `_` is `-`; None leaves one out."""
+    """`<name …>children</name>`. In attribute names `class_` is class and `_` is `-`; None leaves
+    one out.
+    """
     said = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_attribute(value)}"'
         for key, value in attributes.items()
@@ -66,7 +70,8 @@ def _attribute(value: str | float) -> str:
 def table(
     head: Iterable[str], rows: Iterable[Iterable[Child]], *, numbers: int = 0, caption: str = ""
 ) -> Markup:
-    """A table whose first column names the row and whose columns from `numbers` (0: none) on are numbers.
+    """A table whose first column names the row and whose columns from `numbers` (0: none) on are
+    numbers.
 
     On a narrow screen each row becomes a block, every cell under the name of its column.
     """

@@ -1,4 +1,6 @@
-"""Hypotheses as a ranked list with bars; those that the recordings cannot tell apart stand in one box."""
+"""Hypotheses as a ranked list with bars; those that the recordings cannot tell apart stand in one
+box.
+"""
 
 from __future__ import annotations
 

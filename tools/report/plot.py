@@ -1,6 +1,8 @@
-"""Small pictures in SVG: scales, axes and marks. Coordinates are pixels of a picture W wide; colours are CSS classes.
+"""Small pictures in SVG: scales, axes and marks. Coordinates are pixels of a picture W wide;
+colours are CSS classes.
 
-A picture is as wide as a phone, and a page puts several in a row where there is room; so its text is never scaled down.
+A picture is as wide as a phone, and a page puts several in a row where there is room; so its text
+is never scaled down.
 """
 
 from __future__ import annotations
@@ -103,7 +105,8 @@ def frame(
     most: int = 5,
     names: Sequence[str] | None = None,
 ) -> Markup:
-    """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None leaves it bare.
+    """Grid, tick labels, the vertical axis's label on top; `below` names the horizontal axis, None
+    leaves it bare.
 
     names: stand at 0, 1, 2 … on the horizontal axis in place of numbers.
     """

@@ -1,6 +1,8 @@
-"""What it takes to do a computation again: command line, files with their checksums, configuration, versions, seed.
+"""What it takes to do a computation again: command line, files with their checksums, configuration,
+versions, seed.
 
-Keys are shown as they are found: a text of several lines is folded, a list of mappings is a table, the rest are rows.
+Keys are shown as they are found: a text of several lines is folded, a list of mappings is a table,
+    the rest are rows.
 """
 
 from __future__ import annotations

@@ -44,7 +44,9 @@ def draw(path: Path, found: Comparison) -> None:
 
 
 def _plain_text(name: str) -> str:
-    """A run's name without what matplotlib would read as mathematics, and short enough for its column."""
+    """A run's name without what matplotlib would read as mathematics, and short enough for its
+    column.
+    """
     name = "".join(c if c.isprintable() else "\ufffd" for c in name).replace("$", r"\$")
     return name if len(name) <= 48 else f"{name[:47]}…"
 

@@ -1,4 +1,6 @@
-"""The tables of a diagnosis: parameters with units, where in words, held-out errors, the empirical law."""
+"""The tables of a diagnosis: parameters with units, where in words, held-out errors, the empirical
+law.
+"""
 
 from __future__ import annotations
 

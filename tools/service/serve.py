@@ -37,7 +37,9 @@ class QueueSource:
 def serve(
     configuration: Configuration, folder: Path, run: RunInfo, socket: Path, status_every: float
 ) -> int:
-    """Run until told to stop; the exit code. Raises CommandError if it cannot start or a thread dies."""
+    """Run until told to stop; the exit code. Raises CommandError if it cannot start or a thread
+    dies.
+    """
     try:
         return _serve(configuration, folder, run, socket, status_every)
     except (DaemonError, RecordingError, PublishError) as error:

@@ -1,4 +1,6 @@
-"""What the running daemon tells of itself: the mapping that goes out on its status socket, in SI units."""
+"""What the running daemon tells of itself: the mapping that goes out on its status socket, in SI
+units.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""What `gritd run` does beside its threads, ten times a second: tell people and the service manager, reload, tidy."""
+"""What `gritd run` does beside its threads, ten times a second: tell people and the service
+manager, reload, tidy.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ LISTENING = 50  # [ms] given to whoever reads our lines and is behind
 
 
 class Watcher:
-    """Called by Daemon.serve. Prints a line of status now and then, and every change of a device's state at once."""
+    """Called by Daemon.serve. Prints a line of status now and then, and every change of a device's
+    state at once.
+    """
 
     def __init__(
         self,
@@ -81,7 +85,8 @@ class Watcher:
     def _due(self, period: float) -> bool:
         return period > 0 and (self._calls + 1) % max(round(period / WATCH), 1) == 0
 
-    # --- what is told ---------------------------------------------------------------------------------------------
+    # --- what is told
+    # ---------------------------------------------------------------------------------------------
 
     def _follow(self, daemon: Daemon, stats: ReaderStats) -> None:
         beginning = stats.state == "WAITING" and not stats.last_error  # for its first attempt
@@ -96,7 +101,9 @@ class Watcher:
         )
 
     def _follow_queue(self, daemon: Daemon) -> None:
-        """Readings that the loop did not take in time: the oldest are dropped; said once a second at most."""
+        """Readings that the loop did not take in time: the oldest are dropped; said once a second
+        at most.
+        """
         dropped, begins = self._queue.counts().dropped, False
         if dropped > self._dropped and not self._overflowing:
             begins = self._overflowing = True
@@ -153,7 +160,9 @@ class Watcher:
         daemon.say(level, text.strip())
 
     def _notify(self, daemon: Daemon) -> None:
-        """The service manager hears READY after the first tick, and of the watchdog while everything moves."""
+        """The service manager hears READY after the first tick, and of the watchdog while
+        everything moves.
+        """
         if not self._ready and daemon.loop.ticks:
             self._ready = True
             self._notifier.tell(notify.READY)
@@ -162,7 +171,8 @@ class Watcher:
         if self._due(1.0):
             self._notifier.tell(notify.status(status_line(daemon)))
 
-    # --- what is done ---------------------------------------------------------------------------------------------
+    # --- what is done
+    # ---------------------------------------------------------------------------------------------
 
     def _begin_reload(self, daemon: Daemon) -> None:
         """Read the configuration again, from a thread: the watchdog is stroked meanwhile."""
@@ -224,8 +234,9 @@ class Watcher:
 
 
 def say(text: str, stream: TextIO | None = None) -> None:
-    """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon goes on; where somebody
-    does not read what he asked for, it goes on without the line."""
+    """A line for people. Where nobody listens any more, on a terminal that was closed, a daemon
+    goes on; where somebody does not read what he asked for, it goes on without the line.
+    """
     out = stream or sys.stdout
     try:
         if _taken(out):
@@ -235,7 +246,9 @@ def say(text: str, stream: TextIO | None = None) -> None:
 
 
 def _taken(out: TextIO) -> bool:
-    """Whether a line can be written without waiting for its reader: a full pipe would hold up the end, too."""
+    """Whether a line can be written without waiting for its reader: a full pipe would hold up the
+    end, too.
+    """
     try:
         waiting = select.poll()
         waiting.register(out, select.POLLOUT)

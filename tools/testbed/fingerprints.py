@@ -39,7 +39,9 @@ HIGHEST_ORDER = 60  # [cycles a turn] tried for the wheel angle
 
 
 def campaign(runs: int = RUNS, seed: int = 3) -> list[Motion]:
-    """Runs that drive forward through all loads, slips and speeds in a drawn order, each run the next pass."""
+    """Runs that drive forward through all loads, slips and speeds in a drawn order, each run the
+    next pass.
+    """
     rng = np.random.default_rng(seed)
     return [_run(rng, number) for number in range(runs)]
 
@@ -69,7 +71,9 @@ def ramped(time: Array, levels: Array) -> Array:
 
 
 def channels(response: Response) -> dict[str, Array]:
-    """What the channels say of one run; torque is the motor's, from the current and the configured constant."""
+    """What the channels say of one run; torque is the motor's, from the current and the configured
+    constant.
+    """
     sensed = response.sensed
     return {
         "torque": np.asarray(TORQUE_CONSTANT * sensed.current),
@@ -100,7 +104,9 @@ def covariates(motions: list[Motion], plain: list[Response]) -> dict[str, Array]
 
 @dataclass(frozen=True)
 class Shown:
-    """What an effect changes: rms change over noise by channel, and the share of it each covariate explains."""
+    """What an effect changes: rms change over noise by channel, and the share of it each covariate
+    explains.
+    """
 
     change: dict[str, Array]  # by channel, (n,), in the channel's unit
     strength: dict[str, float]  # by channel, rms change over NOISE
@@ -112,7 +118,9 @@ class Shown:
         return max(self.strength, key=lambda channel: self.strength[channel])
 
     def stands_out(self, channel: str, covariate: str) -> bool:
-        """Whether the covariate explains some, and no other clearly more; a constant must explain nearly all."""
+        """Whether the covariate explains some, and no other clearly more; a constant must explain
+        nearly all.
+        """
         share = self.share[channel]
         if covariate == "constant":
             return share[covariate] > 0.95

@@ -1,7 +1,7 @@
 """What the simulated testbed is asked to do, the soil under it, and the two plants that may answer.
 
-`original` solves Eqs. (1)-(10) by the forward model; `linear` obeys the closed forms (20)-(22) exactly, which is what
-the filter takes for true.
+`original` solves Eqs. (1)-(10) by the forward model; `linear` obeys the closed forms (20)-(22)
+exactly, which is what the filter takes for true.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ PlantKind = Literal["original", "linear"]
 
 RAMP = 0.5  # [s] between conditions
 REST = 1.5  # [s] of standstill at the start
-TAIL = 2.0  # [s] of standstill after the end, so that the wires are not silent before the daemon is stopped
+# [s] of standstill after the end, so that the wires are not silent before the daemon is stopped
+TAIL = 2.0
 USUAL = 3.9  # [s] a condition, its ramp included
 SHORTEST = 1.0  # [s]
 LOADS = (30.0, 65.0, 105.0)  # [N]
@@ -35,7 +36,9 @@ DEEPEST = 1.5  # [rad] end of the bracket for θ₁
 
 
 def schedule(seconds: float) -> Schedule:
-    """Standstill, then three loads with as many slips each as there is time for; to rest after `seconds`."""
+    """Standstill, then three loads with as many slips each as there is time for; to rest after
+    `seconds`.
+    """
     each = (seconds - REST) / len(LOADS)
     count = max(1, min(len(SLIPS), max(round(each / USUAL), min(2, int(each / SHORTEST)))))
     driven = [
@@ -49,7 +52,9 @@ def schedule(seconds: float) -> Schedule:
 
 
 def drawn_soil(settings: Settings, rng: np.random.Generator) -> Soil:
-    """A soil about one sigma off the configured one, signs drawn: c and tan φ 0.8 to 1.2 σ, k 10 to 15 %."""
+    """A soil about one sigma off the configured one, signs drawn: c and tan φ 0.8 to 1.2 σ, k 10 to
+    15 %.
+    """
 
     def away(known: Uncertain, low: float, high: float) -> float:
         return known.value + float(rng.choice((-1.0, 1.0)) * rng.uniform(low, high))
@@ -74,7 +79,9 @@ def drive(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion, seed
 
 
 def linear_response(settings: Settings, soil: Soil, motion: Motion) -> Response:
-    """σₘ by Eq. (3) at θₘ; θ₁ where Eq. (21) carries the load; DP and T by Eqs. (20) and (22). Arrays (n,)."""
+    """σₘ by Eq. (3) at θₘ; θ₁ where Eq. (21) carries the load; DP and T by Eqs. (20) and (22).
+    Arrays (n,).
+    """
     wheel, situation = settings.wheel, situation_of(motion, settings.wheel)
     slip, direction = np.asarray(situation.slip), np.asarray(situation.direction)
     known = (wheel, soil.cohesion, soil.tan_phi, soil.shear_modulus)

@@ -1,4 +1,6 @@
-"""The configuration of a run on simulated wires: the testbed's own, with other devices and another log folder."""
+"""The configuration of a run on simulated wires: the testbed's own, with other devices and another
+log folder.
+"""
 
 from __future__ import annotations
 

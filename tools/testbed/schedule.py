@@ -1,4 +1,6 @@
-"""What a testbed is to do: segments of load, slip and speed, joined by ramps; from YAML to a motion."""
+"""What a testbed is to do: segments of load, slip and speed, joined by ramps; from YAML to a
+motion.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ LOCKED = -0.95  # [-] a wheel more locked than this is not driven by its motor a
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of steady driving. Rim speed 0 is standstill, load 0 a lifted wheel, slip 1 a stall."""
+    """A stretch of steady driving. Rim speed 0 is standstill, load 0 a lifted wheel, slip 1 a
+    stall.
+    """
 
     duration: float  # [s]
     load: float  # weights on the axle [N]
@@ -82,7 +86,9 @@ def motion_of(
     pass_number: float = 1.0,
     start_position: float = 0.0,
 ) -> Motion:
-    """The motion a perfect controller makes of a schedule, as its encoders tell it; `rate` samples a second."""
+    """The motion a perfect controller makes of a schedule, as its encoders tell it; `rate` samples
+    a second.
+    """
     time = np.arange(max(round(schedule.duration * rate), 2)) / rate
     load, slip, speed = (_ramped(schedule, time, name) for name in ("load", "slip", "speed"))
     travel = np.where(slip >= 0.0, speed * (1.0 - slip), speed / (1.0 + np.minimum(slip, 0.0)))
@@ -99,7 +105,9 @@ def motion_of(
 
 
 def _ramped(schedule: Schedule, time: Array, name: str) -> Array:
-    """One quantity of the schedule over time: steady, then a ramp to the next segment; ramps fit their segments."""
+    """One quantity of the schedule over time: steady, then a ramp to the next segment; ramps fit
+    their segments.
+    """
     levels = [getattr(segment, name) for segment in schedule.segments]
     knots = np.array(list(_knots(schedule)))
     values: Array = np.interp(time, knots, np.repeat(levels, 2))

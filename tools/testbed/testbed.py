@@ -1,9 +1,11 @@
-"""The simulated testbed: a process of its own that plays a run of the wheel on real wires, in real time.
+"""The simulated testbed: a process of its own that plays a run of the wheel on real wires, in real
+time.
 
     python -m gritd.tools.testbed.testbed --folder F
 
-writes F/testbed.yaml, which tells a daemon where the wires are, and the truth beside it; then it plays: encoders over a
-pseudo-terminal, the other sensors over CAN, every reading at the time it would arrive.
+writes F/testbed.yaml, which tells a daemon where the wires are, and the truth beside it; then it
+plays: encoders over a pseudo-terminal, the other sensors over CAN, every reading at the time it
+would arrive.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Played:
-    """How punctual the wires were [s]: quantiles of sent minus due, and what nobody took, by device."""
+    """How punctual the wires were [s]: quantiles of sent minus due, and what nobody took, by
+    device.
+    """
 
     late_half: float
     late_most: float
@@ -71,7 +75,9 @@ class Played:
 def experiment(
     configuration: Configuration, seconds: float, kind: PlantKind, seed: int
 ) -> Experiment:
-    """A soil drawn away from the configured one, a schedule of this length, and the readings it gives."""
+    """A soil drawn away from the configured one, a schedule of this length, and the readings it
+    gives.
+    """
     settings = configuration.settings
     soil = plant.drawn_soil(settings, np.random.default_rng(seed))
     motion = motion_of(plant.schedule(seconds), settings.wheel.radius, settings.rates.tick)
@@ -81,7 +87,9 @@ def experiment(
 
 
 def in_transit(readings: Iterable[Reading], seed: int) -> list[Reading]:
-    """The readings with random delays on the way, in the order of arrival, stamps and arrivals from zero [ns]."""
+    """The readings with random delays on the way, in the order of arrival, stamps and arrivals from
+    zero [ns].
+    """
     sent = list(readings)
     rng = np.random.default_rng(seed)
     delays = np.minimum(rng.exponential(JITTER, len(sent)), LONGEST_JITTER) * NS
@@ -96,7 +104,9 @@ def in_transit(readings: Iterable[Reading], seed: int) -> list[Reading]:
 def play(
     readings: Sequence[Reading], rig: Rig, stopped: Callable[[], bool] = lambda: False
 ) -> Played:
-    """Send every reading when it is due, `received` [ns] after the start; returns after the last, or when stopped."""
+    """Send every reading when it is due, `received` [ns] after the start; returns after the last,
+    or when stopped.
+    """
     start = time.monotonic_ns() + LEAD
     late = []
     for reading in readings:
@@ -127,7 +137,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         if not arguments.wait or sys.stdin.readline():
             stop = _stop_on_signals()
-            real_time()  # a real rig is not held up by the computer's other work; where refused, it may be
+            # a real rig is not held up by the computer's other work; where refused, it may be
+            real_time()
             played = play(in_transit(prepared.run.readings, arguments.seed + 2), rig, stop.is_set)
             (folder / PLAYED).write_text(
                 json.dumps(asdict(played), indent=2) + "\n", encoding="utf-8"

@@ -1,4 +1,5 @@
-"""The far ends of real wires: pseudo-terminals and a CAN bus on the loopback, and the devices that speak on them.
+"""The far ends of real wires: pseudo-terminals and a CAN bus on the loopback, and the devices that
+speak on them.
 
 Nothing here waits: what nobody reads is lost and counted, as on a wire.
 """
@@ -45,9 +46,8 @@ class Terminal:
     """The master of a pseudo-terminal whose slave the daemon opens as a serial port."""
 
     def __init__(self) -> None:
-        self._master, self._slave = (
-            pty.openpty()
-        )  # held open, so that the raw mode outlives the daemon
+        # held open, so that the raw mode outlives the daemon
+        self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
@@ -89,7 +89,8 @@ class SerialDevice:
 
 
 class MulticastBus:
-    """The nodes of a CAN bus that is a multicast group of this computer; no datagram leaves it (hop limit 0).
+    """The nodes of a CAN bus that is a multicast group of this computer; no datagram leaves it (hop
+    limit 0).
 
     Raises OSError or can.CanError where the computer has no interface that could carry one.
     """
@@ -144,7 +145,9 @@ def connect(device: Device, bus: CanKind = "auto") -> FarEnd:
 
 
 def has_multicast() -> bool:
-    """Whether this computer has an interface that takes multicast; a container without a network has none."""
+    """Whether this computer has an interface that takes multicast; a container without a network
+    has none.
+    """
     membership = socket.inet_aton("239.255.0.1") + socket.inet_aton("0.0.0.0")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -183,7 +186,8 @@ def _free_port() -> int:
 
 
 class Rig:
-    """All devices of a configuration, connected: a reading goes in, its bytes come out on the right wire.
+    """All devices of a configuration, connected: a reading goes in, its bytes come out on the right
+    wire.
 
     settings: the devices in them are replaced by those of `devices` for the daemon.
     """

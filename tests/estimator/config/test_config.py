@@ -65,7 +65,8 @@ def changed(old: str, new: str, text: str = MINIMAL) -> str:
     return text.replace(old, new)
 
 
-# ---- what is read --------------------------------------------------------------------------------------------------
+# ---- what is read
+# --------------------------------------------------------------------------------------------------
 
 
 def test_quantities_become_si() -> None:
@@ -177,7 +178,8 @@ def test_run_section() -> None:
     assert config.loads(MINIMAL, "rig.yaml").run == RunInfo()
 
 
-# ---- what is refused -----------------------------------------------------------------------------------------------
+# ---- what is refused
+# -----------------------------------------------------------------------------------------------
 
 # (old, new, line, key path, words that must stand in the message)
 REFUSED = [
@@ -406,7 +408,9 @@ def _seconds(text: str) -> float:
 @settings(max_examples=150)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
-    """Any edit of a good file ends in settings or in a ConfigError of one line, never in another exception."""
+    """Any edit of a good file ends in settings or in a ConfigError of one line, never in another
+    exception.
+    """
     text = MINIMAL
     for _ in range(data.draw(st.integers(1, 3))):
         at = data.draw(st.integers(0, len(text)))
@@ -427,7 +431,9 @@ def test_packaged_testbed_is_consistent() -> None:
 
 
 def test_an_effect_needs_only_what_differs_from_the_library():
-    """Parameters that are not given have the library's own value; the effective text states them all."""
+    """Parameters that are not given have the library's own value; the effective text states them
+    all.
+    """
     text = MINIMAL + "\neffects: {grousers: {height: 5 mm}}\n"
     read = config.loads(text, "rig.yaml")
     (effect,) = read.settings.effects

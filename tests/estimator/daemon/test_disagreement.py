@@ -1,4 +1,6 @@
-"""The daemon says that model and measurement disagree, in which channel and since when; without cause it does not."""
+"""The daemon says that model and measurement disagree, in which channel and since when; without
+cause it does not.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ BEGINS, ENDS = 80, 200  # ticks, ten a second
 
 
 def watched(loss: float) -> tuple[Watch, list[tuple[int, str]], list[int]]:
-    """A run whose motor consumes more torque between two ticks; the lines said, with their tick, and all flags."""
+    """A run whose motor consumes more torque between two ticks; the lines said, with their tick,
+    and all flags.
+    """
     pipeline, watch = Pipeline(RIG, "plain"), Watch()
     state, said, flags = pipeline.start(), [], []
     more = loss / RIG.drive.torque_constant.value / SHUNT

@@ -1,4 +1,6 @@
-"""What the service is made of: notifications, pulses, the disk cap, the status socket and those who read it."""
+"""What the service is made of: notifications, pulses, the disk cap, the status socket and those who
+read it.
+"""
 
 from __future__ import annotations
 
@@ -177,7 +179,9 @@ def test_what_a_killed_daemon_had_only_begun_is_swept_away(tmp_path):
 
 
 def test_a_recording_whose_name_a_power_cut_took_back_gets_it_again(tmp_path):
-    """The folder may reach the medium later than the file: simulated by renaming a recording to its draft."""
+    """The folder may reach the medium later than the file: simulated by renaming a recording to its
+    draft.
+    """
     path = tmp_path / "a.mcap"
     thread = WriterThread(path, [], "a: 1\n", RunInfo("a"))
     thread.put([Reading(10**18 + i, "wheel_encoder", i, 10**18 + i) for i in range(10)])
@@ -352,7 +356,9 @@ def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
 
 
 def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
-    """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never wrapped."""
+    """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never
+    wrapped.
+    """
     master, slave = pty.openpty()
     termios.tcsetwinsize(slave, (10, 40))
     command = [sys.executable, "-m", "gritd", "monitor", "--socket", str(publisher.path)]

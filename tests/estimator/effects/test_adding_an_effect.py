@@ -1,4 +1,6 @@
-"""docs/adding-an-effect.md, followed word for word; and docs/effects.md says what the effects' files say."""
+"""docs/adding-an-effect.md, followed word for word; and docs/effects.md says what the effects'
+files say.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Every effect of the folder: off is the identity, on is finite and continuous, it shows where it says it shows."""
+"""Every effect of the folder: off is the identity, on is finite and continuous, it shows where it
+says it shows.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ DESIGN = set(
 
 
 def run_of_everything() -> Motion:
-    """Standstill, both directions, braking, stall, lifted wheel and a heavy load, with ramps between."""
+    """Standstill, both directions, braking, stall, lifted wheel and a heavy load, with ramps
+    between.
+    """
     rows = np.array(
         [  # load [N], ω [rad/s], v [m/s]
             (40.0, 0.0, 0.0),
@@ -149,7 +153,9 @@ def test_finite_over_the_whole_box(name: str, hard_run: Motion) -> None:
 
 @pytest.mark.parametrize("name", FORWARD)
 def test_continuous_in_its_parameters(name: str, hard_run: Motion) -> None:
-    """A tiny step of a parameter is a tiny step of every channel, from anywhere in the box and from the off value."""
+    """A tiny step of a parameter is a tiny step of every channel, from anywhere in the box and from
+    the off value.
+    """
     parameters = EFFECTS[name].parameters()
     inside = [
         {p.name: 0.8 * p.centre + 0.2 * edge(p) for p in parameters} for edge in (_low, _high)

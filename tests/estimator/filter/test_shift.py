@@ -1,4 +1,6 @@
-"""With the shift, the closed forms give the forces of the original equations, and c and tan φ come out right."""
+"""With the shift, the closed forms give the forces of the original equations, and c and tan φ come
+out right.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +114,9 @@ def test_gradients():
     "prior", [{}, {"cohesion": 1.25, "tan_phi": 0.95}, {"shear_modulus": 1.15}], ids=str
 )
 def test_c_and_tan_phi_are_found(named, prior):
-    """Issue: bias of c within 5 % or 40 Pa, of tan φ within 1.5 %, loads 30-105 N, slips 5-60 %, no noise."""
+    """Issue: bias of c within 5 % or 40 Pa, of tan φ within 1.5 %, loads 30-105 N, slips 5-60 %, no
+    noise.
+    """
     soil = named.under(WHEEL.width)
     wrong = replace(soil, **{name: factor * getattr(soil, name) for name, factor in prior.items()})
     c, tan_phi = fit(soil, IntegralShift(WHEEL, wrong))
@@ -121,7 +125,9 @@ def test_c_and_tan_phi_are_found(named, prior):
 
 
 def test_an_effect_of_the_contact_is_carried_along():
-    """With a rear contact configured, the closed forms give the forces of a wheel with a rear contact."""
+    """With a rear contact configured, the closed forms give the forces of a wheel with a rear
+    contact.
+    """
     rear = make("rear_contact", {"ratio": 0.25})
     shift = IntegralShift(WHEEL, SAND, (rear,))
     slip, load = np.linspace(0.1, 0.6, 6), np.full(6, 70.0)

@@ -55,7 +55,9 @@ def drawn(settings, seed):
 
 
 def normalised(settings, schedule, runs):
-    """Normalised estimation error squared of (c, tan φ), one a run, each with its own soil and noise."""
+    """Normalised estimation error squared of (c, tan φ), one a run, each with its own soil and
+    noise.
+    """
     squares = []
     for seed in range(runs):
         truth = drawn(settings, 1000 + seed)
@@ -100,7 +102,9 @@ def test_one_load_keeps_the_truth_inside_the_joint_ellipse():
 
 @pytest.mark.slow
 def test_200_runs_are_consistent():
-    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: in the 95 % band of χ²(400)/200."""
+    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: in the 95 % band of
+    χ²(400)/200.
+    """
     squares = normalised(RIG, THREE_LOADS, 200)
     print(f"NEES {squares.mean():.2f} of 2, inside the 95 % ellipse {np.mean(squares < 5.99):.1%}")
     assert 1.73 < squares.mean() < 2.29
@@ -132,7 +136,9 @@ def test_both_engines_agree_to_1e_9_over_a_long_run():
 
 
 def test_a_sinkage_datum_of_unknown_offset_widens_the_estimate_honestly():
-    """The potentiometer reads 0.5 mm too deep; its calibration says ± 0.5 mm. The estimate errs, inside its σ."""
+    """The potentiometer reads 0.5 mm too deep; its calibration says ± 0.5 mm. The estimate errs,
+    inside its σ.
+    """
     pot = replace(SLOW["sinkage_pot"], calibration=calibration(0.01, -0.002, offset_sigma=5e-4))
     stated = replace(RIG, channels={**SLOW, "sinkage_pot": pot})
     wrong = replace(

@@ -1,4 +1,6 @@
-"""The forward model: the balance against scipy, the inverse of the drivetrain, limits, and a wheel that is bogged."""
+"""The forward model: the balance against scipy, the inverse of the drivetrain, limits, and a wheel
+that is bogged.
+"""
 
 from __future__ import annotations
 

@@ -47,7 +47,9 @@ SCHEDULE = [(1.0, 70.0, 0.2), (1.0, 70.0, 0.4), (1.0, 100.0, 0.4), (1.0, 100.0, 
 
 
 def rough(rng, seconds=1.2):
-    """Readings on a bad day: jitter, gaps, repeats, late ones, counter jumps, impossible values, a frozen channel."""
+    """Readings on a bad day: jitter, gaps, repeats, late ones, counter jumps, impossible values, a
+    frozen channel.
+    """
     steady = readings_of(START, seconds=seconds, noise=True, seed=int(rng.integers(1 << 30)))
     steady += [
         Reading(
@@ -160,7 +162,9 @@ def test_a_recording_without_readings_has_no_windows():
 
 
 def recorded(path, rig, with_ticks, rate=250):
-    """A recording of the linear plant, as the daemon writes it or with raw topics only; and the ticks' records."""
+    """A recording of the linear plant, as the daemon writes it or with raw topics only; and the
+    ticks' records.
+    """
     found = [r for _, batch in plant(rig, TRUTH, SCHEDULE, seed=3, rate=rate) for r in batch]
     writer = RunWriter(path, (TICK_TOPIC,), "", RunInfo(), compression="none")
     pipeline = Pipeline(rig, "plain")

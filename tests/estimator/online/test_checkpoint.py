@@ -1,4 +1,6 @@
-"""A state written as text and read back goes on to the same bits; a reloaded configuration is part of the recording."""
+"""A state written as text and read back goes on to the same bits; a reloaded configuration is part
+of the recording.
+"""
 
 from __future__ import annotations
 
@@ -169,7 +171,9 @@ def test_what_needs_a_restart_is_named(section, value, key):
 def test_a_recording_through_a_reload_and_a_loss_is_verified_bit_for_bit(
     consumed, tmp_path, capsys
 ):
-    """What the daemon writes: part 1 with another configuration, part 2 after a loss, its checkpoint later."""
+    """What the daemon writes: part 1 with another configuration, part 2 after a loss, its
+    checkpoint later.
+    """
     other = loads(TESTBED.text.replace("2.0 N*m/A", "2.1 N*m/A"), "other", None)
     assert other.settings.drive != SETTINGS.drive
     path = tmp_path / "run.mcap"

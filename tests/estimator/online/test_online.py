@@ -67,7 +67,9 @@ def undisturbed():
 
 @pytest.mark.parametrize("name", ACTING)
 def test_a_configured_effect_leaves_c_and_tan_phi_where_they_are(name, undisturbed):
-    """Drivetrain and sensor effects are undone: within one σ of the run without the effect. The others within two."""
+    """Drivetrain and sensor effects are undone: within one σ of the run without the effect. The
+    others within two.
+    """
     effect = typical(EFFECTS[name])
     readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
     known = last_tick(replace(SETTINGS, effects=(*SETTINGS.effects, configure(effect))), readings)

@@ -1,4 +1,6 @@
-"""What a damaged, cut, hostile or foreign recording gives back: never a wrong message, never a long wait."""
+"""What a damaged, cut, hostile or foreign recording gives back: never a wrong message, never a long
+wait.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +33,15 @@ def is_subsequence(part: list, whole: list) -> bool:
     return all(any(item == other for other in rest) for item in part)
 
 
-# --- cut and flipped --------------------------------------------------------------------------------------------------
+# --- cut and flipped
+# --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("compression", ["zstd", pytest.param("none", marks=pytest.mark.slow)])
 def test_a_file_cut_at_any_byte_gives_a_prefix(tmp_path: Path, compression: str) -> None:
-    """A power cut. At every offset: the whole chunks before it, and a line about the rest unless only index is cut."""
+    """A power cut. At every offset: the whole chunks before it, and a line about the rest unless
+    only index is cut.
+    """
     writer = RunWriter(tmp_path / "a.mcap", [], "a: 1\n", RunInfo(), compression=compression)
     for i in range(9):
         writer.reading(Reading(T0 + i, "wheel_encoder", i, T0 + i))
@@ -73,7 +78,9 @@ def test_a_cut_inside_a_chunk_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("close", [True, False])
 def test_flipped_bits_never_give_a_wrong_message(tmp_path: Path, close: bool) -> None:
-    """In a chunk, its head, an index, the metadata or the summary: what comes is what was written, a loss is said."""
+    """In a chunk, its head, an index, the metadata or the summary: what comes is what was written,
+    a loss is said.
+    """
     written = write_sample(tmp_path / "a.mcap", 12, close=close, every=2)
     data = (tmp_path / "a.mcap").read_bytes()
     rng = random.Random(7)
@@ -136,7 +143,8 @@ def test_a_lying_message_index_changes_nothing(tmp_path: Path) -> None:
     assert list(read(tmp_path / "a.mcap").messages()) == written
 
 
-# --- other writers ----------------------------------------------------------------------------------------------------
+# --- other writers --------------------------------------------------------------------------------
+# --------------------
 
 FOREIGN = "int32 count\nbuiltin_interfaces/Time stamp\nuint8 quality\nfloat32 voltage\n"
 FOREIGN_FIELDS = (
@@ -148,7 +156,9 @@ FOREIGN_FIELDS = (
 
 
 def write_foreign(path: Path, count: int = 500, schema: str = FOREIGN, **options: object) -> None:
-    """A rig of its own: fields in another order and of other widths, extra topics, the mcap library's writer."""
+    """A rig of its own: fields in another order and of other widths, extra topics, the mcap
+    library's writer.
+    """
     with open(path, "wb") as file:
         writer = Writer(file, **options)  # type: ignore[arg-type]
         writer.start()
@@ -257,7 +267,8 @@ def test_a_contradicting_definition_is_not_followed(tmp_path: Path) -> None:
     assert list(recording.messages()) == list(read(tmp_path / "b.mcap").messages())
 
 
-# --- hostile ----------------------------------------------------------------------------------------------------------
+# --- hostile --------------------------------------------------------------------------------------
+# --------------------
 
 
 def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
@@ -321,7 +332,9 @@ print(f"{time.process_time():.2f} s, {peak / 1024:.0f} MB: {said}")
 
 
 def probe(path: Path) -> tuple[float, float, str]:
-    """Seconds of processor time, peak MB and what was said, in a process of its own whose address space is bounded."""
+    """Seconds of processor time, peak MB and what was said, in a process of its own whose address
+    space is bounded.
+    """
     environment = {
         **os.environ,
         "PYTHONPATH": str(Path(__file__).parents[3]),

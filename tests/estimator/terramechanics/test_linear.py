@@ -1,4 +1,6 @@
-"""The closed forms against quadrature of (15)-(17), in every limit, and their gradients against differences."""
+"""The closed forms against quadrature of (15)-(17), in every limit, and their gradients against
+differences.
+"""
 
 import math
 
@@ -106,7 +108,9 @@ def test_forces_agree_with_quadrature_on_2000_random_draws() -> None:
 def test_closed_forms_keep_their_digits_in_every_limit(
     theta_1: float, ratio: float, sign: float, f: float
 ) -> None:
-    """θ₁ → 0, θₘ → 0, θₘ → θ₁, f → 0, f < 0, large f: each of the eight integrals to 1e-12 of itself."""
+    """θ₁ → 0, θₘ → 0, θₘ → θ₁, f → 0, f < 0, large f: each of the eight integrals to 1e-12 of
+    itself.
+    """
     np.testing.assert_allclose(
         integrals(theta_1, ratio, sign * f), by_quadrature(theta_1, ratio, sign * f), rtol=1e-12
     )

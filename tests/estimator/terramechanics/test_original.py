@@ -1,4 +1,6 @@
-"""The original model against scipy's adaptive quadrature of Eqs. (8)-(10), written out a second time here."""
+"""The original model against scipy's adaptive quadrature of Eqs. (8)-(10), written out a second
+time here.
+"""
 
 import numpy as np
 import pytest

@@ -96,7 +96,9 @@ def test_stated_speed_error_covers_quantisation(rate):
 
 
 def test_slip_of_what_is_not_known_or_hardly_moves_is_no_error():
-    """A silent wheel encoder beside a carriage at rest gives NaN and 0; squares of tiny speeds underflow."""
+    """A silent wheel encoder beside a carriage at rest gives NaN and 0; squares of tiny speeds
+    underflow.
+    """
     assert all(isnan(value) for value in slip(nan, 0.0))
     assert all(isnan(value) for value in slip(1.0, nan))
     assert slip(1e-200, 1e-170) == (0.0, 0.0, 0.0) == slip(0.0, -0.0)

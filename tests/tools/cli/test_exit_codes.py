@@ -1,4 +1,6 @@
-"""One mistake, one exit code, whichever command meets it (DESIGN 5): 2 for a wrong name, 3 for a wrong content."""
+"""One mistake, one exit code, whichever command meets it (DESIGN 5): 2 for a wrong name, 3 for a
+wrong content.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""`gritd compare`: errors in physical units, pictures of every run, the soil fitted where asked for."""
+"""`gritd compare`: errors in physical units, pictures of every run, the soil fitted where asked
+for.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def run(folder: Path, name: str, load: float, *options: str) -> Path:
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Two runs in the configured soil, one of them with a name that tries to be markup and mathematics."""
+    """Two runs in the configured soil, one of them with a name that tries to be markup and
+    mathematics.
+    """
     folder = tmp_path_factory.mktemp("plain")
     return [
         run(folder, name, load, "--seed", f"{load:g}")

@@ -105,11 +105,14 @@ def test_an_impossible_length_is_one_line():
     )
 
 
-# --- verdict --------------------------------------------------------------------------------------------------------
+# --- verdict --------------------------------------------------------------------------------------
+# ------------------
 
 
 def ticks_ending(seconds=60.0, n=200, **last):
-    """/tick of a run whose estimates go from far off to these values; σ of c 20 Pa, of tan φ 0.01, of k 0.5 mm."""
+    """/tick of a run whose estimates go from far off to these values; σ of c 20 Pa, of tan φ 0.01,
+    of k 0.5 mm.
+    """
     ticks = np.zeros(n, TICK_TOPIC.codec.table_dtype)
     ticks["stamp"] = 1_700_000_000_000_000_000 + np.linspace(0, seconds * 1e9, n).astype(np.int64)
     ticks["status"] = 1

@@ -1,4 +1,6 @@
-"""`gritd diagnose` from the command line: what is wrong is one line and an exit code, before any work is done."""
+"""`gritd diagnose` from the command line: what is wrong is one line and an exit code, before any
+work is done.
+"""
 
 from __future__ import annotations
 

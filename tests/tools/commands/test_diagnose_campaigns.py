@@ -1,4 +1,6 @@
-"""Many campaigns side by side: which folders count, what is done again, and what one failure does to the others."""
+"""Many campaigns side by side: which folders count, what is done again, and what one failure does
+to the others.
+"""
 
 import os
 from pathlib import Path

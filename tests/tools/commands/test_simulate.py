@@ -70,9 +70,8 @@ def test_recording_holds_the_truth_through_the_calibration(schedule: Path, tmp_p
             [getattr(m, "count", None) or getattr(m, "volts", 0.0) for m in found[f"/raw/{name}"]]
         )
         error = raw * channel.calibration.scale.value + channel.calibration.offset.value - expected
-        expected_spread = (
-            abs(channel.calibration.scale.value) * channel.noise
-        )  # an encoder's includes rounding
+        # an encoder's includes rounding
+        expected_spread = abs(channel.calibration.scale.value) * channel.noise
         assert np.std(error) == pytest.approx(expected_spread, rel=0.1), name
         assert abs(np.mean(error)) < 5.0 * expected_spread / np.sqrt(raw.size)
     wrench = found["/raw/wrench"]

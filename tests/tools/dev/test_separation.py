@@ -25,7 +25,9 @@ def test_experiment_tells_apart(effect: str, rival: str, experiment: str) -> Non
     "twins", [("bed_slope", "force_crosstalk"), ("wheel_radius_error", "grousers")]
 )
 def test_twins_stay_twins(twins: tuple[str, str]) -> None:
-    """Pairs that driving alone cannot separate, whatever is driven: their files send the engineer to level and tape."""
+    """Pairs that driving alone cannot separate, whatever is driven: their files send the engineer
+    to level and tape.
+    """
     everything = (
         "load_step",
         "slip_step",

@@ -52,8 +52,8 @@ def test_coloured_noise_of_unknown_size_gives_no_alarm(
 ) -> None:
     """iid tests cry wolf; the configured noise is half or twice the true one.
 
-    Noise with 3 s of memory makes a trend in runs of 14 s by chance, in a few campaigns of a hundred: one of the later
-    seeds may.
+    Noise with 3 s of memory makes a trend in runs of 14 s by chance, in a few campaigns of a
+    hundred: one of the later seeds may.
     """
     every = [
         diagnosed(plan(slow=0.3, slow_time=slow_time, noise=noise, seed=seed))
@@ -122,7 +122,9 @@ def test_repeats_do_not_leak() -> None:
 
 @pytest.mark.slow
 def test_an_applied_effect_is_the_next_baseline() -> None:
-    """After --apply the same testbed is consistent, and something new on top of it is what is named."""
+    """After --apply the same testbed is consistent, and something new on top of it is what is
+    named.
+    """
     friction = make("viscous_friction", {"damping": 0.8})
     found = diagnosed(plan(), (friction,))
     document = config.load("config/testbed.yaml")

@@ -1,4 +1,6 @@
-"""Importers without anybody's data: the folder of rigs, the clocks, and files that are not what they should be."""
+"""Importers without anybody's data: the folder of rigs, the clocks, and files that are not what
+they should be.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Diagnoses of every verdict, made up from formulas: what a report has to cope with, without running the engine."""
+"""Diagnoses of every verdict, made up from formulas: what a report has to cope with, without
+running the engine.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def traces(
     loads: tuple[float, ...],
     channels: tuple[str, ...],
 ) -> tuple[Trace, ...]:
-    """Runs of 28 s at 5 Hz with five slips; `missing`(time, slip) adds to the torque what the model left out."""
+    """Runs of 28 s at 5 Hz with five slips; `missing`(time, slip) adds to the torque what the model
+    left out.
+    """
     rng, found = np.random.default_rng(4), []
     time = np.arange(140) / 5.0
     slip = np.repeat([0.1, 0.2, 0.3, 0.45, 0.6], 28)

@@ -1,4 +1,6 @@
-"""The report in a real browser: no scrolling sideways on a phone, nothing cut in print. Skipped without chromium."""
+"""The report in a real browser: no scrolling sideways on a phone, nothing cut in print. Skipped
+without chromium.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The report says what was found, is well-formed, needs nothing from outside, and lets nothing from outside in."""
+"""The report says what was found, is well-formed, needs nothing from outside, and lets nothing from
+outside in.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The simulated testbed: what goes onto its wires comes out of the drivers, and teaches the filter the soil."""
+"""The simulated testbed: what goes onto its wires comes out of the drivers, and teaches the filter
+the soil.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +80,9 @@ def by_channel(readings):
 
 
 def assert_same_values(sent, received):
-    """Value for value, to the resolution of the wire; counts exactly, but for where the 32-bit counter began."""
+    """Value for value, to the resolution of the wire; counts exactly, but for where the 32-bit
+    counter began.
+    """
     assert sent.keys() == received.keys()
     for channel, readings in sent.items():
         expected, found = (
@@ -93,7 +97,9 @@ def assert_same_values(sent, received):
 
 
 def assert_nearly_all_and_nothing_else(sent, received):
-    """For real time on a computer that may be busy: a wire nobody reads for a third of a second loses frames."""
+    """For real time on a computer that may be busy: a wire nobody reads for a third of a second
+    loses frames.
+    """
     assert sent.keys() == received.keys()
     for channel, readings in sent.items():
         assert 0.8 * len(readings) <= len(received[channel]) <= len(readings)

@@ -1,4 +1,6 @@
-"""The configuration that models what was found: effects with value and sigma, for simulator, daemon, next campaign."""
+"""The configuration that models what was found: effects with value and sigma, for simulator,
+daemon, next campaign.
+"""
 
 from __future__ import annotations
 

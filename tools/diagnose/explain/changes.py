@@ -1,11 +1,13 @@
 """Change points: where along the bed, a run, the runs or a condition a misfit starts or stops.
 
-A channel's misfit is taken apart by forward selection: steps and windows (the same offset between two places) along
-every covariate compete with smooth functions of the same covariates, all of them of one size or in proportion to the
-channel, each weighed by its log Bayes factor with a uniform prior over its places. What drifts or curves is taken by a
-smooth function and gives no change point. A step counts when its evidence exceeds what the largest step of 99 % of the
-surrogates has, over all channels and covariates together. Source: binary segmentation (Scott and Knott 1974, Biometrics
-30, 507-512) with the null by simulation, since the noise is coloured and the soil was fitted.
+A channel's misfit is taken apart by forward selection: steps and windows (the same offset between
+two places) along every covariate compete with smooth functions of the same covariates, all of them
+of one size or in proportion to the channel, each weighed by its log Bayes factor with a uniform
+prior over its places. What drifts or curves is taken by a smooth function and gives no change
+point. A step counts when its evidence exceeds what the largest step of 99 % of the surrogates has,
+over all channels and covariates together. Source: binary segmentation (Scott and Knott 1974,
+Biometrics 30, 507-512) with the null by simulation, since the noise is coloured and the soil was
+fitted.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ WIDTHS = (
     0.015,
     0.05,
 )  # of a change, relative to the whole stretch: a wheel is on both sides of it for a while
-WAVES = 12  # cosines of a smooth function; their size falls with the square of their number, as a kink's does
+# cosines of a smooth function; their size falls with the square of their number, as a kink's does
+WAVES = 12
 FEW = 8  # values on either side of a change
 LEVELS, HELD = (
     8,
@@ -46,7 +49,8 @@ LEVELS, HELD = (
 LEVEL = 0.01  # chance of any change point by noise alone
 LEAST = 3.0  # [nats]
 ROUNDS = 6
-MOSTLY = 0.5  # of a channel's misfit that offsets of the runs must take before one looks for changes between runs
+# of a channel's misfit that offsets of the runs must take before one looks for changes between runs
+MOSTLY = 0.5
 NEARLY, FEW_RUNS = 0.93, 2  # of that, what so few steps between runs must take
 WORTH = 0.1  # of the evidence of the first part: a later change that gains less is detail
 
@@ -92,7 +96,9 @@ class Board:
 
 
 def find(search: Search, model: Model) -> Changes:
-    """Change points of every channel; empty where there are none. Of runs, halfway between their numbers."""
+    """Change points of every channel; empty where there are none. Of runs, halfway between their
+    numbers.
+    """
     beside, channels = Beside(search, model), search.problem.stack.rig.channels
     boards = [board for channel in channels if (board := _board(search, model, beside, channel))]
     if not boards:
@@ -109,11 +115,14 @@ def find(search: Search, model: Model) -> Changes:
     return found
 
 
-# ---- what competes -------------------------------------------------------------------------------------------------
+# ---- what competes
+# -------------------------------------------------------------------------------------------------
 
 
 def values(stack: Stack, name: str) -> Array | None:
-    """A covariate (N,); of runs, their number in order of time from 1; elapsed: time since the run began."""
+    """A covariate (N,); of runs, their number in order of time from 1; elapsed: time since the run
+    began.
+    """
     if name == "run":
         began = [float(run.time[0]) for run in stack.rig.runs]
         number = np.empty(len(began))
@@ -198,7 +207,9 @@ def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array
 
 
 def _swept(along: Array) -> bool:
-    """Whether a covariate was driven through rather than held at a few levels, between which nothing can be placed."""
+    """Whether a covariate was driven through rather than held at a few levels, between which
+    nothing can be placed.
+    """
     count, _ = np.histogram(along, PLACES)
     return bool(np.sum(count >= HELD * along.size) >= LEVELS)
 
@@ -235,7 +246,8 @@ def _generics(search: Search, channel: str, own: Bools) -> Iterator[Array]:
             yield signature.columns[own]
 
 
-# ---- taking it apart -----------------------------------------------------------------------------------------------
+# ---- taking it apart
+# -----------------------------------------------------------------------------------------------
 
 
 def _nulls(board: Board) -> Iterator[Array]:
@@ -265,7 +277,9 @@ def _weighed(
 
 
 def _taken_apart(board: Board, runs: Sequence[Part], threshold: float) -> Iterator[Part]:
-    """Steps inside runs that stand beside what steps between runs and smooth functions take, the largest first."""
+    """Steps inside runs that stand beside what steps between runs and smooth functions take, the
+    largest first.
+    """
     left, first = board.scores, max((part.evidence for part in runs), default=0.0)
     for part in runs:
         left = left.without(part.direction(len(left.a)))
@@ -288,7 +302,9 @@ def _taken_apart(board: Board, runs: Sequence[Part], threshold: float) -> Iterat
 
 
 def _between_runs(board: Board, threshold: float) -> list[Part]:
-    """A few steps between runs that do nearly all that an offset of every run could: drift needs one at every run."""
+    """A few steps between runs that do nearly all that an offset of every run could: drift needs
+    one at every run.
+    """
     runs = [steps for steps in board.steps if steps.covariate == "run"]
     if not runs:
         return []

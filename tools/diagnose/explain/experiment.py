@@ -1,10 +1,11 @@
 """What to do next: from a feasible menu, the least effort that decides, else what decides most.
 
-Between rivals, a driven experiment is foreseen: each rival, at its fit, is simulated under the proposed motion; the
-expected gain is half the squared distance of their predictions in units of noise (the Kullback-Leibler divergence of
-two equal Gaussians), for what the uncertainty of the soil leaves of it. Where the recordings were insufficient, what is
-foreseen are the effects that they could not have shown, each at its expected size; where the physics is not in the
-list, the condition along which the misfit lives is stepped. An instrument's reading is worth half the squared parameter
+Between rivals, a driven experiment is foreseen: each rival, at its fit, is simulated under the
+proposed motion; the expected gain is half the squared distance of their predictions in units of
+noise (the Kullback-Leibler divergence of two equal Gaussians), for what the uncertainty of the soil
+leaves of it. Where the recordings were insufficient, what is foreseen are the effects that they
+could not have shown, each at its expected size; where the physics is not in the list, the condition
+along which the misfit lives is stepped. An instrument's reading is worth half the squared parameter
 over a fifth of its expected size.
 """
 
@@ -91,7 +92,8 @@ def _by_hand(names: Sequence[str]) -> NextExperiment | None:
     return None
 
 
-# ---- rivals --------------------------------------------------------------------------------------------------------
+# ---- rivals --------------------------------------------------------------------------------------
+# ------------------
 
 
 def _rivals(search: Search, decision: Decision) -> list[Model]:
@@ -117,7 +119,9 @@ def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
 
 
 def _measured(rivals: list[Model]) -> dict[str, list[float]]:
-    """What instruments that the rivals' own files name would tell between the first and every other."""
+    """What instruments that the rivals' own files name would tell between the first and every
+    other.
+    """
     first, *others = rivals
     keys = {
         k
@@ -130,7 +134,9 @@ def _measured(rivals: list[Model]) -> dict[str, list[float]]:
 
 
 def _read(one: Model, other: Model, key: str) -> float:
-    """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell these two."""
+    """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell
+    these two.
+    """
     gain = 0.0
     for model, rival in ((one, other), (other, one)):
         for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
@@ -140,11 +146,14 @@ def _read(one: Model, other: Model, key: str) -> float:
     return gain
 
 
-# ---- insufficient, and not in the list -----------------------------------------------------------------------------
+# ---- insufficient, and not in the list
+# -----------------------------------------------------------------------------
 
 
 def _unseen_shown(search: Search) -> dict[str, float]:
-    """Of every driven experiment the median gain over effects that these recordings could not show [nats]."""
+    """Of every driven experiment the median gain over effects that these recordings could not show
+    [nats].
+    """
     rig, base = search.problem.stack.rig, search.models[0]
     if not isinstance(rig, WheelRig):
         return {}
@@ -185,7 +194,9 @@ def _expected(effect: type[Effect]) -> Effect:
 
 
 def _shape_of_misfit(search: Search) -> NextExperiment | None:
-    """A step of the condition along which the misfit lives; the gain is its evidence so far, for as much again."""
+    """A step of the condition along which the misfit lives; the gain is its evidence so far, for as
+    much again.
+    """
     evidence = {name: e for name, e in search.screens[()].evidence.items() if "~" in name}
     if not evidence:
         return None
@@ -195,7 +206,8 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     return _foretold(key, gain)
 
 
-# ---- what is foreseen ----------------------------------------------------------------------------------------------
+# ---- what is foreseen
+# ----------------------------------------------------------------------------------------------
 
 Foreseen = Mapping[str, Array]
 
@@ -203,7 +215,9 @@ Foreseen = Mapping[str, Array]
 def _foreseen(
     search: Search, key: str, u: Array, effects: Sequence[Effect]
 ) -> tuple[Foreseen, Array]:
-    """Channels under an experiment, and their change (values, q) for one σ of each soil constant as fitted so far."""
+    """Channels under an experiment, and their change (values, q) for one σ of each soil constant as
+    fitted so far.
+    """
     rig = search.problem.stack.rig
     assert isinstance(rig, WheelRig)
     here = rig.foresee(key, u, effects)
@@ -224,7 +238,9 @@ def _values(foreseen: Foreseen) -> Array:
 
 
 def _gain(search: Search, key: str, here: Foreseen, change: Array, slopes: Array) -> float:
-    """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST [nats]."""
+    """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST
+    [nats].
+    """
     stack = search.problem.stack
     sigma = []
     for channel, colour in zip(here, search.problem.noise.colours, strict=True):

@@ -27,7 +27,8 @@ def with_innovations(
     recordings: Sequence[Recording],
     soil: bool = True,
 ) -> Diagnosis:
-    """The result with the filter's normalised innovations by the given configuration and by the improved one.
+    """The result with the filter's normalised innovations by the given configuration and by the
+    improved one.
 
     Where there are none, or no improved one, `innovation_note` says why.
     """
@@ -56,7 +57,8 @@ def _noted(
 
 
 def innovations(settings: Settings, recordings: Sequence[Recording]) -> dict[str, float]:
-    """Root mean square of innovation over its stated standard deviation, per component; 1 where they are true.
+    """Root mean square of innovation over its stated standard deviation, per component; 1 where
+    they are true.
 
     Of updates that were offered, whether accepted or not.
     """

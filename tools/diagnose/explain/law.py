@@ -1,8 +1,10 @@
-"""A law for what has no name: steps and waves, then few terms of slip, sinkage and speed, fitted with the soil.
+"""A law for what has no name: steps and waves, then few terms of slip, sinkage and speed, fitted
+with the soil.
 
-The terms are those of effect `empirical_law`, so that simulator and filter can use what was found. They are taken up
-one at a time while their evidence pays for them. Steps and waves belong to this campaign: where they are is said, and
-soil and calibration are freed of them, but they are no part of a configuration.
+The terms are those of effect `empirical_law`, so that simulator and filter can use what was found.
+They are taken up one at a time while their evidence pays for them. Steps and waves belong to this
+campaign: where they are is said, and soil and calibration are freed of them, but they are no part
+of a configuration.
 """
 
 from __future__ import annotations
@@ -36,7 +38,9 @@ PAYS = 3.0  # [nats] a term must gain
 
 @dataclass(frozen=True)
 class Found:
-    """A law on top of a model: its fit, soil and calibration fitted with it, and its held-out prediction."""
+    """A law on top of a model: its fit, soil and calibration fitted with it, and its held-out
+    prediction.
+    """
 
     law: Law
     fitted: Fitted
@@ -59,12 +63,15 @@ def find(search: Search, model: Model, location: Sequence[Location]) -> Found | 
     return Found(law, fitted, held_out(fitted, run_folds(stack), start.columns))
 
 
-# ---- steps and waves -----------------------------------------------------------------------------------------------
+# ---- steps and waves
+# -----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Start:
-    """A model with the steps and waves beside it that were found; columns (N, m), each one standard deviation."""
+    """A model with the steps and waves beside it that were found; columns (N, m), each one standard
+    deviation.
+    """
 
     problem: Problem
     fitted: Fitted
@@ -100,7 +107,8 @@ def _said(stack: Stack, start: Start) -> Iterator[tuple[str, str]]:
         yield channel, where.term(stack, channel, axis, kind == WAVE, function.shape["at"], size)
 
 
-# ---- terms ---------------------------------------------------------------------------------------------------------
+# ---- terms ---------------------------------------------------------------------------------------
+# ------------------
 
 
 def _terms(

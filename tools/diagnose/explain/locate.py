@@ -1,7 +1,8 @@
-"""Where the misfit lives: channel by covariate, with its share, its chance, where it starts or stops, and a sentence.
+"""Where the misfit lives: channel by covariate, with its share, its chance, where it starts or
+stops, and a sentence.
 
-In each channel covariates are taken up by evidence, one beside the others, so that one place of the misfit is not told
-once for every covariate that varies along with it.
+In each channel covariates are taken up by evidence, one beside the others, so that one place of the
+misfit is not told once for every covariate that varies along with it.
 """
 
 from __future__ import annotations
@@ -35,14 +36,17 @@ STRAINED = {
     "offset": "constant",
 }  # of a channel's calibration, and the covariate it stands for
 LEAST = 0.05  # share below which a place is not worth naming
-BESIDE = 3.0  # [nats] that a covariate gains beside those already named, and the LEAST share of what they gain
+# [nats] that a covariate gains beside those already named, and the LEAST share of what they gain
+BESIDE = 3.0
 
 Found = tuple[float, Location]  # with the nats that it takes
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Functions of a covariate in one channel: their columns, nats beyond chance and the chance of as many."""
+    """Functions of a covariate in one channel: their columns, nats beyond chance and the chance of
+    as many.
+    """
 
     channel: str
     name: str
@@ -57,10 +61,11 @@ class Family:
 
 
 def bare(search: Search, accepted: Model) -> Model:
-    """The base model held at the constants found beside the accepted effects: what it misses is what they do.
+    """The base model held at the constants found beside the accepted effects: what it misses is
+    what they do.
 
-    Fitted for itself, the base model moves soil and calibration until they hide what they can of the misfit, and what
-    is left shows where they cannot follow, not where the misfit was made.
+    Fitted for itself, the base model moves soil and calibration until they hide what they can of
+    the misfit, and what is left shows where they cannot follow, not where the misfit was made.
     """
     fit = accepted.fitted
     alone = search.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
@@ -74,7 +79,8 @@ def bare(search: Search, accepted: Model) -> Model:
 def locate(search: Search, model: Model, predicted: Array | None = None) -> tuple[Location, ...]:
     """Places of the misfit of a model, by share; only those that survive false-discovery control.
 
-    predicted: (N,) against which the sentences are said; without it the model's, each value's own run held out.
+    predicted: (N,) against which the sentences are said; without it the model's, each value's own
+        run held out.
     """
     stack = search.problem.stack
     if predicted is None:
@@ -107,9 +113,11 @@ def locate(search: Search, model: Model, predicted: Array | None = None) -> tupl
 def _families(
     search: Search, model: Model, beside: Beside, points: changes.Changes
 ) -> tuple[Scores, list[Family]]:
-    """All smooth functions, steps at the change points of a covariate among them; and the likeliest waves.
+    """All smooth functions, steps at the change points of a covariate among them; and the likeliest
+    waves.
 
-    Each about a mean of its own: what grows with slip from nothing is not told as a constant and a slope.
+    Each about a mean of its own: what grows with slip from nothing is not told as a constant and a
+        slope.
     """
     stack, waves = search.problem.stack, _waves(search, model, beside)
     names, columns = [s.name for s in (*search.generics, *waves)], []
@@ -141,8 +149,9 @@ def _families(
 
 
 def _waves(search: Search, model: Model, beside: Beside) -> list[Signature]:
-    """The likeliest wave of each channel and axis, where no ripple of the wheel is as likely: at a steady speed, or in
-    one run, a ripple of the wheel is a wave in time and along the bed too."""
+    """The likeliest wave of each channel and axis, where no ripple of the wheel is as likely: at a
+    steady speed, or in one run, a ripple of the wheel is a wave in time and along the bed too.
+    """
     every = [f for f in search.scans if f.kind == WAVE]
     found: dict[str, Signature] = {}
     for wave in candidates(every, search.problem, model.fitted):
@@ -176,7 +185,9 @@ def _turning(search: Search, beside: Beside, channel: str) -> float:
 
 
 def _turns(stack: Stack, own: Bools, orders: Array) -> Array:
-    """Ripples of a channel's values while the wheel turns, cosine and sine as one complex number (n, orders)."""
+    """Ripples of a channel's values while the wheel turns, cosine and sine as one complex number
+    (n, orders).
+    """
     moving = stack.covariate("speed")[own] > 0.0
     return np.asarray(
         np.exp(1j * np.outer(stack.covariate("wheel_angle")[own], orders)) * moving[:, None]
@@ -207,7 +218,8 @@ def _place(
     return Location(family.channel, covariate, share, family.p, q, said, first)
 
 
-# ---- which covariates ----------------------------------------------------------------------------------------------
+# ---- which covariates
+# ----------------------------------------------------------------------------------------------
 
 
 def _family(board: Scores, name: str, own: Index) -> Family:
@@ -260,11 +272,14 @@ def _false_discovery(p: Array) -> Array:
     return out
 
 
-# ---- ripples and strains -------------------------------------------------------------------------------------------
+# ---- ripples and strains
+# -------------------------------------------------------------------------------------------
 
 
 def ripples(search: Search, beside: Beside, board: Scores, families: list[Family]) -> list[Found]:
-    """The strongest order of the wheel angle in each channel beside all smooth functions, against every surrogate's."""
+    """The strongest order of the wheel angle in each channel beside all smooth functions, against
+    every surrogate's.
+    """
     stack = search.problem.stack
     orders = np.arange(3.0, highest_order(stack))
     found: list[Found] = []
@@ -306,7 +321,9 @@ def _amplitude(left: Scores, one: int, two: int) -> float:
 
 
 def _strains(stack: Stack, model: Model) -> list[Found]:
-    """Calibration constants pulled far off what is known: a misfit that hides there leaves no residual."""
+    """Calibration constants pulled far off what is known: a misfit that hides there leaves no
+    residual.
+    """
     nats = 0.5 * model.fitted.u**2
     found: list[Found] = []
     for known, u, value in zip(

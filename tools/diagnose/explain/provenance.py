@@ -1,7 +1,9 @@
-"""What a recording says of the testbed it was made on, against the configuration it is diagnosed with.
+"""What a recording says of the testbed it was made on, against the configuration it is diagnosed
+with.
 
-The wrong file after `--config` makes a mismatch that no physics explains. A recording holds the configuration it was
-made with, so the difference can be said; it may be meant, when a calibration was mended afterwards.
+The wrong file after `--config` makes a mismatch that no physics explains. A recording holds the
+configuration it was made with, so the difference can be said; it may be meant, when a calibration
+was mended afterwards.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""What a diagnosis found: the JSON of `gritd diagnose`, and the evidence a report draws. Plain values, SI inside.
+"""What a diagnosis found: the JSON of `gritd diagnose`, and the evidence a report draws. Plain
+values, SI inside.
 
-Arrays are lists of floats of one length n per trace; `to_json` gives the whole tree as JSON types, NaN as null.
+Arrays are lists of floats of one length n per trace; `to_json` gives the whole tree as JSON types,
+NaN as null.
 """
 
 from __future__ import annotations
@@ -15,7 +17,9 @@ Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value, its standard deviation and unit. For a parameter, the unit is the one it is stated in (SI)."""
+    """A value, its standard deviation and unit. For a parameter, the unit is the one it is stated
+    in (SI).
+    """
 
     value: float
     sigma: float
@@ -24,9 +28,11 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Test:
-    """The alarm: is there a mismatch at all? Its threshold is a quantile of nulls simulated from the data's own noise.
+    """The alarm: is there a mismatch at all? Its threshold is a quantile of nulls simulated from
+    the data's own noise.
 
-    name:      what was largest: "omnibus", "strain", or the name of an effect whose signature stood out.
+    name:      what was largest: "omnibus", "strain", or the name of an effect whose signature stood
+        out.
     statistic: its evidence [nats] beyond what noise shows, and the threshold it had to pass.
     p:         share of the nulls that exceed it, (1 + exceeded)/(1 + nulls).
     level:     the false-alarm rate at which the threshold was set.
@@ -42,11 +48,12 @@ class Test:
 
 @dataclass(frozen=True)
 class Location:
-    """Where the misfit lives. `share` is the part of the channel's explainable misfit that the covariate takes.
+    """Where the misfit lives. `share` is the part of the channel's explainable misfit that the
+    covariate takes.
 
     p is by surrogates, q after false-discovery control over all pairs that were tried.
-    changes: values of the covariate at which the misfit starts or stops; of runs, the number (from 1) of the first
-    beyond.
+    changes: values of the covariate at which the misfit starts or stops; of runs, the number (from
+    1) of the first beyond.
     """
 
     channel: str
@@ -60,7 +67,9 @@ class Location:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect, fitted jointly with the soil to all channels, scored on runs and conditions it was not fitted to."""
+    """One effect, fitted jointly with the soil to all channels, scored on runs and conditions it
+    was not fitted to.
+    """
 
     effect: str
     probability: float
@@ -87,7 +96,8 @@ STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a 
 
 @dataclass(frozen=True)
 class SoilFit:
-    """c [Pa], tan_phi, k [m], n, K [Pa/mⁿ]: known before, fitted without and with the accepted effects.
+    """c [Pa], tan_phi, k [m], n, K [Pa/mⁿ]: known before, fitted without and with the accepted
+    effects.
 
     strain: (before − prior)/σ of each, at the fit without the effect.
     """
@@ -98,7 +108,9 @@ class SoilFit:
     strain: Mapping[str, float]
 
     def strained(self) -> str:
-        """In words, which parameters the fit without an effect moved far from what was known; empty if none."""
+        """In words, which parameters the fit without an effect moved far from what was known; empty
+        if none.
+        """
         far = [(k, s) for k, s in self.strain.items() if math.isfinite(s) and abs(s) >= STRAINED]
         moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
         together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
@@ -107,10 +119,11 @@ class SoilFit:
 
 @dataclass(frozen=True)
 class Fit:
-    """Root mean square errors in the channel's unit, on data held out: predicted by a fit to the other runs.
+    """Root mean square errors in the channel's unit, on data held out: predicted by a fit to the
+    other runs.
 
-    innovation: root mean square of the on-line filter's normalised innovations, None where there are none; the note
-    says why, or why after is as before.
+    innovation: root mean square of the on-line filter's normalised innovations, None where there
+    are none; the note says why, or why after is as before.
     """
 
     unit: Mapping[str, str]
@@ -124,7 +137,9 @@ class Fit:
 
 @dataclass(frozen=True)
 class Law:
-    """An empirical expression for what no listed effect explains, in the channel's unit, valid inside `domain`."""
+    """An empirical expression for what no listed effect explains, in the channel's unit, valid
+    inside `domain`.
+    """
 
     channel: str
     expression: str
@@ -137,7 +152,9 @@ class Law:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """expected_probability: that of what is true, of two as likely now, after the expected gain. NaN: not foreseen."""
+    """expected_probability: that of what is true, of two as likely now, after the expected gain.
+    NaN: not foreseen.
+    """
 
     key: str  # of gritd.estimator.effects.base.EXPERIMENTS
     action: str
@@ -148,7 +165,8 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Trace:
-    """One channel of one run on the analysis grid, each list (n,). Predictions are for the run held out.
+    """One channel of one run on the analysis grid, each list (n,). Predictions are for the run held
+    out.
 
     used: 1 where the soil fit used the sample, 0 where it did not (standstill, lifted, unsteady).
     """

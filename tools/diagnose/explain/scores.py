@@ -1,4 +1,6 @@
-"""Columns beside the base model and what noise alone would show of them, with some of them taken out again."""
+"""Columns beside the base model and what noise alone would show of them, with some of them taken
+out again.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ WIDE = 3.0  # prior standard deviation of what is taken out, in expected sizes
 
 @dataclass(frozen=True)
 class Scores:
-    """A (m, m) = SᵀMS and b (m, 1 + draws) = SᵀM[r, nulls] of m columns S, with M the projection off the base model."""
+    """A (m, m) = SᵀMS and b (m, 1 + draws) = SᵀM[r, nulls] of m columns S, with M the projection
+    off the base model.
+    """
 
     a: Array
     b: Array
@@ -49,7 +53,9 @@ class Beside:
         )
 
     def scores(self, columns: Array, rows: Bools) -> Scores:
-        """Of columns (rows, m) in the channels' units; rows (N,) holds every value of the channels it touches."""
+        """Of columns (rows, m) in the channels' units; rows (N,) holds every value of the channels
+        it touches.
+        """
         ready = np.asarray(self._noise.whitener[rows][:, rows] @ columns)
         inside = np.linalg.solve(self._base.root, self._base.jacobian[rows].T @ ready)
         return Scores(

@@ -1,4 +1,6 @@
-"""What a report draws: traces of every channel and run, and residuals over the covariate where the misfit lives."""
+"""What a report draws: traces of every channel and run, and residuals over the covariate where the
+misfit lives.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""A place of the misfit as a sentence that a testbed engineer reads, with numbers in the units of the report.
+"""A place of the misfit as a sentence that a testbed engineer reads, with numbers in the units of
+the report.
 
-The residuals are those that the report draws: recorded less predicted with the value's own run held out.
+The residuals are those that the report draws: recorded less predicted with the value's own run held
+    out.
 """
 
 from __future__ import annotations
@@ -45,7 +47,9 @@ TIMES = {1: "once", 2: "twice"}
 def sentence(
     stack: Stack, residual: Array, channel: str, family: str, places: Sequence[float], share: float
 ) -> str:
-    """What a channel (residual (N,) of the stack) does along a family of covariates; places: its change points."""
+    """What a channel (residual (N,) of the stack) does along a family of covariates; places: its
+    change points.
+    """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     own = own if own.any() else stack.of(channel)
     say = _sizes(stack, channel)
@@ -78,7 +82,9 @@ def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: fl
 def wave(
     stack: Stack, residual: Array, channel: str, axis: str, frequency: float, share: float
 ) -> str:
-    """A wave in time [1/s] or along the bed [1/m], its amplitude the root of the mean square over the stretches."""
+    """A wave in time [1/s] or along the bed [1/m], its amplitude the root of the mean square over
+    the stretches.
+    """
     x, squares, count = stack.covariate(axis), 0.0, 0
     for index in lines.stretches(stack, channel):
         pair = lines.waves(x[index], np.array([frequency]))[:, 0]
@@ -100,7 +106,9 @@ def wave(
 
 
 def term(stack: Stack, channel: str, axis: str, wave: bool, place: float, size: float) -> str:
-    """A wave of a frequency [1/s, 1/m] or a step at a place, as a term of a law; size in the channel's unit."""
+    """A wave of a frequency [1/s, 1/m] or a step at a place, as a term of a law; size in the
+    channel's unit.
+    """
     if wave:
         return (
             f"{_amplitude(stack, channel, abs(size))} every {_wavelength(stack, axis, 1.0 / place)}"
@@ -124,7 +132,8 @@ def _started(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-# ---- pieces --------------------------------------------------------------------------------------------------------
+# ---- pieces --------------------------------------------------------------------------------------
+# ------------------
 
 Say = Callable[[float], str]
 

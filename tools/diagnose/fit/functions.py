@@ -1,7 +1,8 @@
-"""Misfits without a name: smooth functions of covariates, offsets between runs, ripples a turn; one channel each.
+"""Misfits without a name: smooth functions of covariates, offsets between runs, ripples a turn; one
+channel each.
 
-They say where a misfit lives, alarm when no listed effect would, and are the saturated model against which the best
-listed explanation is measured.
+They say where a misfit lives, alarm when no listed effect would, and are the saturated model
+against which the best listed explanation is measured.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 
-SIZE = 0.03  # of the channel's size: the expected size of a misfit; a third and three times of it are tried too
+# of the channel's size: the expected size of a misfit; a third and three times of it are tried too
+SIZE = 0.03
 WAVES = 4  # cosines along time or place
 LEVELS = 1e-3  # relative spread below which a covariate does not vary
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
@@ -26,7 +28,9 @@ ORDERS = (
 
 
 def signatures(stack: Stack) -> list[Signature]:
-    """One for each channel and covariate (or product of two) that varies; named 'channel~covariate'."""
+    """One for each channel and covariate (or product of two) that varies; named
+    'channel~covariate'.
+    """
     found = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
@@ -45,7 +49,9 @@ def size_of(stack: Stack, channel: str) -> float:
 
 
 def tolerance(stack: Stack, share: float) -> Array:
-    """Smooth columns (N, t) by which the model may be off, together a share of the channel; each one its own σ."""
+    """Smooth columns (N, t) by which the model may be off, together a share of the channel; each
+    one its own σ.
+    """
     columns = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
@@ -57,7 +63,9 @@ def tolerance(stack: Stack, share: float) -> Array:
 
 
 def shares(stack: Stack, own: Bools) -> Array:
-    """Smooth functions (N, m) of unit size on some values: of slip, speed, load, sinkage, time, place, heat; and 1."""
+    """Smooth functions (N, m) of unit size on some values: of slip, speed, load, sinkage, time,
+    place, heat; and 1.
+    """
     columns = []
     for name, family in _families(stack):
         if name not in ("run", "wheel_angle", "acceleration", "direction"):

@@ -1,6 +1,8 @@
-"""Prediction of what was held out: whole runs, and whole conditions (a load, a slip band), by a fit to the rest.
+"""Prediction of what was held out: whole runs, and whole conditions (a load, a slip band), by a fit
+to the rest.
 
-Around its optimum a model is linear in its unknowns, so a fit without some values is linear algebra on the Jacobian at
+Around its optimum a model is linear in its unknowns, so a fit without some values is linear algebra
+on the Jacobian at
 hand: no further evaluation of the physics. Repeats of one manoeuvre in the same fold cannot leak.
 """
 
@@ -20,7 +22,9 @@ BANDS = 3  # slip and load bands
 
 @dataclass(frozen=True)
 class Held:
-    """log_density: of each fold given the others [nats]; predicted: (N,) with the value's own fold held out."""
+    """log_density: of each fold given the others [nats]; predicted: (N,) with the value's own fold
+    held out.
+    """
 
     log_density: Array
     predicted: Array
@@ -64,7 +68,8 @@ def _thirds(time: Array, run: Index) -> Index:
 def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> Held:
     """Density and prediction of every fold by the model fitted to the others.
 
-    beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the channels' units.
+    beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the
+        channels' units.
     """
     own = np.zeros((fitted.predicted.size, 0)) if beside is None else beside
     last = fitted.jacobian.shape[1] - own.shape[1]

@@ -16,7 +16,8 @@ from gritd.tools.diagnose.noise import lines, replicates
 from gritd.tools.diagnose.rig.interface import Rig, Stack
 from gritd.tools.diagnose.screen.screen import noise_draws
 
-TOLERANCE = 1.5e-3  # of a channel's size: what integration rules and idealised servos may be off by, smoothly
+# of a channel's size: what integration rules and idealised servos may be off by, smoothly
+TOLERANCE = 1.5e-3
 ROUGH = 3  # rounds of the first fit, whose only use is to linearise
 
 
@@ -29,7 +30,9 @@ class Prepared:
 
 
 def prepare(rig: Rig, rng: np.random.Generator) -> Prepared:
-    """Fit with white noise, find the noise's size and colour with everything explained away, fit again."""
+    """Fit with white noise, find the noise's size and colour with everything explained away, fit
+    again.
+    """
     stack = Stack(rig)
     u = np.zeros(len(rig.constants))
     tolerance = generic.tolerance(stack, TOLERANCE)

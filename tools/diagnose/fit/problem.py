@@ -1,4 +1,6 @@
-"""Constants and effects fitted together to all channels of all runs: Gauss-Newton with priors, started warm."""
+"""Constants and effects fitted together to all channels of all runs: Gauss-Newton with priors,
+started warm.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,9 @@ class Free:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A maximum of the posterior. x: constants in prior σ, then effect parameters in expected sizes, then tolerance."""
+    """A maximum of the posterior. x: constants in prior σ, then effect parameters in expected
+    sizes, then tolerance.
+    """
 
     effects: tuple[Maker, ...]
     free: tuple[Free, ...]
@@ -75,8 +79,8 @@ class Fitted:
     def log_evidence(self) -> float:
         """Log evidence, up to a constant that all models of one problem share.
 
-        Laplace's approximation (MacKay 2003, ch. 27) for all unknowns but the strengths; these have the screen's prior:
-        several sizes, and of each effect all strengths or one alone.
+        Laplace's approximation (MacKay 2003, ch. 27) for all unknowns but the strengths; these have
+        the screen's prior: several sizes, and of each effect all strengths or one alone.
         """
         strong = np.zeros(self.penalty.size, bool)
         strong[len(self.u) : len(self.u) + len(self.free)] = [
@@ -101,7 +105,9 @@ class Fitted:
         return float(-0.5 * (misfit + spread) + self._strengths(a, b, centre[strong]))
 
     def _strengths(self, a: Array, b: Array, at: Array) -> float:
-        """What the strengths add to the log evidence, from curvature (p, p) and slope (p,) of the likelihood there."""
+        """What the strengths add to the log evidence, from curvature (p, p) and slope (p,) of the
+        likelihood there.
+        """
         if not at.size:
             return 0.0
         free = [f for f in self.free if f.parameter.role == "strength"]
@@ -138,13 +144,17 @@ class Problem:
     """The recordings, their noise and the tolerance, for any set of effects."""
 
     def __init__(self, stack: Stack, noise: Noise, tolerance: Array) -> None:
-        """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be off by."""
+        """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be
+        off by.
+        """
         self.stack, self.noise, self.allowed = stack, noise, tolerance
         self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
         self.measured = whiten(noise, stack.measured)
 
     def beside(self, columns: Array) -> Problem:
-        """The same with more columns (N, m), each one standard deviation, that no effect stands for."""
+        """The same with more columns (N, m), each one standard deviation, that no effect stands
+        for.
+        """
         other = copy(self)
         other.tolerance = np.column_stack((self.tolerance, whiten(self.noise, columns)))
         other.allowed = np.column_stack((self.allowed, columns))

@@ -1,4 +1,6 @@
-"""What each effect would change: finite differences of all channels over its strengths, on a grid of its shapes."""
+"""What each effect would change: finite differences of all channels over its strengths, on a grid
+of its shapes.
+"""
 
 from __future__ import annotations
 
@@ -65,8 +67,9 @@ def _derivative(
     strength: Parameter,
     others: tuple[Effect, ...],
 ) -> Array:
-    """Change of all values (N,) per expected size; by a smaller step where the full one runs away, as a motor may that
-    heats the more the more current it draws; NaN where every step does."""
+    """Change of all values (N,) per expected size; by a smaller step where the full one runs away,
+    as a motor may that heats the more the more current it draws; NaN where every step does.
+    """
     largest = LARGEST * np.abs(stack.measured).max(initial=0.0)
     for step in STEPS:
         acting = effect(**{**shape, strength.name: strength.off + step * strength.sigma})
@@ -117,7 +120,9 @@ def _places(rig: Rig, parameter: Parameter) -> list[float]:
 
 
 def orders(rig: Rig, parameter: Parameter) -> list[float]:
-    """Ripples a turn that the grid can show: whole numbers, or as dense as the number of turns asks for."""
+    """Ripples a turn that the grid can show: whole numbers, or as dense as the number of turns asks
+    for.
+    """
     speed = np.concatenate(
         [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
     )
@@ -132,7 +137,9 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
 
 
 def highest_order(stack: Stack) -> float:
-    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where the wheel hardly turns."""
+    """The fastest ripple a turn that the grid shows, at the usual speed; 0 where the wheel hardly
+    turns.
+    """
     run = stack.rig.runs[0]
     rate = 1.0 / float(np.median(np.diff(run.time)))
     speed = np.concatenate(
@@ -144,7 +151,9 @@ def highest_order(stack: Stack) -> float:
 
 
 def ripple_columns(stack: Stack, residual: Array) -> Array:
-    """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after the other."""
+    """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after
+    the other.
+    """
     orders = np.arange(3.0, highest_order(stack), 0.25)
     if not orders.size:
         return np.zeros((stack.size, 0))

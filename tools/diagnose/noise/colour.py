@@ -1,11 +1,13 @@
-"""The noise of each channel, size and colour, from the recordings themselves; whitening and surrogates with it.
+"""The noise of each channel, size and colour, from the recordings themselves; whitening and
+surrogates with it.
 
-Model: a value's noise is white noise plus two Ornstein-Uhlenbeck processes, a fast one (what neighbouring slopes share)
-and a slow one of correlation time τ. It is fitted by restricted maximum likelihood (Patterson and Thompson 1971,
-Biometrika 58, 545-554) with a *saturated* mean: soil, calibration, the effects' signatures and smooth functions of the
-covariates. What any of these could explain therefore does not count as noise, and what they take away by chance is
-counted as lost freedom. The residual of the base model alone is never used: it holds the misfit, and prewhitening with
-the misfit's own colour makes wrong effects win. The configured noise is not used at all.
+Model: a value's noise is white noise plus two Ornstein-Uhlenbeck processes, a fast one (what
+neighbouring slopes share) and a slow one of correlation time τ. It is fitted by restricted maximum
+likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554) with a *saturated* mean: soil,
+calibration, the effects' signatures and smooth functions of the covariates. What any of these could
+explain therefore does not count as noise, and what they take away by chance is counted as lost
+freedom. The residual of the base model alone is never used: it holds the misfit, and prewhitening
+with the misfit's own colour makes wrong effects win. The configured noise is not used at all.
 """
 
 from __future__ import annotations
@@ -33,14 +35,20 @@ STEADY = (
     1.3  # values noisier than this share of their channel's, for blur, say nothing of the noise
 )
 CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
-RARE = 0.5  # prior: density of a colour falls as its slow power to this, since instruments drift less than they hiss
+# prior: density of a colour falls as its slow power to this, since instruments drift less than they
+# hiss
+RARE = 0.5
 COLUMNS = 40  # of the saturated mean, at most
-SLIGHT = 1e-4  # of the residual: what changes less at its expected size explains nothing, it is a solver's rounding
+# of the residual: what changes less at its expected size explains nothing, it is a solver's
+# rounding
+SLIGHT = 1e-4
 
 
 @dataclass(frozen=True)
 class Colour:
-    """Noise of one channel: σ of a grid value; correlation time [s] and share of the slow part; share of the fast."""
+    """Noise of one channel: σ of a grid value; correlation time [s] and share of the slow part;
+    share of the fast.
+    """
 
     sigma: float
     time: float
@@ -80,13 +88,15 @@ BLUR = (
     0.5  # of the bend between neighbours: speeds are slopes over three intervals, corners are cut
 )
 SHALLOW = 1e-3  # [m] a sinkage below which its changes mean little
-LAG = 0.015  # [s] by which an axle sinks later than in the balance: its damping carries or adds load meanwhile
+# [s] by which an axle sinks later than in the balance: its damping carries or adds load meanwhile
+LAG = 0.015
 
 
 def blur(stack: Stack, predicted: Array) -> Array:
-    """Error (N,) where things change: averaging takes a share of the second difference, a value's or its neighbours';
-    and a lagging axle shifts all forces by the share by which the sinkage changes within the lag. A rig that passes
-    prediction and measurement through the same filters says so by `blurs = False`.
+    """Error (N,) where things change: averaging takes a share of the second difference, a value's
+    or its neighbours'; and a lagging axle shifts all forces by the share by which the sinkage
+    changes within the lag. A rig that passes prediction and measurement through the same filters
+    says so by `blurs = False`.
     """
     if not getattr(stack.rig, "blurs", True):
         return np.zeros(stack.size)
@@ -118,7 +128,9 @@ def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
 
 
 def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
-    """(N,) what adds to the noise of single values: blur, spikes, and what is left open of the motion."""
+    """(N,) what adds to the noise of single values: blur, spikes, and what is left open of the
+    motion.
+    """
     return np.hypot(
         np.hypot(blur(stack, predicted), spikes(stack, predicted, colours)), stack.unsure
     )
@@ -147,8 +159,8 @@ def fit(
 ) -> Noise:
     """Size and colour of each channel, from the prediction (N,).
 
-    The saturated mean: columns (N, p), of which the leading directions count, columns (N, r) which all count, and the
-    means of the cells (N,), −1 where there is none (see replicates.py).
+    The saturated mean: columns (N, p), of which the leading directions count, columns (N, r) which
+    all count, and the means of the cells (N,), −1 where there is none (see replicates.py).
     """
     found = [
         _fit_channel(
@@ -212,7 +224,9 @@ def log_prior(tried: Sequence[Colour], gaps: Array) -> Array:
 
 
 def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
-    """The colour whose slow power is at quantile CAREFUL of the posterior: few data cannot tell slow noise."""
+    """The colour whose slow power is at quantile CAREFUL of the posterior: few data cannot tell
+    slow noise.
+    """
     power = np.array([c.sigma**2 * _slow_power(c, step) for c in colours])
     order = np.argsort(power)
     at = int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))
@@ -220,14 +234,17 @@ def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
 
 
 def _slow_power(colour: Colour, step: float) -> float:
-    """Spectral density towards zero frequency, relative to that of white noise of the same variance."""
+    """Spectral density towards zero frequency, relative to that of white noise of the same
+    variance.
+    """
     return 1.0 - colour.slow + 2.0 * colour.slow * colour.time / step
 
 
 def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
     """Restricted log-likelihood of each colour with the size maximised out, and the variance.
 
-    gram: (g, m + 1, m + 1) products of the whitened columns of the mean, and of the values last; of so many values.
+    gram: (g, m + 1, m + 1) products of the whitened columns of the mean, and of the values last; of
+        so many values.
     """
     inner, size = gram[:, :-1, :-1], gram.shape[1] - 1
     inner = inner + RIDGE * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
@@ -242,7 +259,8 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 
 
 def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -> Array:
-    """Means of the cells, the columns that all count, and the leading directions of the others; orthonormal.
+    """Means of the cells, the columns that all count, and the leading directions of the others;
+    orthonormal.
 
     Of the others those that would explain some of the residual (n,) at their expected size.
     """
@@ -275,9 +293,11 @@ def _least(stack: Stack, channel: str) -> float:
 
 
 def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
-    """Innovations (g, n, m) of columns (n, m) under noise of g colours and unit variance; log det of each correlation.
+    """Innovations (g, n, m) of columns (n, m) under noise of g colours and unit variance; log det
+    of each correlation.
 
-    The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear in n.
+    The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear
+    in n.
     """
     kept, gain, scale = _recursion(gaps, colours)
     out = np.empty((len(colours), *columns.shape))
@@ -297,7 +317,9 @@ def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
 
 
 def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Array]:
-    """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the innovation (n, g)."""
+    """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the
+    innovation (n, g).
+    """
     times = np.array([[c.time for c in colours], [FAST_TIME * _step(gaps)] * len(colours)])
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
     white = 1.0 - share.sum(axis=0)
@@ -329,7 +351,9 @@ def whiten(noise: Noise, columns: Array) -> Array:
 
 
 def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
-    """Noise (N, count), size and colour drawn from their posterior: what the recordings hold when nothing is amiss."""
+    """Noise (N, count), size and colour drawn from their posterior: what the recordings hold when
+    nothing is amiss.
+    """
     stack = noise.stack
     out = np.empty((stack.size, count))
     for channel, draws in zip(stack.rig.channels, noise.draws, strict=True):
@@ -358,7 +382,9 @@ def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
 
 
 def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) -> Array:
-    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then where it is used."""
+    """An Ornstein-Uhlenbeck process of unit variance (n, count): on the regular grid, then where it
+    is used.
+    """
     step = _step(gaps)
     apart = 5 * (1 + round(time / step))  # grid places between runs: enough to forget
     place = np.cumsum(

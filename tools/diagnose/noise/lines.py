@@ -1,7 +1,9 @@
-"""Waves in time and along the bed: where they are looked for, and those that stand out of the noise's spectrum.
+"""Waves in time and along the bed: where they are looked for, and those that stand out of the
+noise's spectrum.
 
-A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any length, and what shakes
-a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its period, not its phase. A wave of the bed or of
+A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any
+length, and what shakes a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its
+period, not its phase. A wave of the bed or of
 the rails stays where it is: one phase for all runs, or, where the bed was made anew, one for each.
 """
 
@@ -49,7 +51,9 @@ def _parts(time: Array, count: int) -> Index:
 
 
 def frequencies(stack: Stack, channel: str, axis: str) -> Array:
-    """Waves [1/s, 1/m] that the grid shows (f,): at least CYCLES in the longest stretch; empty where there is none."""
+    """Waves [1/s, 1/m] that the grid shows (f,): at least CYCLES in the longest stretch; empty
+    where there is none.
+    """
     x, parts = stack.covariate(axis), stretches(stack, channel)
     longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
     if longest <= 1e-9:
@@ -69,12 +73,14 @@ def waves(x: Array, frequency: Array) -> Array:
 
 
 def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells: Index) -> Array:
-    """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of the noise.
+    """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of
+    the noise.
 
-    Noise has a smooth spectrum. A line of more power than that of its neighbours by a factor that chance gives one
-    channel in a hundred is none, and is not taken for it; of noise alone nothing is taken, so its size and colour stay
-    what they are. Long waves of the bed, the same in all runs, have too few neighbours: they are left out of the noise
-    whether they stand out or not, as lost freedom. The others as in `noise.fit`: what else is no noise, left out first.
+    Noise has a smooth spectrum. A line of more power than that of its neighbours by a factor that
+    chance gives one channel in a hundred is none, and is not taken for it; of noise alone nothing
+    is taken, so its size and colour stay what they are. Long waves of the bed, the same in all
+    runs, have too few neighbours: they are left out of the noise whether they stand out or not, as
+    lost freedom. The others as in `noise.fit`: what else is no noise, left out first.
     """
     columns = [_long(stack, channel) for channel in stack.rig.channels]
     for channel in stack.rig.channels:
@@ -94,7 +100,9 @@ def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells
 
 
 def _long(stack: Stack, channel: str) -> Array:
-    """Waves along the bed (N, m), one phase for all runs, too long to have neighbours; of a single run none."""
+    """Waves along the bed (N, m), one phase for all runs, too long to have neighbours; of a single
+    run none.
+    """
     parts, tried = stretches(stack, channel), frequencies(stack, channel, "position")
     if len(parts) < 2 or not tried.size:
         return np.zeros((stack.size, 0))
@@ -140,17 +148,21 @@ def _power(shape: Array, values: Array) -> Array:
 
 
 def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
-    """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it itself."""
+    """(f, f) 1 where one frequency is a neighbour of the other: its spectrum near by, but not it
+    itself.
+    """
     longest = max(float(np.ptp(x[index])) for index in parts)
     apart = np.abs(tried[:, None] - tried) * longest
     return ((apart >= NEAR) & (apart <= FAR)).astype(float)
 
 
 def _chance(power: Array, parts: int, near: Array) -> Array:
-    """Chance (f,) of a power beside the mean of its neighbours on either side, for noise of a smooth spectrum.
+    """Chance (f,) of a power beside the mean of its neighbours on either side, for noise of a
+    smooth spectrum.
 
-    All are sums of squares, the neighbours' of as many as they resolve. The side that holds more counts: the spectrum
-    of slow noise falls steeply. Without neighbours on both sides nothing is known.
+    All are sums of squares, the neighbours' of as many as they resolve. The side that holds more
+    counts: the spectrum of slow noise falls steeply. Without neighbours on both sides nothing is
+    known.
     """
     out = np.zeros(power.size)
     for side in (np.tril(near), np.triu(near)):

@@ -1,10 +1,13 @@
-"""Conditions that were held, and held again: what varies inside a condition is noise, whatever the model.
+"""Conditions that were held, and held again: what varies inside a condition is noise, whatever the
+model.
 
-A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated model, so that a misfit
-of any shape over the conditions does not count as noise. Runs that held the same condition on equal terms (same pass,
-same start) are replicates: what their means, their drifts and the phases of their waves differ by, beyond the noise
-inside a run, is pure error between runs. A bed that is not level, say, lets the sinkage of each trial drift its own
-way, and an encoder without a zero mark begins each run at another tooth of the gear. A drift that replicates share (a
+A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated
+model, so that a misfit of any shape over the conditions does not count as noise. Runs that held the
+same condition on equal terms (same pass,
+same start) are replicates: what their means, their drifts and the phases of their waves differ by,
+beyond the noise inside a run, is pure error between runs. A bed that is not level, say, lets the
+sinkage of each trial drift its own way, and an encoder without a zero mark begins each run at
+another tooth of the gear. A drift that replicates share (a
 soil that dries, a motor that warms) is none: it stays in full, to be explained.
 """
 
@@ -71,7 +74,9 @@ def _conditions(stack: Stack) -> Array:
 
 
 def _binned(values: Array) -> Index:
-    """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on an edge."""
+    """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on an
+    edge.
+    """
     tried = [np.floor(values + phase).astype(int) for phase in PHASES]
     return max(
         tried,
@@ -84,16 +89,19 @@ class Held(NamedTuple):
 
     run: int
     condition: Array  # mean slip, speed and load, in widths of a cell
-    shape: Array  # (m,) of the residual: coefficients of what a run may do for itself; NaN where not known
+    # (m,) of the residual: coefficients of what a run may do for itself; NaN where not known
+    shape: Array
     chance: Array  # (m,) their variance by noise
 
 
 def own_columns(
     stack: Stack, residual: Array, colours: tuple[Colour, ...], standing: Array
 ) -> Array:
-    """What each run may do for itself (N, m), one standard deviation each, as large as replicates show it.
+    """What each run may do for itself (N, m), one standard deviation each, as large as replicates
+    show it.
 
-    An offset; and, of a run that held one condition, drifts and the phase of waves that stand out of the noise.
+    An offset; and, of a run that held one condition, drifts and the phase of waves that stand out
+    of the noise.
     residual, standing: (N,) and (N, k), what was not predicted, and the waves in it (lines.py).
     """
     label, terms, columns = cells(stack), _terms(stack), []
@@ -114,17 +122,21 @@ def own_columns(
 
 
 def between_runs(held: list[Held], terms: Array, count: int) -> Array:
-    """Standard deviations between replicates beyond the noise inside a run (count,); 0 where nothing was repeated.
+    """Standard deviations between replicates beyond the noise inside a run (count,); 0 where
+    nothing was repeated.
 
-    Of what one channel did while conditions were held. From successive differences (von Neumann 1941), so that what
-    changes steadily from run to run does not count. terms: pass and start of each run (runs, 2).
+    Of what one channel did while conditions were held. From successive differences (von Neumann
+    1941), so that what changes steadily from run to run does not count. terms: pass and start of
+    each run (runs, 2).
     """
     pairs = [(one, two) for one in held if (two := _next(one, held, terms)) is not None]
     return _spread([(two.shape - one.shape, one.chance + two.chance) for one, two in pairs], count)
 
 
 def _waves(stack: Stack, number: int, standing: Array) -> Array:
-    """Waves of a channel that have a phase of their own in every run, one column for all runs (N, k)."""
+    """Waves of a channel that have a phase of their own in every run, one column for all runs (N,
+    k).
+    """
     runs = range(len(stack.rig.runs))
     own = [(stack.channel == number) & (stack.run == run) for run in runs]
     used = standing != 0.0
@@ -167,7 +179,9 @@ def _driven(stack: Stack, number: int, run: int) -> Bools:
 
 
 def _one_condition(own: Bools, label: Index) -> bool:
-    """Whether a run, of values `own`, held one condition, long enough to tell how it drifted meanwhile."""
+    """Whether a run, of values `own`, held one condition, long enough to tell how it drifted
+    meanwhile.
+    """
     most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
     return bool(most >= max(LONG, WHOLE * int(own.sum())))
 
@@ -187,7 +201,8 @@ def _next(one: Held, held: list[Held], terms: Array) -> Held | None:
 
 
 def _shapes(time: Array, waves: Array) -> Array:
-    """What a run may do for itself (n, SHAPES + waves): Legendre polynomials over a stretch of time, and waves.
+    """What a run may do for itself (n, SHAPES + waves): Legendre polynomials over a stretch of
+    time, and waves.
 
     Of waves what is no drift; nothing where that is little.
     """
@@ -199,9 +214,11 @@ def _shapes(time: Array, waves: Array) -> Array:
 
 
 def _spread(found: list[tuple[Array, Array]], count: int) -> Array:
-    """Standard deviations (count,), from differences and what variance noise alone gives them, (count,) each.
+    """Standard deviations (count,), from differences and what variance noise alone gives them,
+    (count,) each.
 
-    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in few cases only.
+    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in few
+    cases only.
     """
     out = np.zeros(count)
     for order, (difference, chance) in enumerate(

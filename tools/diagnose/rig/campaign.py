@@ -1,4 +1,6 @@
-"""All runs of a campaign through the forward model, in one call where no effect remembers what went before."""
+"""All runs of a campaign through the forward model, in one call where no effect remembers what went
+before.
+"""
 
 from __future__ import annotations
 

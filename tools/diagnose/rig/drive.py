@@ -1,12 +1,14 @@
-"""The adapter for a motor drive without soil: T = J dω/dt + B ω, and whatever of the library acts on a drivetrain.
+"""The adapter for a motor drive without soil: T = J dω/dt + B ω, and whatever of the library acts
+on a drivetrain.
 
-Position is low-passed and differentiated on a fine grid, the model evaluated there, and prediction and measured torque
-low-passed and thinned alike, so that neither noise of the acceleration nor a lag of a filter is taken for physics: the
-parallel decimation of Gautier and Poignet (2001), Control Eng. Practice 9, 1361-1372, which the EMPS benchmark uses.
+Position is low-passed and differentiated on a fine grid, the model evaluated there, and prediction
+and measured torque low-passed and thinned alike, so that neither noise of the acceleration nor a
+lag of a filter is taken for physics: the parallel decimation of Gautier and Poignet (2001), Control
+Eng. Practice 9, 1361-1372, which the EMPS benchmark uses.
 
-The same engine, effects and statistics as for a wheel. The library's expected sizes are those of a small wheel, so an
-effect sees torques in units of the drive's own, `unit` newton metres, and speeds in units of its usual speed; what is
-said is in newton metres and radians a second again.
+The same engine, effects and statistics as for a wheel. The library's expected sizes are those of a
+small wheel, so an effect sees torques in units of the drive's own, `unit` newton metres, and speeds
+in units of its usual speed; what is said is in newton metres and radians a second again.
 """
 
 from __future__ import annotations
@@ -30,17 +32,21 @@ from gritd.tools.diagnose.rig.interface import Bools, Known, Run
 from gritd.tools.diagnose.rig.signals import Series
 
 RATE = 10.0  # [Hz] of the comparison, as for a wheel
-FINE = 250.0  # [Hz] at most, on which position and current are averaged first and the model is evaluated
+# [Hz] at most, on which position and current are averaged first and the model is evaluated
+FINE = 250.0
 ORDER = 4  # of the zero-phase low-passes
 SHARP, BAND = (
     0.12,
     0.4,
 )  # their cut-offs: of position and torque, of FINE; of the comparison, of RATE
-STAMPS = 2.0  # sampling intervals by which current and position may be apart: a held output, a bus, a mean
+# sampling intervals by which current and position may be apart: a held output, a bus, a mean
+STAMPS = 2.0
 SHORTEST = 2.0  # [s] of a log
 EDGE = 0.2  # [s] at either end, where a filter lacks its neighbours
-USUAL = 2.0  # size that the drive's torque has in units of `unit`: that of the wheel the priors were made for
-STILL = 0.05  # share of the usual speed; a drive that stays below it rests, and friction holds whatever is asked
+# size that the drive's torque has in units of `unit`: that of the wheel the priors were made for
+USUAL = 2.0
+# share of the usual speed; a drive that stays below it rests, and friction holds whatever is asked
+STILL = 0.05
 EFFECTS_OF_A_DRIVE = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple", "motor_heating", "current_offset",
     "sensor_latency",
@@ -93,7 +99,9 @@ class DriveRig:
         self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
 
     def _most(self, values: Iterable[Array]) -> float:
-        """A constant that is not known is nothing, give or take ten times what would take all of the torque."""
+        """A constant that is not known is nothing, give or take ten times what would take all of
+        the torque.
+        """
         return 10.0 * USUAL * self.unit / _size(values)
 
     @property
@@ -160,7 +168,9 @@ class DriveRig:
 
 @dataclass(frozen=True)
 class Moving:
-    """A drive's motion and torque on the fine grid, arrays (n,), all through one low-pass: none lags another."""
+    """A drive's motion and torque on the fine grid, arrays (n,), all through one low-pass: none
+    lags another.
+    """
 
     step: float  # [s]
     sampled: float  # [s] sampling interval of the log
@@ -186,7 +196,9 @@ class Moving:
 
 
 def _motion(series: Mapping[str, Series], constant: float, name: str) -> Moving:
-    """The fine grid, no finer than the log's own sampling. Raises CommandError where the log is too short."""
+    """The fine grid, no finer than the log's own sampling. Raises CommandError where the log is too
+    short.
+    """
     time, angle = series["wheel_encoder"]
     current_time, current = series["motor_shunt"]
     sampled = max(float(np.median(np.diff(t))) for t in (time, current_time))
@@ -205,13 +217,17 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> Moving:
 
 
 def _timed(torque: Array, step: float, delay: float, blur: float) -> Array:
-    """As a current that lags by `delay` [s], and was averaged over a window of variance 2 `blur` [s²], shows it."""
+    """As a current that lags by `delay` [s], and was averaged over a window of variance 2 `blur`
+    [s²], shows it.
+    """
     rate = np.gradient(torque, step)
     return np.asarray(torque - delay * rate + blur * np.gradient(rate, step))
 
 
 def _rate(values: Array, step: float) -> Array:
-    """Derivative by a cubic spline: differences would smooth the acceleration, and nothing else, by 2 % at 10 Hz."""
+    """Derivative by a cubic spline: differences would smooth the acceleration, and nothing else, by
+    2 % at 10 Hz.
+    """
     return np.asarray(
         CubicSpline(step * np.arange(values.size), values)(step * np.arange(values.size), 1)
     )

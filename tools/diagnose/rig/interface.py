@@ -1,7 +1,8 @@
-"""What the engine needs of a rig: runs on a time grid, a prediction of the channels, what is known of its constants.
+"""What the engine needs of a rig: runs on a time grid, a prediction of the channels, what is known
+of its constants.
 
-A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil. All else in this
-package works on the arrays defined here and knows nothing of wheels.
+A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil.
+All else in this package works on the arrays defined here and knows nothing of wheels.
 """
 
 from __future__ import annotations
@@ -23,9 +24,11 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Known:
-    """A constant of the base model: its prior N(0, 1) is on `u`, and its value is what `of` makes of u.
+    """A constant of the base model: its prior N(0, 1) is on `u`, and its value is what `of` makes
+    of u.
 
-    log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept inside low … high.
+    log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept
+        inside low … high.
     """
 
     name: str
@@ -49,7 +52,9 @@ class Known:
 
 @dataclass(frozen=True)
 class Run:
-    """One run on the analysis grid; arrays (n,). `used` says which values of a channel the comparison counts."""
+    """One run on the analysis grid; arrays (n,). `used` says which values of a channel the
+    comparison counts.
+    """
 
     name: str
     time: Array  # [s] since the campaign began
@@ -78,7 +83,9 @@ class Rig(Protocol):
 
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
-        """Constants that do to some values, marked per run, what another constant does to all: a cheap derivative."""
+        """Constants that do to some values, marked per run, what another constant does to all: a
+        cheap derivative.
+        """
 
     @property
     def effects(self) -> Mapping[str, type[Effect]]:
@@ -94,7 +101,9 @@ class Rig(Protocol):
 
     @property
     def unsure(self) -> Sequence[Mapping[str, Array]]:
-        """Per run, standard deviation of every channel's prediction by what is left open of the motion."""
+        """Per run, standard deviation of every channel's prediction by what is left open of the
+        motion.
+        """
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         """Every channel of every run, for constants u (in prior σ) and effects beyond the baseline."""
@@ -152,8 +161,9 @@ class Stack:
 
     @cached_property
     def partial(self) -> dict[int, tuple[int, Array]]:
-        """Of each constant of `rig.partial`: the constant that it is a part of, and its derivative's share of that
-        one's (N,)."""
+        """Of each constant of `rig.partial`: the constant that it is a part of, and its
+        derivative's share of that one's (N,).
+        """
         place = {known.name: i for i, known in enumerate(self.rig.constants)}
         sigma = [known.sigma for known in self.rig.constants]
         out = {}

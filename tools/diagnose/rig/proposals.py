@@ -48,7 +48,9 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
 
 
 def driving(key: str) -> NDArray[np.bool_]:
-    """Whether the wheel drives on the soil: at rest and lifted the motor current alone tells something."""
+    """Whether the wheel drives on the soil: at rest and lifted the motor current alone tells
+    something.
+    """
     speeds, _, loads = LEVELS[key]
     time = np.arange(round(SECONDS * RATE)) / RATE
     driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)

@@ -1,7 +1,9 @@
-"""Recordings to signals on one time grid: block means of analogue channels, fitted slopes of encoders.
+"""Recordings to signals on one time grid: block means of analogue channels, fitted slopes of
+encoders.
 
-Every value is a mean over one grid interval of readings placed by their stamps less the channel's latency, so jitter
-and dropped samples only change how many readings stand behind it; an interval with too few of them is NaN.
+Every value is a mean over one grid interval of readings placed by their stamps less the channel's
+latency, so jitter and dropped samples only change how many readings stand behind it; an interval
+with too few of them is NaN.
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ class Signals:
     wheel_speed: Array  # [rad/s]
     carriage_angle: Array
     carriage_rate: Array  # [rad/s] of the pulley
-    doubt: Array  # relative standard deviation of the ratio of both speeds, of what the encoders' counts leave of it
+    # relative standard deviation of the ratio of both speeds, of what the encoders' counts leave of
+    # it
+    doubt: Array
     analogue: dict[
         str, Array
     ]  # sinkage, current, temperature, drawbar_pull, load, axle_torque; those there are
@@ -87,7 +91,9 @@ def sha256(path: Path) -> str:
 
 
 def distinct(paths: Sequence[Path]) -> dict[str, str]:
-    """SHA-256 of every file. Raises CommandError where two are the same: a run counted twice would prove nothing."""
+    """SHA-256 of every file. Raises CommandError where two are the same: a run counted twice would
+    prove nothing.
+    """
     found: dict[str, str] = {}
     for path in paths:
         checksum = sha256(path)
@@ -201,7 +207,9 @@ def _ordered(time: Array, values: Array) -> Series:
 
 
 def block_mean(time: Array, values: Array, edges: Array) -> Array:
-    """Mean of the readings in each interval (n,), moved to its middle; single readings far off are left out."""
+    """Mean of the readings in each interval (n,), moved to its middle; single readings far off are
+    left out.
+    """
     n = edges.size - 1
     block = np.searchsorted(edges, time, side="right") - 1
     inside = (block >= 0) & (block < n)
@@ -251,9 +259,11 @@ def doubt(wheel: Turned, carriage: Turned) -> Array:
 def slope(time: Array, values: Array, edges: Array) -> Turned:
     """Value and slope of an encoder at the middle of each interval.
 
-    By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is steady within its
-    own noise, STEADY or LONG to either side, if that line leaves no more than the short one: at creeping speed one
-    count is much of the slip, and counts that beat with the sampling make slow waves of what was steady.
+    By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is
+    steady within its
+    own noise, STEADY or LONG to either side, if that line leaves no more than the short one: at
+    creeping speed one count is much of the slip, and counts that beat with the sampling make slow
+    waves of what was steady.
     """
     best, left = _line(time, values, edges, QUICK)
     quick, calm = best.rate, np.ones(best.rate.size, bool)
@@ -270,7 +280,9 @@ def slope(time: Array, values: Array, edges: Array) -> Turned:
 
 
 def _line(time: Array, values: Array, edges: Array, reach: int) -> tuple[Turned, Array]:
-    """Lines fitted over each interval and `reach` more on either side; the r.m.s. of what they leave (n,)."""
+    """Lines fitted over each interval and `reach` more on either side; the r.m.s. of what they
+    leave (n,).
+    """
     n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     block = np.searchsorted(edges, time, side="right") - 1
     inside = (block >= 0) & (block < n)

@@ -1,8 +1,9 @@
 """Which values of a run say something of the steady physics: driving and settled, at rest, lifted.
 
-Speeds are slopes over three grid intervals, sinkage follows the load within one contact length, and servo, soil and
-encoders start and stop at their own paces. A value next to a start, a stop, a reversal, or the wheel's touching down
-mixes two states and belongs to neither; it is left out on both sides alike.
+Speeds are slopes over three grid intervals, sinkage follows the load within one contact length, and
+servo, soil and encoders start and stop at their own paces. A value next to a start, a stop, a
+reversal, or the wheel's touching down mixes two states and belongs to neither; it is left out on
+both sides alike.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ SETTLING, LONGEST = (
     0.5,
     5.0,
 )  # [s] after the wheel starts, before the comparison counts: at least, at most
-STOPPING = 0.5  # [s] before the wheel stops, from which on it no longer counts: a slope's reach, and a servo's ramp
-ANGLE = 0.7  # [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
+# [s] before the wheel stops, from which on it no longer counts: a slope's reach, and a servo's ramp
+STOPPING = 0.5
+# [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
+ANGLE = 0.7
 RESTING, RISING = (
     0.4,
     0.2,
@@ -28,7 +31,9 @@ RESTING, RISING = (
 
 
 def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
-    """Driving on the soil and settled; at rest for a while; lifted off the soil and settled. Each (n,)."""
+    """Driving on the soil and settled; at rest for a while; lifted off the soil and settled. Each
+    (n,).
+    """
     rim = settings.wheel.radius * np.asarray(motion.wheel_speed)
     turning = np.abs(rim)[np.abs(rim) > 1e-3]
     usual = float(np.median(turning)) if turning.size else 1e-3
@@ -45,7 +50,9 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
 
 
 def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
-    """Both stand still but for the encoders' noise; a standing wheel's slip means nothing, so both speeds become 0."""
+    """Both stand still but for the encoders' noise; a standing wheel's slip means nothing, so both
+    speeds become 0.
+    """
     turning = np.abs(rim_speed)[np.abs(rim_speed) > 1e-3]
     least = 0.01 * float(np.median(turning)) if turning.size else 1e-4
     rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
@@ -55,7 +62,8 @@ def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
 def _inside(state: Array, after: int, before: int) -> Bools:
     """Where a state other than 0 has lasted for `after` intervals and goes on for `before` more.
 
-    It may have begun before the recording and go on beyond it: the ends of a run are no change of state.
+    It may have begun before the recording and go on beyond it: the ends of a run are no change of
+        state.
     """
     n, at = state.size, np.arange(state.size)
     changed = np.flatnonzero(np.diff(state)) + 1  # first intervals of a new state

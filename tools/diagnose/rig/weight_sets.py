@@ -1,4 +1,6 @@
-"""Weights of their own: what hangs on the axle is a set of plates for each load, and each set errs for itself."""
+"""Weights of their own: what hangs on the axle is a set of plates for each load, and each set errs
+for itself.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The weights on the axle in each run: as the run states them, or as the force/torque sensor tells them."""
+"""The weights on the axle in each run: as the run states them, or as the force/torque sensor tells
+them.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ CLOSE = (
 )
 RAISED = 0.2  # share of the stated load below which the wheel is lifted
 PASSING = 0.1  # share of a run that may pass between lifted and loaded
-DOUBT = 4.0  # [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
+# [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
+DOUBT = 4.0
 LEVEL = 0.03  # relative change of the measured load that is a change of weights
 HOLD = 1.0  # [s] weights stay for at least this long
 
@@ -26,9 +29,11 @@ class Weights(NamedTuple):
 
 
 def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weights:
-    """Stated weights where the measured load does not contradict them, else the levels of the measured load.
+    """Stated weights where the measured load does not contradict them, else the levels of the
+    measured load.
 
-    A run that states nothing has the configuration's weights, if the measured load is theirs within the uncertainties.
+    A run that states nothing has the configuration's weights, if the measured load is theirs within
+    the uncertainties.
     """
     said = signals.info.nominal_load
     stated = settings.load.nominal.value if said is None else said
@@ -58,7 +63,9 @@ def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
 
 
 def levels(time: Array, load: Array) -> Array:
-    """The measured load: its mean over each stretch on which it is level, as measured where it changes."""
+    """The measured load: its mean over each stretch on which it is level, as measured where it
+    changes.
+    """
     step = float(np.median(np.diff(time)))
     half = max(round(0.5 * HOLD / step), 1)
     padded = np.pad(load, half, mode="edge")

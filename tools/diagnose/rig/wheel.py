@@ -1,4 +1,6 @@
-"""The adapter for a wheel in soil: recordings and configuration in, channels predicted by the forward model out."""
+"""The adapter for a wheel in soil: recordings and configuration in, channels predicted by the
+forward model out.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ HELD = 0.05  # of the driving torque: current at rest that differs by more holds
 EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
 TIMING = 5e-3  # [s] by which a channel's stamps may be off
-BLUR = 0.3  # second differences by which speeds, slopes over three intervals, cut corners that a channel does not
+# second differences by which speeds, slopes over three intervals, cut corners that a channel does
+# not
+BLUR = 0.3
 FLOORS = {
     "c": 0.05,
     "tan_phi": 0.02,
@@ -104,7 +108,8 @@ class WheelRig:
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
 
-    # ---- prediction --------------------------------------------------------------------------------------------------
+    # ---- prediction ------------------------------------------------------------------------------
+    # --------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
@@ -155,14 +160,18 @@ class WheelRig:
 
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
-        """What one set of weights is off by for itself does to its own values what a common error does to all."""
+        """What one set of weights is off by for itself does to its own values what a common error
+        does to all.
+        """
         return {
             name: ("weights", [label == number for label in self._plates.label])
             for number, name in enumerate(self._plates.names)
         }
 
     def _own_weight(self, load: float, common: float) -> float:
-        """Relative standard deviation of one set of weights for itself: a plate's, or the load cell's at that load."""
+        """Relative standard deviation of one set of weights for itself: a plate's, or the load
+        cell's at that load.
+        """
         wrench = self.settings.wrench
         if wrench is None or all(w.known for w in self._weights):
             return OWN * common
@@ -170,7 +179,9 @@ class WheelRig:
 
     @cached_property
     def unsure(self) -> Sequence[Mapping[str, Array]]:
-        """By the encoders' counts: slip is uncertain by what a carriage would make of it that is off by as much."""
+        """By the encoders' counts: slip is uncertain by what a carriage would make of it that is
+        off by as much.
+        """
         place = next(i for i, known in enumerate(self.constants) if known.name == "carriage_scale")
         u = np.zeros(len(self.constants))
         before = self.predict(u, ())
@@ -182,7 +193,9 @@ class WheelRig:
         ]
 
     def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
-        """Channels under a proposed experiment (see proposals.py), for constants and effects as fitted."""
+        """Channels under a proposed experiment (see proposals.py), for constants and effects as
+        fitted.
+        """
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
         soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
         acting = (*self._baseline(value), *effects)
@@ -194,7 +207,8 @@ class WheelRig:
             c: sensed_as(sensed, c, self.settings) + value[f"{c}_offset"] for c in self.channels
         }
 
-    # ---- what is known -----------------------------------------------------------------------------------------------
+    # ---- what is known ---------------------------------------------------------------------------
+    # --------------------
 
     def _calibrations(self) -> list[Known]:
         known = []
@@ -230,7 +244,9 @@ class WheelRig:
         return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
 
     def _without_held_torque(self, runs: list[Run]) -> list[Run]:
-        """A servo may hold torque at rest: where the current at rest differs from rest to rest, rest says nothing."""
+        """A servo may hold torque at rest: where the current at rest differs from rest to rest,
+        rest says nothing.
+        """
         if "torque" not in self.channels:
             return runs
         still = [run.used["torque"] & (run.covariates["speed"] == 0.0) for run in runs]
@@ -371,7 +387,9 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
 
 
 def _configured(settings: Settings) -> tuple[Known, ...]:
-    """Parameters of configured effects float within their own uncertainty, kept inside their bounds."""
+    """Parameters of configured effects float within their own uncertainty, kept inside their
+    bounds.
+    """
     known = []
     for effect in settings.effects:
         for p in EFFECTS[effect.name].parameters():

@@ -1,20 +1,23 @@
-"""Whether slow noise alone explains it: evidence of a misfit with size and colour of the noise left open.
+"""Whether slow noise alone explains it: evidence of a misfit with size and colour of the noise left
+open.
 
-The screen whitens with one colour for each channel, found with everything explained away (noise.py). Short campaigns
-leave that colour wide open: what tells slow noise lies in the slow part of the residual, and there the saturated mean
-takes it. A misfit that stands out of the assumed colour may then be noise of a slower one. So what raised the alarm is
-weighed once more: base model and base model with the misfit, each with the colours that suit *it*, averaged over what
-they may be. A misfit that follows its covariate through all runs is far likelier than noise that happens to; slow noise
-that looks like a trend is not.
+The screen whitens with one colour for each channel, found with everything explained away
+(noise.py). Short campaigns
+leave that colour wide open: what tells slow noise lies in the slow part of the residual, and there
+the saturated mean takes it. A misfit that stands out of the assumed colour may then be noise of a
+slower one. So what raised the alarm is
+weighed once more: base model and base model with the misfit, each with the colours that suit *it*,
+averaged over what they may be. A misfit that follows its covariate through all runs is far likelier
+than noise that happens to; slow noise that looks like a trend is not.
 
-Linear about the fit, Gaussian priors: for noise of covariance Σ, columns C of unit prior, and at the fit
-y = measured − predicted + C θ,
+Linear about the fit, Gaussian priors: for noise of covariance Σ, columns C of unit prior, and at
+the fit y = measured − predicted + C θ,
 
     ln p(y) = −½ [yᵀΣ⁻¹y − bᵀK⁻¹b + ln det K + ln det Σ],   K = I + CᵀΣ⁻¹C,   b = CᵀΣ⁻¹y
 
-(Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14). Channels share the columns, so colours are sought one channel
-after the other, from those that suit each alone; the average of each is over its own colours and sizes, the other
-channels' at their best.
+(Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 14). Channels share the columns, so colours are
+sought one channel after the other, from those that suit each alone; the average of each is over its
+own colours and sizes, the other channels' at their best.
 """
 
 from __future__ import annotations
@@ -42,7 +45,9 @@ AT_ONCE = 8_000_000  # numbers whitened at once
 
 @dataclass(frozen=True)
 class Squares:
-    """Products of a channel's whitened columns, for each colour (g, m, m); log det of the correlation (g,); values."""
+    """Products of a channel's whitened columns, for each colour (g, m, m); log det of the
+    correlation (g,); values.
+    """
 
     gram: Array
     log_det: Array
@@ -51,7 +56,9 @@ class Squares:
 
 @dataclass(frozen=True)
 class Suiting:
-    """Colours that may suit a channel: products (k, p + 1, p + 1), what their size adds (k,), variance (k,), values."""
+    """Colours that may suit a channel: products (k, p + 1, p + 1), what their size adds (k,),
+    variance (k,), values.
+    """
 
     gram: Array
     rest: Array
@@ -139,7 +146,9 @@ def _term(part: Suiting, at: int, size: float) -> tuple[Array, float]:
 
 
 def _averaged(part: Suiting, prior: Array, others: Sequence[tuple[Array, float]]) -> Array:
-    """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors (s, p)."""
+    """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors
+    (s, p).
+    """
     variance = part.variance[:, None] * SIZES**2
     gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
     added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
@@ -149,7 +158,9 @@ def _averaged(part: Suiting, prior: Array, others: Sequence[tuple[Array, float]]
 
 
 def _log_evidence(gram: Array, prior: Array) -> Array:
-    """From products (…, p + 1, p + 1) of columns and y, and the prior precision (p,) of the columns."""
+    """From products (…, p + 1, p + 1) of columns and y, and the prior precision (p,) of the
+    columns.
+    """
     root = np.linalg.cholesky(gram[..., :-1, :-1] + np.diag(prior))
     taken = np.linalg.solve(root, gram[..., :-1, -1:])[..., 0]
     spread = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) - 0.5 * np.log(prior).sum()

@@ -20,7 +20,9 @@ def order_of(effect: type[Effect]) -> str | None:
 
 
 def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) -> list[float]:
-    """The orders whose ripple takes most from the whitened residual (N,), each channel with a phase of its own."""
+    """The orders whose ripple takes most from the whitened residual (N,), each channel with a phase
+    of its own.
+    """
     phase = np.outer(stack.covariate("wheel_angle"), orders)
     moving = (stack.covariate("speed") > 0.0)[:, None]
     cosine, sine = (

@@ -1,11 +1,13 @@
-"""Misfits without a name that must be searched for: waves (lines.py) and steps, in time and along the bed.
+"""Misfits without a name that must be searched for: waves (lines.py) and steps, in time and along
+the bed.
 
-A family is one channel along one axis, with a wave at every frequency that the grid shows, or a step at every place.
-Its evidence is the average over all of them, in the recordings and in every surrogate alike, so that the number of
-frequencies and places tried is paid for. Cosine and sine of a wave are of one size and at a right angle to each other;
-so are those of one stretch to another's: what this leaves out is small, and the same for the surrogates. Where a wave's
-neighbours in the spectrum hold more than the noise that is assumed, its power counts by so much less: a line stands out
-of what is near it, whatever the colour.
+A family is one channel along one axis, with a wave at every frequency that the grid shows, or a
+step at every place. Its evidence is the average over all of them, in the recordings and in every
+surrogate alike, so that the number of frequencies and places tried is paid for. Cosine and sine of
+a wave are of one size and at a right angle to each other; so are those of one stretch to another's:
+what this leaves out is small, and the same for the surrogates. Where a wave's
+neighbours in the spectrum hold more than the noise that is assumed, its power counts by so much
+less: a line stands out of what is near it, whatever the colour.
 """
 
 from __future__ import annotations
@@ -41,7 +43,9 @@ FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Values whose shapes have coefficients of their own: whitened shapes (n, f, c), their scores (f · c, draws)."""
+    """Values whose shapes have coefficients of their own: whitened shapes (n, f, c), their scores
+    (f · c, draws).
+    """
 
     rows: slice
     shapes: Array
@@ -65,13 +69,17 @@ class Family:
 
     @property
     def shared(self) -> tuple[bool, ...]:
-        """Whether all blocks have one coefficient: of waves in time never, of waves along the bed it is not known."""
+        """Whether all blocks have one coefficient: of waves in time never, of waves along the bed
+        it is not known.
+        """
         if len(self.blocks) == 1:
             return (True,)
         return (False,) if self.axis == "time" else (False, True)
 
     def evidence(self, left: Left, near: Array | None = None) -> Array:
-        """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands out of them."""
+        """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands
+        out of them.
+        """
         return np.stack([self.form(left, shared, near) for shared in self.shared])
 
     def form(self, left: Left, shared: bool, near: Array | None = None) -> Array:
@@ -88,7 +96,9 @@ class Left:
     """What of a shape is left beside a fitted model, in the recordings and in every surrogate."""
 
     def __init__(self, base: Base, noise: Array | None = None, strain: Array | None = None) -> None:
-        """Surrogates: noise (N, draws) whitened, strain (q, draws); without them the recordings alone count."""
+        """Surrogates: noise (N, draws) whitened, strain (q, draws); without them the recordings
+        alone count.
+        """
         noise = np.zeros((base.residual.size, 0)) if noise is None else noise
         strain = np.zeros((base.u.size, 0)) if strain is None else strain
         self._base = base
@@ -98,7 +108,9 @@ class Left:
         self._pulled = np.linalg.solve(base.root, score)
 
     def of(self, block: Block) -> tuple[Array, Array, Array]:
-        """Squares of the shapes (m,), coordinates in the model's directions (q, m), scores (m, 1 + draws)."""
+        """Squares of the shapes (m,), coordinates in the model's directions (q, m), scores (m, 1 +
+        draws).
+        """
         flat = block.shapes.reshape(len(block.shapes), -1)
         jacobian = self._base.jacobian[block.rows]
         acting = np.any(jacobian != 0.0, axis=0)
@@ -146,7 +158,8 @@ def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
     return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, TINY)) - expected), 0.0)))
 
 
-# ---- what is searched ----------------------------------------------------------------------------------------------
+# ---- what is searched
+# ----------------------------------------------------------------------------------------------
 
 
 def families(stack: Stack, noise: Noise, nulls: Array) -> list[Family]:
@@ -184,7 +197,9 @@ def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at:
 
 
 def places(stack: Stack, channel: str, axis: str) -> Array:
-    """Where a step may be [s, m] (p,): as many values between two as between others, some on either side of all."""
+    """Where a step may be [s, m] (p,): as many values between two as between others, some on either
+    side of all.
+    """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     x = stack.covariate(axis)[own]
     if x.size < 2 * FEW or np.ptp(x) <= 1e-9:
@@ -213,11 +228,14 @@ def _block(noise: Noise, nulls: Array, rows: slice, raw: Array) -> Block:
     return Block(rows, white.reshape(raw.shape), white.T @ nulls[rows])
 
 
-# ---- those that stand out ------------------------------------------------------------------------------------------
+# ---- those that stand out
+# ------------------------------------------------------------------------------------------
 
 
 def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> list[Signature]:
-    """The likeliest shapes of every family beside a model, each with its log share among all that were tried."""
+    """The likeliest shapes of every family beside a model, each with its log share among all that
+    were tried.
+    """
     left = Left(without_harmonics(problem, fitted))
     return [found for family in search for found in _peaks(family, problem, left)]
 
@@ -257,7 +275,9 @@ def _refined(family: Family, problem: Problem, left: Left, place: int, shared: b
 def in_step(
     search: Sequence[Family], problem: Problem, fitted: Fitted, found: Signature
 ) -> Signature:
-    """A wave in time with one phase for all runs, where that is likelier than one for each; else as it was."""
+    """A wave in time with one phase for all runs, where that is likelier than one for each; else as
+    it was.
+    """
     family = next(f for f in search if f.name == found.name)
     if family.kind != WAVE or family.axis != "time" or found.shape["shared"]:
         return found
@@ -280,7 +300,9 @@ def in_step(
 def shape_columns(
     stack: Stack, channel: str, axis: str, kind: str, at: float, shared: bool
 ) -> Array:
-    """One wave or step (N, m), of the expected size of a misfit; of a wave two columns, or two a stretch."""
+    """One wave or step (N, m), of the expected size of a misfit; of a wave two columns, or two a
+    stretch.
+    """
     size = generic.size_of(stack, channel)
     if kind == STEP:
         rows, out = _rows(stack.of(channel)), np.zeros((stack.size, 1))
@@ -298,7 +320,8 @@ def shape_columns(
 def without_harmonics(problem: Problem, fitted: Fitted) -> Base:
     """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too.
 
-    At a steady speed they are waves in time and along the bed, and another published form of the ripple has them.
+    At a steady speed they are waves in time and along the bed, and another published form of the
+    ripple has them.
     """
     base, columns = fitted.base(), list(_harmonics(problem.stack, fitted))
     if not columns:

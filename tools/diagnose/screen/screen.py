@@ -1,11 +1,13 @@
-"""The screen: evidence of every effect and of every smooth misfit at once, against what noise alone would show.
+"""The screen: evidence of every effect and of every smooth misfit at once, against what noise alone
+would show.
 
-Nulls are surrogates of the recordings' own noise (size and colour drawn from their posterior) together with constants
-drawn from their priors; each goes through the same linear algebra. What noise alone shows differs from name to name: a
-function of time takes slow noise for a drift, a ripple does not. So each evidence is counted from where the last tenth
-of its own nulls begins, in units of how far they reach beyond (never less than a nat), and the alarm is a quantile of
-the largest of *all* these surprises in every null, however many were tried and however alike they are (Westfall and
-Young 1993, Resampling-Based Multiple Testing).
+Nulls are surrogates of the recordings' own noise (size and colour drawn from their posterior)
+together with constants drawn from their priors; each goes through the same linear algebra. What
+noise alone shows differs from name to name: a function of time takes slow noise for a drift, a
+ripple does not. So each evidence is counted from where the last tenth of its own nulls begins, in
+units of how far they reach beyond (never less than a nat), and the alarm is a quantile of the
+largest of *all* these surprises in every null, however many were tried and however alike they are
+(Westfall and Young 1993, Resampling-Based Multiple Testing).
 """
 
 from __future__ import annotations
@@ -30,7 +32,9 @@ TENTH = 0.9  # quantile from which evidence is counted
 
 @dataclass(frozen=True)
 class Whitened:
-    """A signature in units of independent noise; its columns may have been left out where they vanish."""
+    """A signature in units of independent noise; its columns may have been left out where they
+    vanish.
+    """
 
     signature: Signature
     columns: Array
@@ -50,18 +54,21 @@ class Screen:
     chance: dict[str, float] = field(
         default_factory=dict
     )  # of as much evidence under a name by noise alone
-    open: float = (
-        np.inf
-    )  # [nats] the evidence that is left with the noise's colour open (open_noise.py)
+    # [nats] the evidence that is left with the noise's colour open (open_noise.py)
+    open: float = np.inf
 
     @property
     def threshold(self) -> float:
-        """At the tail of the nulls, fitted and counted: whichever is farther, since a fitted tail may be too light."""
+        """At the tail of the nulls, fitted and counted: whichever is farther, since a fitted tail
+        may be too light.
+        """
         counted = np.sort(self.nulls)[-max(int(LEVEL * (1 + len(self.nulls))), 1)]
         return max(float(tail_quantile(self.nulls, LEVEL)), float(counted), LEAST)
 
     def surprise(self, name: str, evidence: float | None = None) -> float:
-        """How far evidence (that of the recordings if not given) lies beyond what noise shows under this name."""
+        """How far evidence (that of the recordings if not given) lies beyond what noise shows under
+        this name.
+        """
         start, reach = self.usual[name]
         return ((self.evidence[name] if evidence is None else evidence) - start) / reach
 
@@ -73,8 +80,10 @@ class Screen:
 
     @property
     def p(self) -> float:
-        """Of the largest surprise, among the nulls; where it was weighed with the noise's colour open, no less than the
-        chance of such a likelihood ratio in any kind of misfit (Markov's inequality)."""
+        """Of the largest surprise, among the nulls; where it was weighed with the noise's colour
+        open, no less than the chance of such a likelihood ratio in any kind of misfit (Markov's
+        inequality).
+        """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
         return max(counted, min(KINDS * float(np.exp(-max(self.open, 0.0))), 1.0))
 
@@ -92,15 +101,18 @@ class Screen:
 
 
 def tail_quantile(values: Array, level: float) -> float:
-    """The value exceeded with probability `level`: exponential tail beyond the 90 % quantile (Davison, Smith 1990)."""
+    """The value exceeded with probability `level`: exponential tail beyond the 90 % quantile
+    (Davison, Smith 1990).
+    """
     start = float(np.quantile(values, 0.9))
     beyond = values[values > start] - start
     return start + float(beyond.mean()) * np.log(0.1 / level) if beyond.size else start
 
 
 def tail_chance(values: Array, value: float) -> float:
-    """Chance of a value among nulls: counted; where fewer than ten reach it by the tail of `tail_quantile`, which is
-    not trusted beyond a tenth of what can be counted."""
+    """Chance of a value among nulls: counted; where fewer than ten reach it by the tail of
+    `tail_quantile`, which is not trusted beyond a tenth of what can be counted.
+    """
     least = 1.0 / (1 + values.size)
     counted = float(1 + np.sum(values >= value)) * least
     start = float(np.quantile(values, 0.9))
@@ -174,7 +186,9 @@ def _ranked(
 
 
 def _usual(nulls: Array) -> tuple[float, float]:
-    """Where the last tenth of nulls begins (0 at least), and their mean reach beyond (1 nat at least)."""
+    """Where the last tenth of nulls begins (0 at least), and their mean reach beyond (1 nat at
+    least).
+    """
     start = max(float(np.quantile(nulls, TENTH)), 0.0)
     beyond = nulls[nulls > start] - start
     return start, max(float(beyond.mean()) if beyond.size else 0.0, 1.0)

@@ -1,4 +1,6 @@
-"""The same work for many items on all cores: children are forked, so what the work needs is there already."""
+"""The same work for many items on all cores: children are forked, so what the work needs is there
+already.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ _work: Callable[[Any], Any] | None = None  # what the children find when they ar
 
 
 def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
-    """`work` of every item, in order. The result must be picklable, `work` and the items need not be."""
+    """`work` of every item, in order. The result must be picklable, `work` and the items need not
+    be.
+    """
     if jobs < 2 or len(items) < 2:
         return [work(item) for item in items]
     global _work

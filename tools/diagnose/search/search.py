@@ -1,4 +1,6 @@
-"""From the screen to models: nonlinear fits of the likely effects, one more at a time, earlier ones re-tested."""
+"""From the screen to models: nonlinear fits of the likely effects, one more at a time, earlier ones
+re-tested.
+"""
 
 from __future__ import annotations
 
@@ -96,7 +98,9 @@ def rescreen(search: Search, model: Model) -> Screen:
 
 
 def _open(search: Search, model: Model, found: Screen) -> float:
-    """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends the search."""
+    """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
+    the search.
+    """
     names = found.stands_out[:WEIGHED]
     families = [f for f in search.scans if f.name in names]
     searched = scans.candidates(families, search.problem, model.fitted)
@@ -117,7 +121,9 @@ def _open(search: Search, model: Model, found: Screen) -> float:
 
 
 def _beside(search: Search, model: Model) -> Iterator[Signature]:
-    """Signatures about the model's fit: of all shapes at the first screen, later of those that were likeliest there."""
+    """Signatures about the model's fit: of all shapes at the first screen, later of those that were
+    likeliest there.
+    """
     stack, fitted = search.problem.stack, model.fitted
     first = search.screens.get(())
     for name, effect in stack.rig.effects.items():
@@ -138,7 +144,9 @@ def _beside(search: Search, model: Model) -> Iterator[Signature]:
 def _worth(
     search: Search, model: Model, effect: type[Effect], shapes: list[dict[str, float]]
 ) -> list[dict[str, float]]:
-    """The shapes to simulate: of ripples only those that the residual holds, the others' evidence being nil."""
+    """The shapes to simulate: of ripples only those that the residual holds, the others' evidence
+    being nil.
+    """
     order = order_of(effect)
     if order is None or len(shapes) <= LOUDEST:
         return shapes
@@ -188,7 +196,9 @@ def extend(search: Search, model: Model, found: Screen, most: int) -> list[Model
 
 
 def _hopeless(search: Search, top: float) -> float:
-    """How far behind the best evidence a model may be and still win: rivals for a strong effect differ by much."""
+    """How far behind the best evidence a model may be and still win: rivals for a strong effect
+    differ by much.
+    """
     return max(HOPELESS, BEHIND * (top - search.models[0].evidence))
 
 
@@ -232,7 +242,9 @@ def _start(
 
 
 def run(search: Search, first: Model, step: Callable[[str], None] = lambda _: None) -> None:
-    """Forward steps from the base model while the screen alarms; each from the best few models of the step before."""
+    """Forward steps from the base model while the screen alarms; each from the best few models of
+    the step before.
+    """
     step("screening every effect")
     search.models.append(first)
     found = rescreen(search, first)

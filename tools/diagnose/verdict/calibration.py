@@ -1,8 +1,9 @@
-"""How far evidence is to be trusted: what `python -m gritd.tools.proof.ours.calibrate` learnt from simulated cases.
+"""How far evidence is to be trusted: what `python -m gritd.tools.proof.ours.calibrate` learnt from
+simulated cases.
 
-The evidence of every explanation [nats] becomes a probability by one temperature, one weight for each degree to which a
-published form may differ from ours, the odds of one more effect and of physics that is in no list, and the share of
-cases in which all evidence misleads.
+The evidence of every explanation [nats] becomes a probability by one temperature, one weight for
+each degree to which a published form may differ from ours, the odds of one more effect and of
+physics that is in no list, and the share of cases in which all evidence misleads.
 """
 
 from __future__ import annotations

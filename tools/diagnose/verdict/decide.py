@@ -1,8 +1,9 @@
 """From fitted models to a verdict, probabilities and groups.
 
-Every explanation has an evidence: listed effects, with a discrepancy for forms other than ours (discrepancy.py);
-or smooth functions without a name instead of them: `unlisted`. `calibration.py` makes probabilities of these. An effect
-has the weight of all models that hold it.
+Every explanation has an evidence: listed effects, with a discrepancy for forms other than ours
+    (discrepancy.py);
+or smooth functions without a name instead of them: `unlisted`. `calibration.py` makes probabilities
+of these. An effect has the weight of all models that hold it.
 """
 
 from __future__ import annotations
@@ -34,14 +35,18 @@ FAMILIES, FITTED = (
 WEIGHED = 5  # models at most, of one effect and of more
 NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
 WHOLE, MUCH = 0.9, 20.0  # share of the misfit that an explanation takes, if it leaves so many nats
-PART = 0.1  # belief in one that takes less: of eleven such in simulated cases none was right, of eight others all
+# belief in one that takes less: of eleven such in simulated cases none was right, of eight others
+# all
+PART = 0.1
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
 
 @dataclass(frozen=True)
 class Weighed:
-    """A model and its log evidence above the base model's for each degree of difference (discrepancy.FORMS,)."""
+    """A model and its log evidence above the base model's for each degree of difference
+    (discrepancy.FORMS,).
+    """
 
     model: Model
     evidence: Array
@@ -98,7 +103,9 @@ def _bending(weighed: Weighed) -> float:
 
 
 def _best(weighed: Sequence[Weighed], weights: Array) -> Model:
-    """The likeliest model of the likeliest number of effects: many alike sets of two weigh together against one."""
+    """The likeliest model of the likeliest number of effects: many alike sets of two weigh together
+    against one.
+    """
     sizes = np.array([len(w.model.names) for w in weighed])
     size = max(np.unique(sizes).tolist(), key=lambda n: float(logsumexp(weights[sizes == n])))
     return weighed[int(np.argmax(np.where(sizes == size, weights, -np.inf)))].model
@@ -125,16 +132,20 @@ def weigh(search: Search) -> list[Weighed]:
 
 
 def remaining(search: Search, model: Model) -> tuple[float, bool]:
-    """Nats that smooth functions of the covariates would still gain; whether any of them stands out of the noise."""
+    """Nats that smooth functions of the covariates would still gain; whether any of them stands out
+    of the noise.
+    """
     found = search.screens.get(model.names) or rescreen(search, model)
     standing = [n for n in found.stands_out if "~" in n] if found.alarmed else []
     return (_families(search, model, FAMILIES)[0] if standing else 0.0), bool(standing)
 
 
 def nameless_evidence(search: Search, model: Model) -> float:
-    """Evidence for functions without a name on top of a model [nats], as far as they may act together.
+    """Evidence for functions without a name on top of a model [nats], as far as they may act
+    together.
 
-    Linear, and with soil and calibration fitted anew beside the first few, as they are for listed effects.
+    Linear, and with soil and calibration fitted anew beside the first few, as they are for listed
+    effects.
     """
     linear, chosen = _families(search, model, FAMILIES)
     return max(

@@ -1,16 +1,20 @@
 """Evidence for effects whose published form need not be ours.
 
-A listed effect stands for its physics, not for one formula: another form differs from ours by a smooth share of what
-the effect does. So the model of an effect that adds S(x) to the channels (N,) is
+A listed effect stands for its physics, not for one formula: another form differs from ours by a
+smooth share of what the effect does. So the model of an effect that adds S(x) to the channels (N,)
+is
 
     y = f(x) + S(x) + S′(x) h(x),   h(x) = Σ aⱼ φⱼ(x),   aⱼ ~ N(0, ρ²/m)
 
-with m smooth functions φ of unit size in each channel, of a ripple its harmonics too (a discrepancy after Kennedy and
-O'Hagan 2001, J. R. Stat. Soc. B 63, 425-464, proportional to the effect). S′ is all of S, or what of S the soil and the
-calibration cannot absorb. ρ is how far forms differ: 0 says that ours is exact. Because the discrepancy grows with the
-effect, the evidence of rivals for a strong effect differs by how well their *shapes* agree with what was recorded, not
-by thousands of nats. An effect that must be bent by more than ρ has little evidence left, and one that explains less
-than its own bending is not what was recorded: that is how physics outside the library gives itself away.
+with m smooth functions φ of unit size in each channel, of a ripple its harmonics too (a discrepancy
+after Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63, 425-464, proportional to the effect). S′ is
+all of S, or what of S the soil and the calibration cannot absorb. ρ is how far forms differ: 0 says
+that ours is exact. Because the discrepancy grows with the effect, the evidence of rivals for a
+strong effect differs by how well their *shapes* agree with what was recorded, not by thousands of
+nats. An effect that must be bent by more than ρ has little evidence left, and one that explains
+less
+than its own bending is not what was recorded: that is how physics outside the library gives itself
+    away.
 """
 
 from __future__ import annotations
@@ -36,7 +40,9 @@ FORMS = 1 + len(WHOLE) + len(NET)  # degrees of difference, none first
 
 
 def evidence(problem: Problem, fitted: Fitted, base: Fitted) -> Array:
-    """Log evidence of fitted effects above the base model's, for each degree to which forms may differ (FORMS,)."""
+    """Log evidence of fitted effects above the base model's, for each degree to which forms may
+    differ (FORMS,).
+    """
     added = [_added(problem.stack, fitted, i) for i in range(len(fitted.effects))]
     net = [_net(problem, fitted, one) for one in added]
     bent = np.concatenate(
@@ -91,7 +97,9 @@ def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
 
 
 def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Array:
-    """The first two harmonics of a ripple's order (N, 4): times the ripple they give another shape. Else (N, 0)."""
+    """The first two harmonics of a ripple's order (N, 4): times the ripple they give another shape.
+    Else (N, 0).
+    """
     effect = build(fitted.effects, fitted.free, fitted.x)[number]
     if effect.fingerprint.covariate != "wheel_angle":
         return np.zeros((stack.size, 0))

@@ -23,7 +23,9 @@ AHEAD = 2  # cases in hand for every worker
 
 @dataclass(frozen=True)
 class Batch:
-    """What a batch is; `sealed` is public before any diagnosis, `secret` is what every case is drawn from."""
+    """What a batch is; `sealed` is public before any diagnosis, `secret` is what every case is
+    drawn from.
+    """
 
     output: Path
     cases: int
@@ -53,7 +55,9 @@ def _number(secret: str, purpose: str) -> int:
 
 
 def started(output: Path, cases: int, chosen: tuple[str, ...], seed: int | None) -> Batch:
-    """A new batch, from the operating system's randomness or from a seed. Raises CommandError where one is there."""
+    """A new batch, from the operating system's randomness or from a seed. Raises CommandError where
+    one is there.
+    """
     if (output / BATCH).exists():
         raise CommandError(f"{output}: found a batch; expected a new folder, or --resume", USAGE)
     secret = secrets.token_hex(32) if seed is None else f"seed {seed}"
@@ -86,7 +90,9 @@ def run(
     finished: Callable[[Spec], None],
     diagnosed: bool = True,
 ) -> None:
-    """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends the batch."""
+    """Every case that is not done: prepared, its seal told, then diagnosed if wanted. An error ends
+    the batch.
+    """
     waiting = [spec for spec in specs if not spec.done]
     waiting.reverse()
     active: dict[Future[Any], tuple[Spec, bool]] = {}

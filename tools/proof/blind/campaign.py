@@ -1,4 +1,6 @@
-"""Campaigns as an engineer would drive them: runs of steady stretches at several loads, slips and speeds."""
+"""Campaigns as an engineer would drive them: runs of steady stretches at several loads, slips and
+speeds.
+"""
 
 from __future__ import annotations
 
@@ -139,7 +141,9 @@ def _stretch(
 
 
 def orders(run: Run, radius: float, rate: float = RATE) -> Orders:
-    """What the controllers are told, smooth between the stretches. `radius` [m] is the one that is configured."""
+    """What the controllers are told, smooth between the stretches. `radius` [m] is the one that is
+    configured.
+    """
     time = np.arange(round(run.duration * rate)) / rate
     speed = _levels(run, time, [stretch.speed for stretch in run.stretches])
     slip = _levels(run, time, [stretch.slip for stretch in run.stretches])

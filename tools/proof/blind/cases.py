@@ -1,4 +1,6 @@
-"""One blind case: everything that is true of it, drawn from its own seed; and what of it is handed over."""
+"""One blind case: everything that is true of it, drawn from its own seed; and what of it is handed
+over.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,9 @@ class Case:
 
 
 def drawn(number: int, seed: int, assignment: Assignment) -> Case:
-    """A case from its seed. Campaigns are drawn until the effect shows as wanted, or the best of them is taken."""
+    """A case from its seed. Campaigns are drawn until the effect shows as wanted, or the best of
+    them is taken.
+    """
     rng = np.random.default_rng(seed)
     wanted = detect.LIMIT * LEVELS.get(assignment.level, 0.0)
     best: Case | None = None
@@ -128,7 +132,9 @@ def _fixed(assignment: Assignment) -> campaign.Habits:
 
 
 def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Trial]:
-    """Soil, rig, knowledge, sensors and campaign, in this order; campaigns that would bog the wheel are not driven."""
+    """Soil, rig, knowledge, sensors and campaign, in this order; campaigns that would bog the wheel
+    are not driven.
+    """
     while True:
         family, ground = knowledge.ground_drawn(rng)
         rig = knowledge.rig_drawn(rng)
@@ -151,7 +157,9 @@ def noise_factor(nothing: bool, rng: np.random.Generator) -> float:
 
 
 def _judged(case: Case, rng: np.random.Generator) -> Case:
-    """With the oracle's error, and the rivals that this campaign cannot tell from a single listed effect."""
+    """With the oracle's error, and the rivals that this campaign cannot tell from a single listed
+    effect.
+    """
     detector = Detector(case.trial)
     added = detector.refit_variance(case.effects)
     unit = {"current": case.trial.known.torque_constant.value**2}

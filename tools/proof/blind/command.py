@@ -1,4 +1,6 @@
-"""`gritd prove`: blind trials of the diagnosis, sealed, scored, resumable, on this computer or on a cluster."""
+"""`gritd prove`: blind trials of the diagnosis, sealed, scored, resumable, on this computer or on a
+cluster.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ OUTPUT = Path("proof")
 
 
 def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int:
-    """Run the trials, open the answers, print the score; 1 where a diagnosis failed. Raises CommandError."""
+    """Run the trials, open the answers, print the score; 1 where a diagnosis failed. Raises
+    CommandError.
+    """
     arguments = _parser().parse_args(argv)
     output: Path = arguments.output
     begun = batch.resumed(output) if arguments.resume else _started(arguments)

@@ -1,9 +1,11 @@
-"""How visible a concealed effect is, by the plant itself: what it changes beyond what the soil can imitate, in sigmas.
+"""How visible a concealed effect is, by the plant itself: what it changes beyond what the soil can
+imitate, in sigmas.
 
-The plant predicts every channel with the effect and without it, on the motion that the encoders tell. The difference
-is whitened at 5 Hz by the channels' own noise and by a floor of FLOOR of the channel's size, correlated over
-FLOOR_TIME, below which nobody believes a model of soil. Soil parameters, calibration constants and weights are then
-fitted to it (linearly, within their stated sigma). What is left, as a root of squares over all samples, is the
+The plant predicts every channel with the effect and without it, on the motion that the encoders
+tell. The difference is whitened at 5 Hz by the channels' own noise and by a floor of FLOOR of the
+channel's size, correlated over FLOOR_TIME, below which nobody believes a model of soil. Soil
+parameters, calibration constants and weights are then fitted to it (linearly, within their stated
+sigma). What is left, as a root of squares over all samples, is the
 detectability D: the effect costs a model that knows everything else D²/2 nats.
 """
 
@@ -104,7 +106,9 @@ class Detector:
         return float(np.sqrt(max(self._left(change) - float(gain), 0.0)))
 
     def rivals(self, effect: type[Effect], rng: np.random.Generator) -> Array:
-        """Changes (m, k) by an effect in as many shapes as it is granted, at a tenth of its largest strength."""
+        """Changes (m, k) by an effect in as many shapes as it is granted, at a tenth of its largest
+        strength.
+        """
         facts, count = self.facts(), SHAPES if len(fields(effect)) > 1 else 1
         drawn = [effect.drawn(rng, facts) for _ in range(count)]
         return np.stack(
@@ -112,10 +116,12 @@ class Detector:
         )
 
     def refit_variance(self, effects: Sequence[Effect]) -> dict[str, float]:
-        """What fitting adds to the error of a held-out run [SI²], by channel, expected, to first order.
+        """What fitting adds to the error of a held-out run [SI²], by channel, expected, to first
+        order.
 
-        The oracle knows the form of the effects. It fits their strengths, soil, weights and calibration to the other
-        runs (to the other two thirds of a single one) within what is stated of them.
+        The oracle knows the form of the effects. It fits their strengths, soil, weights and
+        calibration to the other runs (to the other two thirds of a single one) within what is
+        stated of them.
         """
         columns = [
             *self._nuisance,
@@ -130,10 +136,13 @@ class Detector:
                 sums.setdefault(channel, []).append(((rows @ covariance) * rows).sum(axis=1))
         return {channel: float(np.concatenate(parts).mean()) for channel, parts in sums.items()}
 
-    # ---- parts -------------------------------------------------------------------------------------------------------
+    # ---- parts -----------------------------------------------------------------------------------
+    # --------------------
 
     def _covariance(self, columns: Sequence[Signals], run: int, inside: Array) -> Array:
-        """Of the columns' amplitudes after a fit to everything but these samples of a run, unit priors."""
+        """Of the columns' amplitudes after a fit to everything but these samples of a run, unit
+        priors.
+        """
         kept = []
         for column in columns:
             rest = [dict(signals) for signals in column]
@@ -193,7 +202,9 @@ class Detector:
         return [_scaled(self._moved(ground=other), 1.0 / SMALL) for other in moved]
 
     def _weights(self) -> list[Signals]:
-        """One sigma of the weights, half of it alike in all runs, half each run's own; and of the carriage's travel."""
+        """One sigma of the weights, half of it alike in all runs, half each run's own; and of the
+        carriage's travel.
+        """
         half = self._trial.known.weight_share / np.sqrt(2.0)
         alike = _scaled(self._moved(heavier=SMALL * half), 1.0 / SMALL)
         carriage = self._trial.known.instruments["carriage_encoder"].scale
@@ -261,7 +272,9 @@ def _scaled_by(signals: Signals, factors: Sequence[float]) -> Signals:
 
 
 def _held_out(sizes: Sequence[int]) -> list[tuple[int, Array]]:
-    """What is held out in turn: a run and a mask (n,) of its samples. Whole runs, or thirds of a single one."""
+    """What is held out in turn: a run and a mask (n,) of its samples. Whole runs, or thirds of a
+    single one.
+    """
     if len(sizes) > 1:
         return [(run, np.ones(size, dtype=bool)) for run, size in enumerate(sizes)]
     third = np.arange(sizes[0]) * 3 // sizes[0]
@@ -336,7 +349,9 @@ def _mean_square(time: float) -> float:
 
 
 def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Effect, float]:
-    """The effect at the strength where its D is as wanted, and that D; at the largest strength where D stays below."""
+    """The effect at the strength where its D is as wanted, and that D; at the largest strength
+    where D stays below.
+    """
     found = detector.detectability([effect])
     if found <= wanted:
         return effect, found

@@ -1,4 +1,6 @@
-"""Effects that say the same in most campaigns, fixed before any trial: a sceptic's list, not the engine's."""
+"""Effects that say the same in most campaigns, fixed before any trial: a sceptic's list, not the
+engine's.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ GROUPS: tuple[frozenset[str], ...] = (
     frozenset(("pulley_slip", "wheel_radius_error")),  # slip off in proportion to travel
 )
 
-# Pairs for the stratum of confounded effects, and what the campaign must not contain for them to be confounded.
+# Pairs for the stratum of confounded effects, and what the campaign must not contain for them to be
+# confounded.
 CONFOUNDED: tuple[tuple[str, str, dict[str, bool | int]], ...] = (
     ("bed_slope", "force_crosstalk", {"reversal": False, "wrench": True}),
     ("side_wall_rubbing", "bed_slope", {"reversal": False, "wrench": True}),

@@ -28,7 +28,9 @@ TRUTH_RATE = 50.0  # [Hz] of the noiseless channels that judge held-out errors
 
 
 def write(case: Case, folder: Path) -> list[Path]:
-    """testbed.yaml, its CAN database and run-1.mcap … in a new folder. Returns the recordings. Raises OSError."""
+    """testbed.yaml, its CAN database and run-1.mcap … in a new folder. Returns the recordings.
+    Raises OSError.
+    """
     folder.mkdir(parents=True)
     text = configuration(case.stated(), case.trial.runs[0].weight)
     (folder / CONFIGURATION).write_text(text, encoding="utf-8")
@@ -82,7 +84,9 @@ def _weight_error(case: Case, weight: float) -> float:
 
 
 def truth(case: Case, number: int) -> dict[str, Array]:
-    """One run's noiseless channels as the configured calibration shows them, SI, at TRUTH_RATE; time from its start."""
+    """One run's noiseless channels as the configured calibration shows them, SI, at TRUTH_RATE;
+    time from its start.
+    """
     felt, known, chain = driven(case, number), case.trial.known, case.trial.chain
     every = round(campaign.RATE / TRUTH_RATE)
     true = {c.channel: c for c in (*chain.converters, *(chain.wrench or ()))}
@@ -109,7 +113,8 @@ def truth(case: Case, number: int) -> dict[str, Array]:
     return told
 
 
-# ---- configuration -------------------------------------------------------------------------------------------------
+# ---- configuration
+# -------------------------------------------------------------------------------------------------
 
 
 def configuration(known: Knowledge, nominal: float) -> str:

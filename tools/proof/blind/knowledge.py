@@ -1,4 +1,6 @@
-"""What is true of a testbed and what its configuration says: soil, calibration, noise. The two differ, within sigma."""
+"""What is true of a testbed and what its configuration says: soil, calibration, noise. The two
+differ, within sigma.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ class Stated:
 
 @dataclass(frozen=True)
 class Instrument:
-    """Calibration of one channel as configured, physical = raw · scale + offset, and its stated noise [raw]."""
+    """Calibration of one channel as configured, physical = raw · scale + offset, and its stated
+    noise [raw].
+    """
 
     scale: Stated
     offset: Stated
@@ -98,7 +102,9 @@ def rig_drawn(rng: np.random.Generator) -> Rig:
 
 
 def fitted(rig: Rig, heaviest: float, constant: Stated, rng: np.random.Generator) -> Rig:
-    """The rig with drives that its loads ask for: full torque slows the wheel by 4-12 mrad/s until they catch up."""
+    """The rig with drives that its loads ask for: full torque slows the wheel by 4-12 mrad/s until
+    they catch up.
+    """
     wheel = Servo(
         8e-4,
         heaviest * rig.radius / float(rng.uniform(0.004, 0.012)),
@@ -156,7 +162,9 @@ def _wrench(heaviest: float, torque: float, worse: float) -> dict[str, Instrumen
 
 
 def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
-    """The rig's sensors as they truly are: off their calibration by an error within its sigma, coloured noise."""
+    """The rig's sensors as they truly are: off their calibration by an error within its sigma,
+    coloured noise.
+    """
     made = {
         name: _converter(name, instrument, rng) for name, instrument in known.instruments.items()
     }
@@ -168,7 +176,9 @@ def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
 
 
 def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Converter:
-    """`said.noise` is the true total here; what the configuration will state may be wrong by a factor."""
+    """`said.noise` is the true total here; what the configuration will state may be wrong by a
+    factor.
+    """
     encoder = name.endswith("_encoder")
     share = 0.0 if encoder else float(rng.uniform(0.2, 0.6))
     white = 0.2 if encoder else said.noise * float(np.sqrt(1.0 - share**2))
@@ -190,7 +200,9 @@ def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Convert
 
 
 def _calibrated(said: Instrument, rng: np.random.Generator) -> tuple[float, float]:
-    """True scale and offset. Sensors are zeroed where they read nothing, so the gain errs about the physical zero."""
+    """True scale and offset. Sensors are zeroed where they read nothing, so the gain errs about the
+    physical zero.
+    """
     gain = _true(said.scale, rng) / said.scale.value
     return said.scale.value / gain, (2.0 * said.offset.value - _true(said.offset, rng)) / gain
 

@@ -1,4 +1,6 @@
-"""The score as one self-contained HTML page: tables, reliability, and the confusion matrix. No script, no network."""
+"""The score as one self-contained HTML page: tables, reliability, and the confusion matrix. No
+script, no network.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Counting: detection, names, probabilities, soil, parameters and held-out errors, by stratum, with intervals."""
+"""Counting: detection, names, probabilities, soil, parameters and held-out errors, by stratum, with
+intervals.
+"""
 
 from __future__ import annotations
 
@@ -141,7 +143,9 @@ def _unlisted(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def calibration(rows: Sequence[Row]) -> dict[str, Any]:
-    """Stated probability of the first name against how often it, or the group it was stated with, was right."""
+    """Stated probability of the first name against how often it, or the group it was stated with,
+    was right.
+    """
     spoken = [(row, row.first) for row in rows if row.first is not None]
     stated = np.array([said.probability for _, said in spoken])
     found: dict[str, Any] = {}

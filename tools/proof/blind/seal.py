@@ -1,4 +1,6 @@
-"""Sealing answers: a hash of them and of a salt, published before anyone is asked, checked when they are opened."""
+"""Sealing answers: a hash of them and of a salt, published before anyone is asked, checked when
+they are opened.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ def digest(sealed: dict[str, Any]) -> str:
 
 
 def close(path: Path, answers: dict[str, Any], files: dict[str, str] | None = None) -> str:
-    """Write answers with a fresh salt and the hashes of the files that belong to them; returns the seal."""
+    """Write answers with a fresh salt and the hashes of the files that belong to them; returns the
+    seal.
+    """
     sealed = {"salt": secrets.token_hex(32), "answers": answers, "files": files or {}}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(

@@ -97,7 +97,9 @@ def _cells(of: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
 
 
 def reliability(score: Mapping[str, Any]) -> Table:
-    """Stated probability of the first name against how often it, or the group it was stated with, was right."""
+    """Stated probability of the first name against how often it, or the group it was stated with,
+    was right.
+    """
     by_name, by_group = (score["calibration"][by]["table"] for by in ("name", "engine"))
     rows = [
         (
@@ -112,7 +114,9 @@ def reliability(score: Mapping[str, Any]) -> Table:
 
 
 def soil(score: Mapping[str, Any]) -> Table:
-    """Median relative error of c and tan φ before and after, and how often two sigma cover the truth after."""
+    """Median relative error of c and tan φ before and after, and how often two sigma cover the
+    truth after.
+    """
     head = (
         "soil, median error",
         "c before",

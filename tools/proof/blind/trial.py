@@ -1,4 +1,6 @@
-"""One trial: draw and seal the answers, hand over recordings and configuration, have them diagnosed elsewhere."""
+"""One trial: draw and seal the answers, hand over recordings and configuration, have them diagnosed
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ class Spec:
 
 
 def prepare(spec: Spec) -> str:
-    """Draw the case, write what is handed over, seal the answers; returns the seal. A finished step is not redone."""
+    """Draw the case, write what is handed over, seal the answers; returns the seal. A finished step
+    is not redone.
+    """
     if spec.seal.exists():
         return spec.seal.read_text(encoding="utf-8").strip()
     shutil.rmtree(spec.folder, ignore_errors=True)
@@ -79,7 +83,9 @@ def _truth(spec: Spec, case: cases.Case) -> dict[str, str]:
 
 
 def diagnose(spec: Spec) -> dict[str, Any]:
-    """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed over."""
+    """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed
+    over.
+    """
     given, result = spec.folder / "given", spec.folder / "result.json"
     files = sorted(path.name for path in given.glob("*.mcap"))
     command = [
@@ -119,7 +125,9 @@ def _run(command: list[str], folder: Path) -> tuple[int, str]:
 
 
 def _environment() -> dict[str, str]:
-    """Nothing of ours but where the code is; one thread for linear algebra, for cases run side by side."""
+    """Nothing of ours but where the code is; one thread for linear algebra, for cases run side by
+    side.
+    """
     kept = {
         name: value
         for name, value in os.environ.items()

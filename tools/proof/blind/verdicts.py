@@ -1,4 +1,6 @@
-"""What the diagnosis said of one case, beside what was true: one row of the score, before any counting."""
+"""What the diagnosis said of one case, beside what was true: one row of the score, before any
+counting.
+"""
 
 from __future__ import annotations
 
@@ -69,7 +71,9 @@ class Row:
         return self.first.effect if self.first else SPOKEN.get(self.verdict, FAILED)
 
     def right(self, name: str, by: str = "name") -> bool:
-        """Whether a name is that of a concealed effect, or of its group by `table`, or in this campaign by `plant`."""
+        """Whether a name is that of a concealed effect, or of its group by `table`, or in this
+        campaign by `plant`.
+        """
         if by == "table":
             return any(name in alike(true) for true in self.truth)
         if by == "plant":
@@ -187,7 +191,9 @@ def _quantity(said: Any) -> tuple[float, float]:
 
 
 def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, float]:
-    """Errors over sigma of parameters that plant and diagnosis state in the same terms, of accepted true effects."""
+    """Errors over sigma of parameters that plant and diagnosis state in the same terms, of accepted
+    true effects.
+    """
     stated = {said.effect: said.parameters for said in _hypotheses(result) if said.accepted}
     found = {}
     for effect in answers["concealed"]:
@@ -198,13 +204,16 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
     return found
 
 
-# ---- held-out error against the oracle -----------------------------------------------------------------------------
+# ---- held-out error against the oracle
+# -----------------------------------------------------------------------------
 
 
 def _heldout(
     result: Mapping[str, Any], answers: Mapping[str, Any], spec: Spec
 ) -> dict[str, tuple[float, float, float]]:
-    """Root mean square errors on the diagnosis' own held-out samples, beside those of the noiseless truth on them."""
+    """Root mean square errors on the diagnosis' own held-out samples, beside those of the noiseless
+    truth on them.
+    """
     sums: dict[str, list[np.ndarray[Any, Any]]] = {}
     begins = {f"run-{number}": run["begins"] for number, run in enumerate(answers["runs"], start=1)}
     for trace in result.get("traces") or ():

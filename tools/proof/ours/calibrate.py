@@ -1,10 +1,13 @@
-"""`python -m gritd.tools.proof.ours.calibrate FILE… --out OUT`: learn how far evidence is to be trusted.
+"""`python -m gritd.tools.proof.ours.calibrate FILE… --out OUT`: learn how far evidence is to be
+trusted.
 
-Each FILE holds trials (`python -m gritd.tools.proof.ours.trials --out FILE`). The temperature, the weights of how far forms may
-differ, and the odds are those that give the truth of every case the largest probability, on average: the
-logarithmic score, which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps what
-few cases do not tell. The truth of a case is any set of effects that holds a true one, weighted by how many of its
-effects are true; of a stranger, functions without a name.
+Each FILE holds trials (`python -m gritd.tools.proof.ours.trials --out FILE`). The temperature, the
+weights of how far forms may
+differ, and the odds are those that give the truth of every case the largest probability, on
+average: the logarithmic score, which only stated probabilities that are true maximise (Good 1952).
+A prior (START, PRIOR) keeps what few cases do not tell. The truth of a case is any set of effects
+that holds a true one, weighted by how many of its effects are true; of a stranger, functions
+without a name.
 """
 
 from __future__ import annotations
@@ -29,7 +32,8 @@ START = np.array(
     [np.log(2.0), *([0.0] * (FORMS - 1)), -2.5, -3.5, -3.0]
 )  # ln T, forms after the first, odds, lapse
 PRIOR = np.array([0.2, *([1.0] * (FORMS - 1)), 1.0, 1.0, 0.2])  # standard deviations about START
-# The lapse is nearly what it starts at: our own cases tell little of a plant that is not ours. On the independent plant
+# The lapse is nearly what it starts at: our own cases tell little of a plant that is not ours. On
+# the independent plant
 # 5 of 96 first names that were stated with 0.93 were wrong, in a sealed batch that had been opened.
 LEARNT_FROM = (
     "cousin",
@@ -105,7 +109,9 @@ def learn(cases: Sequence[dict[str, Any]]) -> tuple[Calibration, float]:
 
 
 def usable(cases: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Trials that alarmed, rightly, on what another author might have recorded: the others say nothing of names."""
+    """Trials that alarmed, rightly, on what another author might have recorded: the others say
+    nothing of names.
+    """
     return [c for c in cases if c.get("weighed") and c["stratum"] in LEARNT_FROM]
 
 

@@ -1,7 +1,9 @@
-"""Fresh cases from our own simulator, for measuring the diagnosis: drawn testbeds, soils, schedules, noise and effects.
+"""Fresh cases from our own simulator, for measuring the diagnosis: drawn testbeds, soils,
+schedules, noise and effects.
 
-Signals are made without a file: simulated at 250 Hz, counted and quantised as the sensors do, noise white and coloured,
-then averaged by the loader's own functions. Their truth stays with them. The sealed proof uses another plant.
+Signals are made without a file: simulated at 250 Hz, counted and quantised as the sensors do, noise
+white and coloured, then averaged by the loader's own functions. Their truth stays with them. The
+sealed proof uses another plant.
 """
 
 from __future__ import annotations
@@ -66,7 +68,9 @@ LACKS = ("runs", "loads", "force")  # of a poor campaign: one run, one load, no 
 
 
 def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
-    """A testbed, a soil inside what is known of it, a schedule; noise of any colour. lack: one of LACKS, or nothing."""
+    """A testbed, a soil inside what is known of it, a schedule; noise of any colour. lack: one of
+    LACKS, or nothing.
+    """
     settings = _known(settings, rng)
     count = 1 if lack == "runs" else int(rng.integers(4, 8))
     loads = rng.permutation(np.linspace(rng.uniform(30, 45), rng.uniform(80, 110), count))
@@ -97,7 +101,9 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
 
 
 def _plates(loads: Array, rng: np.random.Generator) -> Array:
-    """What the plates of each run are off by for themselves, in σ; the same load hangs on the same plates."""
+    """What the plates of each run are off by for themselves, in σ; the same load hangs on the same
+    plates.
+    """
     drawn = rng.standard_normal(loads.size)
     return drawn if np.ptp(loads) > 0.0 else np.full(loads.size, drawn[0])
 
@@ -267,7 +273,9 @@ def _read(plan: Plan, name: str, values: Array, rng: np.random.Generator, noisy:
 
 
 def scaled(effect: type[Effect], size: float, rng: np.random.Generator) -> Effect:
-    """The effect at `size` times its expected strength; bipolar strengths of either sign, shapes drawn."""
+    """The effect at `size` times its expected strength; bipolar strengths of either sign, shapes
+    drawn.
+    """
     values = {}
     for p in effect.parameters():
         if p.role == "strength":

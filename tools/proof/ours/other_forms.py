@@ -1,4 +1,5 @@
-"""Listed physics in other published forms, for trials: the name must survive a formula that is not ours.
+"""Listed physics in other published forms, for trials: the name must survive a formula that is not
+ours.
 
 The class's `stands_for` is the name the diagnosis should give.
 """

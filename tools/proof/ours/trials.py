@@ -1,9 +1,12 @@
-"""`python -m gritd.tools.proof.ours.trials`: the diagnosis on fresh cases of our own simulator, scored against their truth.
+"""`python -m gritd.tools.proof.ours.trials`: the diagnosis on fresh cases of our own simulator,
+scored against their truth.
 
-Strengths are three to five times the detection limit (strangers, which a listed effect must not be able to mimic, eight
-to fifteen times): the strength whose whitened signature, soil and calibration projected out, has a squared length of 16
-(four standard deviations) in the drawn campaign. An effect whose limit lies beyond three times its expected size cannot
-be seen in that campaign; another campaign is drawn for it.
+Strengths are three to five times the detection limit (strangers, which a listed effect must not be
+able to mimic, eight
+to fifteen times): the strength whose whitened signature, soil and calibration projected out, has a
+squared length of 16 (four standard deviations) in the drawn campaign. An effect whose limit lies
+beyond three times its expected size cannot be seen in that campaign; another campaign is drawn for
+it.
 """
 
 from __future__ import annotations

@@ -1,1 +1,3 @@
-"""Proofs on other laboratories' recordings: a channel is concealed, `gritd diagnose` speaks, the channel judges."""
+"""Proofs on other laboratories' recordings: a channel is concealed, `gritd diagnose` speaks, the
+channel judges.
+"""

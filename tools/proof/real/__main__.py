@@ -1,4 +1,6 @@
-"""`python -m gritd.tools.proof.real`: the five proofs on real recordings, and what docs/proof.md says of them."""
+"""`python -m gritd.tools.proof.real`: the five proofs on real recordings, and what docs/proof.md
+says of them.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ DOCS, PAGE = ROOT / "docs", "proof.md"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Redo the proofs and write their sections and figures. Exit 0; 1 if a command failed, the others are made.
+    """Redo the proofs and write their sections and figures. Exit 0; 1 if a command failed, the
+    others are made.
 
     A question that is missed is no failure of the command: it stands in the page.
     """

@@ -1,4 +1,6 @@
-"""Where a proof works: a folder of its own, the public data beside it, and the commands that a user would type."""
+"""Where a proof works: a folder of its own, the public data beside it, and the commands that a user
+would type.
+"""
 
 from __future__ import annotations
 

@@ -102,7 +102,9 @@ def _written(value: float, unit: str) -> Any:
 
 
 def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
-    """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of each channel."""
+    """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of
+    each channel.
+    """
     models = (
         [run.measured for run in judge.rig.runs],
         judge.predicted(None),
@@ -122,7 +124,9 @@ def _sorted(rows: Array) -> Array:
 
 
 def moduli(path: Path) -> tuple[float, float]:
-    """Exponent n and modulus [Pa/mⁿ] by least squares on the logarithms, the frame's yielding taken off the depth."""
+    """Exponent n and modulus [Pa/mⁿ] by least squares on the logarithms, the frame's yielding taken
+    off the depth.
+    """
     body = f"plate {PLATE * 1e3:.0f} mm"
     with path.open(encoding="utf-8") as stream:
         rows = [

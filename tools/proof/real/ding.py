@@ -1,4 +1,6 @@
-"""Ding et al. 2011: cohesion and friction angle from six points of a smooth wheel, against what was measured."""
+"""Ding et al. 2011: cohesion and friction angle from six points of a smooth wheel, against what was
+measured.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ def _run(bench: Bench) -> Finding:
 
 
 def _table(columns: list[Array]) -> Table:
-    """Every point as measured, by the published soil, by the fitted one, and with effects; then the errors."""
+    """Every point as measured, by the published soil, by the fitted one, and with effects; then the
+    errors.
+    """
     rows = [
         [f"{slip:.0%}", *(_four(c[1:, k]) for c in columns)] for k, slip in enumerate(columns[0][0])
     ]

@@ -1,4 +1,6 @@
-"""EMPS: a motor drive without soil, its friction concealed by not being in the model that the diagnosis starts from."""
+"""EMPS: a motor drive without soil, its friction concealed by not being in the model that the
+diagnosis starts from.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +70,9 @@ def _run(bench: Bench) -> Finding:
 
 @dataclass(frozen=True)
 class Regression:
-    """Force (n,) and what it may be made of (n, 4): acceleration, speed, its sign, one; all through one low-pass."""
+    """Force (n,) and what it may be made of (n, 4): acceleration, speed, its sign, one; all through
+    one low-pass.
+    """
 
     time: Array
     columns: Array
@@ -108,7 +112,9 @@ def _low_passed(values: Array, cutoff: float) -> Array:
 
 
 def stated(said: Said) -> Array:
-    """Mass, viscous friction, Coulomb friction and offset (4,) that the diagnosis states; 0 where it states none."""
+    """Mass, viscous friction, Coulomb friction and offset (4,) that the diagnosis states; 0 where
+    it states none.
+    """
     gain = config.loads(
         said.found["redo"]["configuration"], "emps.yaml"
     ).settings.drive.torque_constant.value

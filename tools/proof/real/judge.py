@@ -1,4 +1,5 @@
-"""What a diagnosis found, put to use on recordings it has not seen: predictions, and measurements freed of the effects.
+"""What a diagnosis found, put to use on recordings it has not seen: predictions, and measurements
+freed of the effects.
 
 The constants (soil, calibration) and accepted effects are read from the JSON alone.
 """
@@ -43,8 +44,8 @@ class Judge:
     def predicted(
         self, found: dict[str, Any] | None, when: str = "after"
     ) -> list[dict[str, Array]]:
-        """Every channel of every run: by the configuration alone (None), 'before' with the soil fitted without effects,
-        'after' with both.
+        """Every channel of every run: by the configuration alone (None), 'before' with the soil
+        fitted without effects, 'after' with both.
         """
         if found is None:
             return self.rig.predict(np.zeros(len(self.rig.constants)), ())
@@ -53,7 +54,9 @@ class Judge:
         )
 
     def freed(self, found: dict[str, Any], channel: str) -> list[Array]:
-        """A channel of every run less what the accepted effects of the rig, and its calibration, put on it."""
+        """A channel of every run less what the accepted effects of the rig, and its calibration,
+        put on it.
+        """
         u = self._constants(found, "after")
         acting = effects(found)
         ideal = [e for e in acting if e.stage not in RIG_STAGES]
@@ -70,7 +73,9 @@ class Judge:
         ]
 
     def means(self, channel: str, *series: Sequence[Array]) -> Array:
-        """Means (rows, conditions) of series of every run over each steady state, where the channel counts."""
+        """Means (rows, conditions) of series of every run over each steady state, where the channel
+        counts.
+        """
         parts = []
         for n, run in enumerate(self.rig.runs):
             number = np.floor((self.time(n) + 0.5 * PAUSE) / (DURATION + PAUSE))

@@ -1,4 +1,6 @@
-"""MGST: what the drivetrain consumes, and what the side wall takes, of a wheel in GRC-1 simulant at one speed."""
+"""MGST: what the drivetrain consumes, and what the side wall takes, of a wheel in GRC-1 simulant at
+one speed.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ DRAGS = ("side_wall_rubbing", "bed_slope", "force_crosstalk")
 
 @dataclass(frozen=True)
 class Held:
-    """One trial judged by a diagnosis that did not see it: concealed channel, as read, and freed of effects, (n,)."""
+    """One trial judged by a diagnosis that did not see it: concealed channel, as read, and freed of
+    effects, (n,).
+    """
 
     trial: str
     time: Array
@@ -54,7 +58,9 @@ class Held:
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden, how the importer hides it, and the channel that is freed and the one that judges it."""
+    """What is hidden, how the importer hides it, and the channel that is freed and the one that
+    judges it.
+    """
 
     name: str
     arguments: tuple[str, ...]
@@ -155,7 +161,8 @@ def _nearer(said: Said, held: Sequence[Held], unit: str) -> Asked:
     )
 
 
-# ---- the drivetrain ------------------------------------------------------------------------------------------------
+# ---- the drivetrain
+# ------------------------------------------------------------------------------------------------
 
 SPEED, TORQUE, CONSTANT = (
     0.462,
@@ -226,7 +233,8 @@ DRIVETRAIN = Proof(
     ),
 )
 
-# ---- the side wall -------------------------------------------------------------------------------------------------
+# ---- the side wall
+# -------------------------------------------------------------------------------------------------
 
 
 def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:

@@ -11,7 +11,9 @@ from gritd.tools.proof.real.bench import Bench, Said
 
 @dataclass(frozen=True)
 class Asked:
-    """One question of the judge. `reason`: why it was missed, as far as it was found out; shown only if it was."""
+    """One question of the judge. `reason`: why it was missed, as far as it was found out; shown
+    only if it was.
+    """
 
     question: str
     wanted: str
@@ -30,7 +32,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Panel:
-    """One drawing over x: the concealed truth, what stood without the diagnosis, and with it; rows of (4, n)."""
+    """One drawing over x: the concealed truth, what stood without the diagnosis, and with it; rows
+    of (4, n).
+    """
 
     title: str
     curves: Array

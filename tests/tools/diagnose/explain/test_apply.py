@@ -1,4 +1,6 @@
-"""A calibrated rig is the baseline: what a reference campaign taught is modelled, what is new later is named."""
+"""A calibrated rig is the baseline: what a reference campaign taught is modelled, what is new later
+is named.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def accepted(found: dict[str, Any]) -> set[str]:
 
 @pytest.mark.slow
 def test_what_is_new_in_a_later_campaign_is_what_is_named(tmp_path: Path) -> None:
-    """By the command line: friction found on a smooth wheel, applied; then a wheel with lugs on the same rig."""
+    """By the command line: friction found on a smooth wheel, applied; then a wheel with lugs on the
+    same rig.
+    """
     friction = "coulomb_friction.loss=0.25"
     lugs = (
         "grousers.height=0.005",

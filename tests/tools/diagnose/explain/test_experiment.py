@@ -1,4 +1,6 @@
-"""The next experiment: feasible, sensible for the verdict, its gain bounded and less where the soil takes it up."""
+"""The next experiment: feasible, sensible for the verdict, its gain bounded and less where the soil
+takes it up.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def proposed(found: Diagnosis) -> str:
 
 @pytest.mark.slow
 def test_rivals_are_told_apart_by_what_they_do_differently() -> None:
-    """Without reversal a constant loss and one that differs by direction are the same; driving back tells."""
+    """Without reversal a constant loss and one that differs by direction are the same; driving back
+    tells.
+    """
     found = diagnosed(plan(), (make("coulomb_friction", {"loss": 0.25}),))
     group = {h.effect for h in found.accepted} | set(found.accepted[0].indistinguishable_from)
     assert "asymmetric_friction" in group

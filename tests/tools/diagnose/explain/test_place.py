@@ -1,4 +1,6 @@
-"""Where the misfit lives: change points where something starts or stops, none where it drifts, words with numbers."""
+"""Where the misfit lives: change points where something starts or stops, none where it drifts,
+words with numbers.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,9 @@ def explained(search: Search, base: Model, effect: Effect) -> Model:
 
 @cache
 def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Location, ...]:
-    """Places of the misfit that one effect makes; `repeated`: the same drive in every run, each another pass."""
+    """Places of the misfit that one effect makes; `repeated`: the same drive in every run, each
+    another pass.
+    """
     drawn = plan(loads=(70.0,) * 4 if repeated else (40.0, 70.0, 100.0), seed=3)
     if repeated:
         first = drawn.motions[0]
@@ -112,7 +116,9 @@ def test_passes_differ_from_the_second_on() -> None:
 
 @pytest.mark.slow
 def test_noise_alone_has_no_change_points() -> None:
-    """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a change point."""
+    """Forty campaigns without a left-out effect, noise of any size and colour: at most 5 % with a
+    change point.
+    """
     settings = config.load(packaged()).settings
     alarms = 0
     for seed in range(40):

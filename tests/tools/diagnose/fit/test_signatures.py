@@ -1,4 +1,6 @@
-"""Signatures: the derivative of what is measured by a strength, also where the full strength would run away."""
+"""Signatures: the derivative of what is measured by a strength, also where the full strength would
+run away.
+"""
 
 from typing import Any
 
@@ -11,7 +13,9 @@ SHAPE = {"duration": 100.0}
 
 
 class Bench:
-    """Ten values of about 1 that grow with the strength, and past `limit` without bound, as a motor that runs away."""
+    """Ten values of about 1 that grow with the strength, and past `limit` without bound, as a motor
+    that runs away.
+    """
 
     size, measured = 10, np.linspace(0.5, 1.5, 10)
 

@@ -57,7 +57,9 @@ def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:
 
 
 def test_rounding_is_no_direction_of_the_saturated_mean() -> None:
-    """What an effect does not change comes out of a solver as 1e-12: scaled to unit size it would take noise away."""
+    """What an effect does not change comes out of a solver as 1e-12: scaled to unit size it would
+    take noise away.
+    """
     rng = np.random.default_rng(7)
     residual, effects, sure = (
         rng.standard_normal(400),
@@ -91,7 +93,9 @@ def test_log_bayes_is_the_integral() -> None:
 
 
 def test_strain_against_the_prior_is_evidence() -> None:
-    """An effect that a constant of the base model absorbs: the residual is noise, the strained prior names it."""
+    """An effect that a constant of the base model absorbs: the residual is noise, the strained
+    prior names it.
+    """
     rng = np.random.default_rng(3)
     direction = rng.standard_normal(400)
     direction /= np.linalg.norm(direction)

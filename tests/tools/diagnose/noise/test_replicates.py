@@ -1,4 +1,6 @@
-"""Runs of one condition, one after the other: what they differ by, in means, drifts and phases, is no physics."""
+"""Runs of one condition, one after the other: what they differ by, in means, drifts and phases, is
+no physics.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,9 @@ def wandering(stack: Any, mean: float, drift: float, seed: int = 0) -> Array:
 
 
 def own(stack: Any, residual: Array, waves: Array | None = None) -> Array:
-    """Root mean square (m,) of what a run may do for itself: offset, drifts, waves; one column of each kind."""
+    """Root mean square (m,) of what a run may do for itself: offset, drifts, waves; one column of
+    each kind.
+    """
     standing = np.zeros((stack.size, 0)) if waves is None else waves
     found = replicates.own_columns(stack, residual, (NOISE,), standing)
     return np.asarray(np.sqrt(np.mean(found[stack.run == 0] ** 2, axis=0)))
@@ -122,11 +126,14 @@ def waves_of(stack: Any) -> Array:
 
 
 def test_what_was_held_does_not_fall_on_an_edge() -> None:
-    """70 % slip is 17.5 cells of 4 %: half of the values on either side, were the edges where they fall."""
+    """70 % slip is 17.5 cells of 4 %: half of the values on either side, were the edges where they
+    fall.
+    """
     assert len(np.unique(replicates.cells(stack_of(0.7)))) == 1
 
 
-# ---- whole diagnoses of campaigns that repeat a condition -----------------------------------------------------------
+# ---- whole diagnoses of campaigns that repeat a condition
+# -----------------------------------------------------------
 
 
 def repeated(slow: float = 0.0, seed: int = 1) -> Plan:

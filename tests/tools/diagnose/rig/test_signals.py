@@ -1,4 +1,6 @@
-"""Recordings to a grid: jitter, dropped samples and single bad readings must not move what is compared."""
+"""Recordings to a grid: jitter, dropped samples and single bad readings must not move what is
+compared.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ EDGES = np.arange(0.0, 5.05, 0.1)
 
 @given(st.integers(0, 2**31), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
 def test_a_line_stays_a_line(seed: int, offset: float, rate: float) -> None:
-    """Jittered stamps with a fifth of the samples dropped: values and slopes of a line are exact inside."""
+    """Jittered stamps with a fifth of the samples dropped: values and slopes of a line are exact
+    inside.
+    """
     rng = np.random.default_rng(seed)
     time = np.sort(rng.uniform(0.0, 5.0, 1000))[rng.random(1000) > 0.2]
     values = offset + rate * time
@@ -40,7 +44,9 @@ def test_one_wild_reading_does_not_move_the_mean() -> None:
 
 
 def test_a_steady_speed_is_averaged_longer_than_a_step() -> None:
-    """Coarse counts at creeping speed: quiet where steady, yet a step in speed is not smeared beyond its neighbours."""
+    """Coarse counts at creeping speed: quiet where steady, yet a step in speed is not smeared
+    beyond its neighbours.
+    """
     time = np.arange(0.0, 5.0, 0.004)
     travel = np.where(time < 2.5, 0.01 * time, 0.025 + 0.02 * (time - 2.5))
     rng = np.random.default_rng(3)

@@ -1,4 +1,6 @@
-"""Which values count: nothing next to a start, a stop, a reversal or a touch-down, on either side alike."""
+"""Which values count: nothing next to a start, a stop, a reversal or a touch-down, on either side
+alike.
+"""
 
 from __future__ import annotations
 

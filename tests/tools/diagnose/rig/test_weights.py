@@ -1,4 +1,6 @@
-"""Which weights a run was driven with: as it states, as the configuration states, or as the sensor tells."""
+"""Which weights a run was driven with: as it states, as the configuration states, or as the sensor
+tells.
+"""
 
 from __future__ import annotations
 

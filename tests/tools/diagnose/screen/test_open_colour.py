@@ -1,4 +1,6 @@
-"""Noise of unknown colour: a misfit stands out of any, a trend that slow noise makes as easily does not."""
+"""Noise of unknown colour: a misfit stands out of any, a trend that slow noise makes as easily does
+not.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ def searched(drawn: Plan, *acting: str) -> tuple[Search, Model]:
 
 
 def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
-    """Two thirds of the variance keep 3 s of memory; with the colour assumed, half a dozen names stand out."""
+    """Two thirds of the variance keep 3 s of memory; with the colour assumed, half a dozen names
+    stand out.
+    """
     search, _ = searched(plan(slow=0.3, slow_time=3.0, noise=2.0, seed=7))
     found = search.screens[()]
     assert found.largest[1] > found.threshold

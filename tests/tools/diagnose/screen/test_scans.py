@@ -1,4 +1,6 @@
-"""Waves and steps without a name: found where they are, paid for by how many are tried, and no part of the noise."""
+"""Waves and steps without a name: found where they are, paid for by how many are tried, and no part
+of the noise.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +65,9 @@ def test_noise_of_any_colour_holds_no_line() -> None:
 
 
 def test_a_line_is_no_noise() -> None:
-    """Less than a third of slow noise in power, with another phase in every run: it stands out, and where it is."""
+    """Less than a third of slow noise in power, with another phase in every run: it stands out, and
+    where it is.
+    """
     made, rng = stack(), np.random.default_rng(2)
     noise = coloured(made.gaps, 1, Colour(1.0, 0.5, 0.7, 0.2), rng)[:, 0]
     line = 0.75 * np.sin(2.0 * np.pi * made.time / 1.3 + 2.0 * made.run)
@@ -130,7 +134,9 @@ def test_a_joint_of_the_rails_is_found_where_it_is() -> None:
 
 
 def test_what_was_tried_is_paid_for() -> None:
-    """Of noise alone no wave or step has evidence that would bear its share among all that were tried."""
+    """Of noise alone no wave or step has evidence that would bear its share among all that were
+    tried.
+    """
     search, model, found = screened(None, 0.0)
     assert not found.alarmed
     assert not candidates(search.scans, search.problem, model.fitted)

@@ -58,7 +58,9 @@ def _evidence(acting: Sequence[Effect], name: str) -> Any:
 
 
 def test_another_published_form_keeps_its_name() -> None:
-    """Lorentz's break-away friction is not our Gaussian: with a discrepancy it is evident, ours needs none."""
+    """Lorentz's break-away friction is not our Gaussian: with a discrepancy it is evident, ours
+    needs none.
+    """
     ours = _evidence((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
     other = _evidence((LorentzStribeck(size=1.5),), "stribeck_friction")
     assert np.argmax(ours) == 0
@@ -91,7 +93,9 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
 def test_an_explanation_that_leaves_much_is_none(
     left: float, verdict: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Five hundred nats gained, by far more than functions without a name alone; what stands out beside it decides."""
+    """Five hundred nats gained, by far more than functions without a name alone; what stands out
+    beside it decides.
+    """
     monkeypatch.setattr(decide, "remaining", lambda *_: (left, left > 0.0))
     base, best = (
         SimpleNamespace(names=n, fitted=SimpleNamespace(objective=o))

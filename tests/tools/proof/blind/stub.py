@@ -1,4 +1,5 @@
-"""A diagnoser that knows nothing of soil: it stands for `gritd diagnose` where only the trial around it is tested.
+"""A diagnoser that knows nothing of soil: it stands for `gritd diagnose` where only the trial
+around it is tested.
 
     python -m tests.proof.stub FILES --config F --json OUT
 

@@ -1,4 +1,6 @@
-"""The plant shares no physics with what it judges, and the proof none with the diagnosis: by imports, and when run."""
+"""The plant shares no physics with what it judges, and the proof none with the diagnosis: by
+imports, and when run.
+"""
 
 import ast
 import subprocess

@@ -1,4 +1,6 @@
-"""The plant against independent quadrature, mechanics that must hold, and (for the bare equations) the estimator."""
+"""The plant against independent quadrature, mechanics that must hold, and (for the bare equations)
+the estimator.
+"""
 
 from dataclasses import replace
 
@@ -52,7 +54,8 @@ def test_integrals_agree_with_adaptive_quadrature(
     load = r * b * whole(lambda t: sigma(t) * np.cos(t) + tau(t) * np.sin(t))
     torque = r * r * b * whole(tau)
     pull = r * b * whole(lambda t: tau(t) * np.cos(t) - sigma(t) * np.sin(t))
-    # behind the wheel shear changes sign where the rim rolls faster than it slips: a kink costs digits
+    # behind the wheel shear changes sign where the rim rolls faster than it slips: a kink costs
+    # digits
     close = 1e-6 if rebound == 0.0 else 2e-3
     assert felt.load[0] == pytest.approx(load, rel=close)
     assert felt.torque[0] == pytest.approx(torque, rel=close, abs=close * load * r)
@@ -60,7 +63,9 @@ def test_integrals_agree_with_adaptive_quadrature(
 
 
 def test_without_effects_it_is_the_papers_wheel() -> None:
-    """Same equations, other code: where nothing is concealed the estimator's forward model must agree when steady."""
+    """Same equations, other code: where nothing is concealed the estimator's forward model must
+    agree when steady.
+    """
     felt = drive(WORLD, run(passes=1))
     m = felt.scene.motion
     told = ToldMotion(m.time, m.turn, m.omega, m.travel, m.speed, felt.load)

@@ -1,4 +1,6 @@
-"""The vertical axis: the entry angle at which the soil carries the weight, and how the axle gets there."""
+"""The vertical axis: the entry angle at which the soil carries the weight, and how the axle gets
+there.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ CLOSE = 1e-8  # relative error of the load at which the search ends
 
 
 def balance(load_at: Callable[[Array], Array], weight: Array, guess: Array) -> Array:
-    """θ₁ (n,) where `load_at(θ₁)` is the weight [N], by secants in ln W over ln θ₁, where it is nearly a line."""
+    """θ₁ (n,) where `load_at(θ₁)` is the weight [N], by secants in ln W over ln θ₁, where it is
+    nearly a line.
+    """
     wanted = np.log(np.maximum(weight, 1e-6))
     old = np.log(np.clip(guess, SHALLOWEST, DEEPEST))
     new = np.log(np.clip(1.02 * np.exp(old), SHALLOWEST, 0.999 * DEEPEST))

@@ -1,7 +1,8 @@
 """Stresses under the rim, Eqs. (1)-(10), integrated by tanh-sinh; arrays (n,), one value a sample.
 
-Equation numbers are those of Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42, 1-13. Angles θ [rad] count from
-bottom dead centre, positive forward. Everything here is for forward travel; `respond` mirrors it.
+Equation numbers are those of Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42, 1-13. Angles
+θ [rad] count from bottom dead centre, positive forward. Everything here is for forward travel;
+`respond` mirrors it.
 """
 
 from __future__ import annotations
@@ -58,7 +59,9 @@ class Reaction(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Nodes of one zone, arrays (n, m): θ₁ − θ, its shadow in the front zone for Eq. (4), weights dθ."""
+    """Nodes of one zone, arrays (n, m): θ₁ − θ, its shadow in the front zone for Eq. (4), weights
+    dθ.
+    """
 
     turned: Array
     shadow: Array
@@ -79,7 +82,9 @@ def reaction(
 
 
 def exit_angle(rim: Rim, theta_1: Array) -> Array:
-    """−θ₂: where soil that springs back by a share of the sinkage leaves the rim (Ishigami et al. 2007)."""
+    """−θ₂: where soil that springs back by a share of the sinkage leaves the rim (Ishigami et al.
+    2007).
+    """
     share = np.clip(rim.rebound, 0.0, 1.0)
     return np.asarray(2.0 * np.arcsin(np.sqrt(share) * np.sin(0.5 * theta_1)))
 
@@ -127,9 +132,11 @@ def _sine_gap(entry: Array, turned: Array) -> Array:
 
 
 def mobilised(x: Array, overshoot: Array | float) -> Array:
-    """Share of the residual strength mobilised at x = j/k: Eq. (2) and a hump P x e^(1 − x) that dies out.
+    """Share of the residual strength mobilised at x = j/k: Eq. (2) and a hump P x e^(1 − x) that
+    dies out.
 
-    The hump is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay to a residual.
+    The hump is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay to a
+    residual.
     """
     far = np.abs(x)
     fading = np.exp(-far)

@@ -1,4 +1,6 @@
-"""The shape of a concealed effect. Each acts where its physics acts; off, at strength 0, it changes nothing."""
+"""The shape of a concealed effect. Each acts where its physics acts; off, at strength 0, it changes
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ class Facts:
 class Effect:
     """One physical effect of one strength; subclasses add shapes as fields, with their draw.
 
-    `most` is the largest strength still plausible on a testbed; `signed` says that it may have either sign.
+    `most` is the largest strength still plausible on a testbed; `signed` says that it may have
+    either sign.
     """
 
     strength: float

@@ -1,4 +1,5 @@
-"""Tanh-sinh quadrature on a fixed grid: the stresses' fractional powers at the entry angle cost it no accuracy.
+"""Tanh-sinh quadrature on a fixed grid: the stresses' fractional powers at the entry angle cost it
+no accuracy.
 
 Source: Takahasi and Mori (1974), Publ. RIMS 9, 721-741: x = tanh(π/2 sinh t), trapezoids in t.
 """
@@ -19,7 +20,9 @@ STEP, REACH = (
 
 
 class Rule(NamedTuple):
-    """On (0, 1): distance of the nodes from either end, exact however near, and weights; arrays (m,)."""
+    """On (0, 1): distance of the nodes from either end, exact however near, and weights; arrays
+    (m,).
+    """
 
     from_start: Array
     to_end: Array

@@ -1,4 +1,6 @@
-"""The chain: motion in, what the sensors would read without noise out. Time samples at once, one run at a time."""
+"""The chain: motion in, what the sensors would read without noise out. Time samples at once, one
+run at a time.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,8 @@ class Orders:
 
 
 def respond(world: World, motion: Motion, damped: bool = True, near: Array | None = None) -> Felt:
-    """What is felt and read when the rig moves like this. Undamped, the axle is in balance at every sample.
+    """What is felt and read when the rig moves like this. Undamped, the axle is in balance at every
+    sample.
 
     `near`: entry angles (n,) of a similar case, where the search for the balance starts.
     """
@@ -132,7 +135,9 @@ def _contact(world: World, scene: Scene, damped: bool) -> Scene:
 
 
 def _balanced(scene: Scene, radius: float, weight: Array) -> Array:
-    """θ₁ (n,) at which the soil carries the weight, solved on a grid not finer than the axle can follow."""
+    """θ₁ (n,) at which the soil carries the weight, solved on a grid not finer than the axle can
+    follow.
+    """
     every = _every(scene.motion.time, COARSE)
     time, width, ratio = scene.motion.time, scene.rig.width, scene.ratio[::every]
     ground, rim = thinned(scene.ground, every), thinned(scene.rim, every)

@@ -1,4 +1,6 @@
-"""What the plant's physics may know: the rig, the motion of one run, and the state of the wheel in it."""
+"""What the plant's physics may know: the rig, the motion of one run, and the state of the wheel in
+it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from gritd.tools.proof.blind.plant.contact import Ground, Rim
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.servo import Servo
 
-REST = 1.5e-3  # [m/s] below about this rim and carriage creep: soil forces fade out, shear has no distance to build up
+# [m/s] below about this rim and carriage creep: soil forces fade out, shear has no distance to
+# build up
+REST = 1.5e-3
 HANGING = -5e-3  # [m] sinkage of a lifted wheel
 
 

@@ -1,4 +1,6 @@
-"""The sensor chain: when a sample is taken, what the converter makes of it, and which samples never arrive."""
+"""The sensor chain: when a sample is taken, what the converter makes of it, and which samples never
+arrive.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +82,9 @@ class Chain:
 def readings(
     chain: Chain, felt: Felt, pulley: float, begins: int, rng: np.random.Generator
 ) -> list[Reading]:
-    """What the devices send in one run, by time of receipt; `begins` is the run's start [ns since the epoch]."""
+    """What the devices send in one run, by time of receipt; `begins` is the run's start [ns since
+    the epoch].
+    """
     time = felt.scene.motion.time - felt.scene.motion.time[0]
     signals = {
         "wheel_encoder": felt.scene.motion.turn,

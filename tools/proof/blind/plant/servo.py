@@ -1,4 +1,6 @@
-"""Wheel and carriage under their speed controllers: what they really do when the soil pulls at them."""
+"""Wheel and carriage under their speed controllers: what they really do when the soil pulls at
+them.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from gritd.tools.proof.blind.plant.quadrature import Array
 
 @dataclass(frozen=True)
 class Servo:
-    """A PI speed loop around an inertia; gain in force per speed, SI of its axis (N·m·s/rad or N·s/m)."""
+    """A PI speed loop around an inertia; gain in force per speed, SI of its axis (N·m·s/rad or
+    N·s/m).
+    """
 
     inertia: float  # [kg·m²] or [kg]
     gain: float
@@ -19,9 +23,11 @@ class Servo:
 
 
 def follow(servo: Servo, wanted: Array, against: Array, step: float, substeps: int = 2) -> Array:
-    """Speed (n,) of an axis told to run at `wanted` (n,) while the force or torque `against` (n,) holds it back.
+    """Speed (n,) of an axis told to run at `wanted` (n,) while the force or torque `against` (n,)
+    holds it back.
 
-    Fixed steps, implicit in the speed: m u̇ = P (u* − u) + (P/T)∫(u* − u)dt − F. Starts at rest in balance.
+    Fixed steps, implicit in the speed: m u̇ = P (u* − u) + (P/T)∫(u* − u)dt − F. Starts at rest in
+        balance.
     """
     h = step / substeps
     integral_gain = servo.gain / servo.reset

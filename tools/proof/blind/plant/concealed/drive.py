@@ -17,8 +17,8 @@ BRISTLE = 2e-3  # [rad] the wheel turns before the bristles slip
 def lugre(omega: Array, level: Array, step: float) -> Array:
     """Friction torque (n,) at level g(ω) (n,): ż = ω − |ω| z/z₀, T = g z/z₀, exact over each step.
 
-    Source: Canudas de Wit, Olsson, Åström, Lischinsky (1995), IEEE Trans. Automatic Control 40, 419-425, without
-    its micro-damping.
+    Source: Canudas de Wit, Olsson, Åström, Lischinsky (1995), IEEE Trans. Automatic Control 40,
+    419-425, without its micro-damping.
     """
     bent, shares = 0.0, []
     for speed in omega.tolist():
@@ -105,7 +105,9 @@ class AsymmetricFriction(Effect):
 
 @dataclass(frozen=True)
 class GearRipple(Effect):
-    """A tooth-mesh ripple with its second harmonic. Source: transmission error of a spur gear is no pure sine."""
+    """A tooth-mesh ripple with its second harmonic. Source: transmission error of a spur gear is no
+    pure sine.
+    """
 
     order: int = 24
     phase: float = 0.0
@@ -130,10 +132,13 @@ class GearRipple(Effect):
 
 @dataclass(frozen=True)
 class MotorHeating(Effect):
-    """Winding and housing, each with its temperature; the magnets follow the housing, the flux falls with them.
+    """Winding and housing, each with its temperature; the magnets follow the housing, the flux
+    falls with them.
 
-    τ₁ u̇ = I² (1 + ρ u) − (u − w), τ₂ ẇ = (u − w) − w/2; K_t falls by β (0.3 u + 0.7 w) of itself. u, w in A².
-    Source: two-body thermal network, Hendershot and Miller (2010), Design of Brushless Permanent-Magnet Machines.
+    τ₁ u̇ = I² (1 + ρ u) − (u − w), τ₂ ẇ = (u − w) − w/2; K_t falls by β (0.3 u + 0.7 w) of itself.
+    u, w in A².
+    Source: two-body thermal network, Hendershot and Miller (2010), Design of Brushless
+        Permanent-Magnet Machines.
     """
 
     winding: float = 15.0  # τ₁ [s]
@@ -160,7 +165,9 @@ class MotorHeating(Effect):
 
 @dataclass(frozen=True)
 class TorqueConstantError(Effect):
-    """The torque per ampere is K_t (1 + e) while the motor drives; e < 0 is a gear that loses a share."""
+    """The torque per ampere is K_t (1 + e) while the motor drives; e < 0 is a gear that loses a
+    share.
+    """
 
     name, signed, most = "torque_constant_error", True, 0.3
 

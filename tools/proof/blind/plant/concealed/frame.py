@@ -30,7 +30,9 @@ class BedSlope(Effect):
 
 @dataclass(frozen=True)
 class FrameCompliance(Effect):
-    """z_read = z + C W/(1 + W/W_h): joints close, so the frame stiffens under load. Source: contact stiffening."""
+    """z_read = z + C W/(1 + W/W_h): joints close, so the frame stiffens under load. Source: contact
+    stiffening.
+    """
 
     hardening: float = 1e3  # W_h [N]
 
@@ -49,10 +51,11 @@ class FrameCompliance(Effect):
 
 @dataclass(frozen=True)
 class LoadAxisFriction(Effect):
-    """The axis holds back by a spring of stiffness F/δ that slips at ±F. The wheel was lowered: it starts at +F.
+    """The axis holds back by a spring of stiffness F/δ that slips at ±F. The wheel was lowered: it
+    starts at +F.
 
-    Source: elasto-plastic (Prandtl) element; Al-Bender, Lampaert, Swevers (2005), IEEE Trans. Automatic Control 50,
-    1883-1887, its single-element case.
+    Source: elasto-plastic (Prandtl) element; Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
+    Automatic Control 50, 1883-1887, its single-element case.
     """
 
     breakaway: float = 2e-4  # δ [m]

@@ -1,4 +1,6 @@
-"""Effects of the soil itself: strength and stiffness that change with time, place, pass, speed and slip."""
+"""Effects of the soil itself: strength and stiffness that change with time, place, pass, speed and
+slip.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,11 @@ SLOWEST = 1e-3  # [m/s] keeps a standing wheel's rates finite
 
 @dataclass(frozen=True)
 class DryingCohesion(Effect):
-    """c (1 + a √(t/t₀)), t₀ the length of one run: loss limited by the soil grows with the root of time.
+    """c (1 + a √(t/t₀)), t₀ the length of one run: loss limited by the soil grows with the root of
+    time.
 
-    Source: Black, Gardner, Thurtell (1969), Soil Sci. Soc. Am. Proc. 33, 655-660 (evaporation from a drying bed).
+    Source: Black, Gardner, Thurtell (1969), Soil Sci. Soc. Am. Proc. 33, 655-660 (evaporation from
+        a drying bed).
     """
 
     span: float = 30.0  # t₀ [s]
@@ -36,9 +40,11 @@ class DryingCohesion(Effect):
 
 @dataclass(frozen=True)
 class Multipass(Effect):
-    """K Nᵃ, c N^(a/2), k N^(−a/3) on the N-th pass: density grows with the logarithm of the number of passes.
+    """K Nᵃ, c N^(a/2), k N^(−a/3) on the N-th pass: density grows with the logarithm of the number
+    of passes.
 
-    Source: power law of repeated passes, Abebe, Tanaka, Yamazaki (1989), J. Terramechanics 26, 275-283.
+    Source: power law of repeated passes, Abebe, Tanaka, Yamazaki (1989), J. Terramechanics 26,
+        275-283.
     """
 
     name, most = "multipass", 0.8

@@ -14,10 +14,11 @@ from gritd.tools.proof.blind.plant.scene import Scene
 
 @dataclass(frozen=True)
 class RateDependentShear(Effect):
-    """Strength times 1 + (λ/ln 10) [asinh(u/u₀) − asinh(v₀/u₀)], u the rim's speed, v₀ = 20 mm/s, u₀ = 2 mm/s.
+    """Strength times 1 + (λ/ln 10) [asinh(u/u₀) − asinh(v₀/u₀)], u the rim's speed, v₀ = 20 mm/s,
+    u₀ = 2 mm/s.
 
-    Source: rate process theory (Eyring): strength goes with the inverse hyperbolic sine of the rate; Mitchell and
-    Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12.
+    Source: rate process theory (Eyring): strength goes with the inverse hyperbolic sine of the
+    rate; Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12.
     """
 
     name, most = "rate_dependent_shear", 0.15
@@ -31,7 +32,8 @@ class RateDependentShear(Effect):
 class RearContact(Effect):
     """Soil springs back by a share κ of the sinkage: cos θ₂ = 1 − κ (1 − cos θ₁).
 
-    Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, wheel sinkage ratio.
+    Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, wheel sinkage
+        ratio.
     """
 
     name, most = "rear_contact", 0.3
@@ -42,7 +44,9 @@ class RearContact(Effect):
 
 @dataclass(frozen=True)
 class ShearPeak(Effect):
-    """τ over its residual has a hump P (j/k) e^(1 − j/k). Source: form after Oida (1979); see `contact.mobilised`."""
+    """τ over its residual has a hump P (j/k) e^(1 − j/k). Source: form after Oida (1979); see
+    `contact.mobilised`.
+    """
 
     name, most = "shear_peak", 0.8
 
@@ -54,7 +58,8 @@ class ShearPeak(Effect):
 class StressPeakShift(Effect):
     """θₘ/θ₁ = ½ + s [a + (1 − a) tanh(2 i)]: forward with slip, levelling off.
 
-    Source: data of Wong and Reece (1967), J. Terramechanics 4(1), 81-98, which bend down at high slip.
+    Source: data of Wong and Reece (1967), J. Terramechanics 4(1), 81-98, which bend down at high
+        slip.
     """
 
     share: float = 0.5  # a

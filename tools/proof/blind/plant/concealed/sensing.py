@@ -58,9 +58,11 @@ class ForceCrosstalk(Effect):
 
 @dataclass(frozen=True)
 class PulleySlip(Effect):
-    """The belt creeps on the pulley by s + s' |F|, F what it transmits: the encoder sees less than the travel.
+    """The belt creeps on the pulley by s + s' |F|, F what it transmits: the encoder sees less than
+    the travel.
 
-    Source: elastic creep goes with the tension difference, Johnson (1985), Contact Mechanics, section 8.2.
+    Source: elastic creep goes with the tension difference, Johnson (1985), Contact Mechanics,
+        section 8.2.
     """
 
     loading: float = 0.0  # how much of the creep goes with the force

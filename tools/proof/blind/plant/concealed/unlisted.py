@@ -1,4 +1,6 @@
-"""Physics that no library lists, for which the right answer is that none of the listed effects explains it."""
+"""Physics that no library lists, for which the right answer is that none of the listed effects
+explains it.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +72,9 @@ class PotentiometerDrift(Effect):
 
 @dataclass(frozen=True)
 class MagneticSaturation(Effect):
-    """Iron saturates: torque K_t I (1 − (I/I_s)²); strength is the shortfall at the typical current."""
+    """Iron saturates: torque K_t I (1 − (I/I_s)²); strength is the shortfall at the typical
+    current.
+    """
 
     typical: float = 1.0
 
@@ -106,7 +110,9 @@ class BuildingVibration(Effect):
 
 @dataclass(frozen=True)
 class RailJoint(Effect):
-    """Beyond a joint of the rails the carriage runs with more friction, which the force sensor feels."""
+    """Beyond a joint of the rails the carriage runs with more friction, which the force sensor
+    feels.
+    """
 
     joint: float = 0.3  # [m]
 
@@ -123,7 +129,9 @@ class RailJoint(Effect):
 
 @dataclass(frozen=True)
 class Thixotropy(Effect):
-    """Soil at rest gains torque resistance that shearing wears off: T (1 + a e^(−s/s₀)), s the path of the rim."""
+    """Soil at rest gains torque resistance that shearing wears off: T (1 + a e^(−s/s₀)), s the path
+    of the rim.
+    """
 
     wear: float = 0.1  # s₀ [m]
 

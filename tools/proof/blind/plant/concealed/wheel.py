@@ -1,4 +1,6 @@
-"""Effects of the wheel's body: what its front, faces, lugs, shape and mass add to the rim of Eqs. (8)-(10)."""
+"""Effects of the wheel's body: what its front, faces, lugs, shape and mass add to the rim of Eqs.
+(8)-(10).
+"""
 
 from __future__ import annotations
 
@@ -41,12 +43,14 @@ class Bulldozing(Effect):
 
 @dataclass(frozen=True)
 class Grousers(Effect):
-    """N separate lugs of height h, each a blade that pushes with passive pressure while it is in the soil.
+    """N separate lugs of height h, each a blade that pushes with passive pressure while it is in
+    the soil.
 
-    A lug at θ, root at depth d, carries F = m b [½ γ ((d + h)² − d²) K_p + 2 c h √K_p + K_p σ̄ h], m the share
-    1 − e^(−j/k) that it has mobilised; T + F (r + h/2), DP + F cos θ, and F sin θ lifts the wheel (read as sinkage).
-    Source: blade theory of Terzaghi (1943) with the surcharge σ̄ of the rim; lugs one by one as in Skonieczny,
-    Moreland, Wettergreen (2012), IEEE/RSJ IROS.
+    A lug at θ, root at depth d, carries F = m b [½ γ ((d + h)² − d²) K_p + 2 c h √K_p + K_p σ̄ h],
+    m the share 1 − e^(−j/k) that it has mobilised; T + F (r + h/2), DP + F cos θ, and F sin θ lifts
+    the wheel (read as sinkage).
+    Source: blade theory of Terzaghi (1943) with the surcharge σ̄ of the rim; lugs one by one as in
+    Skonieczny, Moreland, Wettergreen (2012), IEEE/RSJ IROS.
     """
 
     count: int = 16
@@ -66,9 +70,8 @@ class Grousers(Effect):
             pull += push * np.cos(theta)
             lift += push * np.sin(theta)
         sign = scene.direction * scene.moving
-        stiffness = (
-            2.0 * np.maximum(scene.carried, 1.0) / np.maximum(scene.sinkage, 1e-3)
-        )  # dW/dz of a wheel
+        # dW/dz of a wheel
+        stiffness = 2.0 * np.maximum(scene.carried, 1.0) / np.maximum(scene.sinkage, 1e-3)
         raised = np.where(scene.sinkage > 0.0, lift / stiffness, 0.0)
         return replace(
             scene,
@@ -98,19 +101,19 @@ class Grousers(Effect):
 
 @dataclass(frozen=True)
 class SidewallFriction(Effect):
-    """Each buried face slides as one area at its centroid, pressed by (1 − sin φ) of the rim's mean stress.
+    """Each buried face slides as one area at its centroid, pressed by (1 − sin φ) of the rim's mean
+    stress.
 
-    Source: at-rest pressure of Jaky (1944), J. Soc. Hungarian Architects and Engineers 78, 355-358; the area of a
-    circle's segment and its centroid.
+    Source: at-rest pressure of Jaky (1944), J. Soc. Hungarian Architects and Engineers 78, 355-358;
+    the area of a circle's segment and its centroid.
     """
 
     name, most = "sidewall_friction", 1.0
 
     def forces(self, scene: Scene) -> Scene:
         radius, angle = scene.rig.radius, scene.theta_1
-        area = (
-            0.5 * radius**2 * (angle - 0.5 * np.sin(2.0 * angle))
-        )  # the leading half of the segment
+        # the leading half of the segment
+        area = 0.5 * radius**2 * (angle - 0.5 * np.sin(2.0 * angle))
         below = (
             radius
             * 2.0
@@ -129,7 +132,9 @@ class SidewallFriction(Effect):
 
 @dataclass(frozen=True)
 class WheelEccentricity(Effect):
-    """The axle sits e beside the middle of a round wheel: R = e cos ψ' + √(r² − e² sin² ψ'); W lifts with it."""
+    """The axle sits e beside the middle of a round wheel: R = e cos ψ' + √(r² − e² sin² ψ'); W
+    lifts with it.
+    """
 
     phase: float = 0.0
 

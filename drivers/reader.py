@@ -10,7 +10,7 @@ from gritd.drivers.decoder import Decoder
 from gritd.drivers.errors import DeviceError, one_line
 from gritd.drivers.link import Chunk, Link
 from gritd.drivers.queue import ReadingQueue
-from gritd.estimator.recording.patience import waited
+from gritd.estimator.threads.waiting import wait_until
 
 BACKOFF_FIRST = 0.1  # [s]
 BACKOFF_LAST = 5.0  # [s]
@@ -82,7 +82,7 @@ class Reader:
     def stop(self, timeout: float = 0.2) -> bool:
         """End the thread and close the device; False if it did not end within `timeout` [s]."""
         self._stop.set()
-        waited(lambda: not self.alive, timeout)
+        wait_until(lambda: not self.alive, timeout)
         return not self.alive
 
     def stats(self) -> ReaderStats:

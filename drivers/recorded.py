@@ -13,9 +13,7 @@ from typing import Protocol, TypeVar
 from gritd.drivers.decoder import Decoder
 from gritd.drivers.link import POLL, Chunk
 from gritd.drivers.queue import ReadingQueue
-from gritd.estimator.messages.readings import Reading
-
-NS = 1_000_000_000
+from gritd.estimator.messages.readings import NS, Reading
 
 
 class Received(Protocol):

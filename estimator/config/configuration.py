@@ -15,7 +15,7 @@ from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.config.table import EffectSchema, table
 from gritd.estimator.config.yamltree import ConfigError, compose, read_text, serialise
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 
 __all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text"]
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 
@@ -182,3 +183,12 @@ class Settings:
     logging: Logging
     effects: tuple[ConfiguredEffect, ...] = ()
     place: Place = Place()
+
+
+def settings_of_run(settings: Settings, run: RunInfo) -> Settings:
+    """The settings of one run: its place on the bed, and its nominal load where it states one."""
+    settings = replace(settings, place=Place(run.pass_number, run.start_position))
+    if run.nominal_load is None:
+        return settings
+    nominal = replace(settings.load.nominal, value=run.nominal_load)
+    return replace(settings, load=replace(settings.load, nominal=nominal))

@@ -50,7 +50,7 @@ from gritd.estimator.config.yamltree import Mapping as Tree
 from gritd.estimator.config.yamltree import Node, Scalar, describe
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, REQUIRED
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 EffectSchema = Callable[[str], Mapping[str, Quantity] | None]

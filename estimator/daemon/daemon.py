@@ -9,59 +9,34 @@ longer stroked.
 
 from __future__ import annotations
 
-import gc
-import os
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Protocol
 
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.config.settings import settings_of_run
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.daemon.disagreement import Watch
-from gritd.estimator.daemon.ending import Ending
-from gritd.estimator.daemon.health import Pulse, silent
-from gritd.estimator.daemon.loop import Change, Loop, LoopRecord, Source
-from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.record import LOOP_FIELDS, TICK_FIELDS
-from gritd.estimator.offline.playback import CHECKPOINT, settings_for
+from gritd.estimator.daemon.log_sink import LogSink
+from gritd.estimator.daemon.loop import Change, Loop, Source
+from gritd.estimator.daemon.rotation import Rotation
+from gritd.estimator.daemon.scheduling import undisturbed
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.carry import needs_restart
-from gritd.estimator.online.pipeline import Pipeline, TickRecord
-from gritd.estimator.recording.cdr import STRING, TIME, Topic
-from gritd.estimator.recording.patience import waited
-from gritd.estimator.recording.run import LOG_TOPIC, RunInfo
+from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording.topics import LOG_TOPIC, TOPICS
 from gritd.estimator.recording.writer import WriterStatus, WriterThread
+from gritd.estimator.threads.pulse import Pulse, silent
+from gritd.estimator.threads.stop_request import StopRequest
+from gritd.estimator.threads.waiting import wait_until
 
-TICK_TOPIC = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
-LOOP_TOPIC = Topic("/loop", "gritd_msgs/msg/Loop", LOOP_FIELDS)
-CHECKPOINT_TOPIC = Topic(
-    CHECKPOINT,
-    "gritd_msgs/msg/Checkpoint",
-    (
-        ("stamp", TIME, "time of the tick before"),
-        ("configuration", STRING, "effective YAML from here on"),
-        ("state", STRING, "what the next tick begins with: estimator/online/checkpoint.py"),
-    ),
-)
-TOPICS = (TICK_TOPIC, LOOP_TOPIC, CHECKPOINT_TOPIC)
-
-SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from another thread
-KEPT_TUPLES, LONGEST_KEPT = (
-    2000,
-    20,
-)  # freed tuples of each length up to this are kept by CPython (tupleobject.h)
-PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
 # [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s
 # more
 STOP = 1.5
-MIN_PART = 1.0  # [s] a part is at least this long
-MAX_CHUNKS = 400_000  # and of no more flushes than this: a reader takes 500,000
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
 
 # Looks (of WATCH) without a sign of life before a thread is said to hang.
@@ -88,28 +63,6 @@ class ReaderThread(Protocol):
     def stop(self, timeout: float) -> bool: ...
 
 
-class LogSink:
-    """Hands ticks to the writer thread, readings first: file order is consumption order."""
-
-    def __init__(self, writer: WriterThread) -> None:
-        self._writer = writer
-
-    def put(self, readings: Sequence[Reading], tick: TickRecord, loop: LoopRecord) -> None:
-        stamp = loop.stamp
-        self._writer.put(readings, [(TICK_TOPIC.name, stamp, tick), (LOOP_TOPIC.name, stamp, loop)])
-
-    def counts(self) -> tuple[int, int]:
-        status = self._writer.status()
-        return status.queued, status.dropped
-
-    def checkpoint(self, stamp: int, configuration: str, state: str, new_part: bool) -> None:
-        message = (CHECKPOINT_TOPIC.name, stamp, (stamp, configuration, state))
-        if new_part:
-            self._writer.begin_part(configuration, message)
-        else:
-            self._writer.put((), [message])
-
-
 class Daemon:
     """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last
     word.
@@ -131,7 +84,7 @@ class Daemon:
         self.readers = readers
         self.clock = clock
         self.writer = _writer(path, configuration, run)
-        pipeline = Pipeline(settings_for(configuration.settings, run))
+        pipeline = Pipeline(settings_of_run(configuration.settings, run))
         self.loop = Loop(pipeline, source, LogSink(self.writer), clock, configuration.text)
         self._pulses = [
             Pulse("loop", lambda: self.loop.ticks, LOOP_PATIENCE),
@@ -143,18 +96,14 @@ class Daemon:
         ]
         self.model = Watch()  # whether model and measurement agree
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
-        self.deleted: list[
-            Path
-        ] = []  # parts that somebody deleted while they were written, not yet told
-        self._part_began = time.monotonic()
-        self._ending_part: Path | None = None  # which the writer was asked to end
-        self._ending, self._loop_stop = Ending(), Event()
+        self.rotation = Rotation()
+        self._stop, self._loop_stop = StopRequest(), Event()
         self._failure = ""
         self._wall_offset = 0.0
 
     def stop(self) -> None:
         """Ask `serve` to end; may be called from a signal handler."""
-        self._ending.set()
+        self._stop.set()
 
     def say(self, level: int, text: str) -> None:
         """A line into the recording's /log."""
@@ -172,13 +121,15 @@ class Daemon:
         fixed = needs_restart(self.configuration.settings, configuration.settings)
         if fixed:
             raise DaemonError(f"{configuration.source}: {fixed}: changed, which needs a restart")
-        return Change(configuration.text, Pipeline(settings_for(configuration.settings, self.run)))
+        return Change(
+            configuration.text, Pipeline(settings_of_run(configuration.settings, self.run))
+        )
 
     def reload(self, configuration: Configuration, change: Change) -> None:
         """Go on with it from the next tick, in a new part of the recording."""
         self.loop.ask(change)
         self.configuration = configuration
-        self._part_began = time.monotonic()
+        self.rotation.begin()
 
     def serve(self, watch: Callable[[Daemon], None] = lambda daemon: None) -> WriterStatus:
         """Run until stopped. `watch` is called about ten times a second from the caller's thread."""
@@ -186,9 +137,9 @@ class Daemon:
         for reader in self.readers:
             reader.start()
         loop = Thread(target=self._run_loop, name="loop", daemon=True)
-        with _undisturbed():
+        with undisturbed():
             loop.start()
-            while not self._ending.wait(WATCH):
+            while not self._stop.wait(WATCH):
                 self._look(loop, watch)
             left = self._drained(loop)
         return self._close(left)
@@ -199,20 +150,23 @@ class Daemon:
         """
         for reader in self.readers:
             reader.stop(0.0)
-        left = STOP / 2 + waited(lambda: not any(reader.alive for reader in self.readers), STOP / 2)
+        left = STOP / 2 + wait_until(
+            lambda: not any(reader.alive for reader in self.readers), STOP / 2
+        )
         self._loop_stop.set()
-        return left / 2 + waited(lambda: not loop.is_alive(), left / 2)
+        return left / 2 + wait_until(lambda: not loop.is_alive(), left / 2)
 
     def fail(self, reason: str) -> None:
         """Stop, with a reason; the first one given is the one told."""
         self._failure = self._failure or reason
-        self._ending.set()
+        self._stop.set()
 
     def _look(self, loop: Thread, watch: Callable[[Daemon], None]) -> None:
         try:
             self._check(loop)
             self._compare()
-            self._rotate()
+            if self.rotation.due(self.configuration.settings.logging, self.writer.status()):
+                self.loop.ask(Change(self.configuration.text))
             watch(self)
         except Exception as error:  # a fault of ours: named, and the log is closed all the same
             self.fail(f"the watch failed: {type(error).__name__}: {error}")
@@ -246,20 +200,6 @@ class Daemon:
         if self.loop.latest is not None and (said := self.model.look(self.loop.latest[0])):
             self.say(WARNING if self.model.present else INFO, said)
 
-    def _rotate(self) -> None:
-        """Ask for a new part when the present one is large or old, or gone."""
-        logging, age = self.configuration.settings.logging, time.monotonic() - self._part_began
-        status = self.writer.status()
-        part = status.files[-1]
-        if age < MIN_PART or status.state != "writing" or part == self._ending_part:
-            return
-        size, longest = _size(part), min(logging.part_time, MAX_CHUNKS * logging.flush_interval)
-        if size is None:
-            self.deleted.append(part)
-        if size is None or size > min(logging.part_size, logging.disk_cap / 2.0) or age > longest:
-            self.loop.ask(Change(self.configuration.text))
-            self._part_began, self._ending_part = time.monotonic(), part
-
     def _close(self, patience: float) -> WriterStatus:
         if self._failure:
             self.say(ERROR, self._failure)
@@ -283,55 +223,3 @@ def _writer(path: Path, configuration: Configuration, run: RunInfo) -> WriterThr
 
 def _beats(reader: ReaderThread) -> int:
     return reader.beats
-
-
-def _size(path: Path) -> int | None:
-    """None where nothing is."""
-    try:
-        return path.stat().st_size
-    except FileNotFoundError:
-        return None
-    except OSError:
-        return 0
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Short switch interval, no garbage collection of what was built at start, and memory as it
-    will be for good.
-    """
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    gc.collect()
-    gc.freeze()
-    _fill_free_lists()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        sys.setswitchinterval(interval)
-
-
-def _fill_free_lists() -> None:
-    """What CPython keeps of freed tuples, it keeps from the start: else it comes by and by, 0.4 MB
-    when a path through the code is first taken, and looks like a leak for hours.
-    """
-    for length in range(1, LONGEST_KEPT + 1):
-        kept = [tuple(range(length)) for _ in range(KEPT_TUPLES)]
-        del kept
-
-
-def real_time() -> str:
-    """Real-time scheduling for this thread and those it starts; '' or one line why not."""
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-        return ""
-    except (OSError, AttributeError) as error:
-        return f"no real-time scheduling ({getattr(error, 'strerror', None) or error}): ticks may be late under load"
-
-
-def run_path(folder: Path, name: str, started: int) -> Path:
-    """RUN-YYYYmmdd-HHMMSS.mcap, in UTC, not yet taken."""
-    stem = f"{name or 'run'}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime(started / 1e9))}"
-    paths = (folder / f"{stem}{suffix}.mcap" for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
-    return next(path for path in paths if not path.exists())

@@ -8,11 +8,10 @@ from threading import Event
 from typing import NamedTuple, Protocol
 
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.online.carry import carried
 from gritd.estimator.online.checkpoint import encode
 from gritd.estimator.online.pipeline import Pipeline, State, TickRecord
-from gritd.estimator.wheel.sync import NS
 
 RECENT = 2500  # ticks whose lateness is remembered
 _SHARES = {"late_50": 0.5, "late_99": 0.99, "late_999": 0.999, "late_max": 1.0}

@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
-from gritd.estimator.recording.patience import waited
+from gritd.estimator.threads.waiting import wait_until
 
 INTERVAL = 0.1  # [s] between lines
 BREATH = 0.01  # [s] between attempts to take somebody in who cannot be, for want of descriptors
@@ -58,7 +58,7 @@ class Publisher:
     def close(self) -> None:
         """End the thread, close every connection and remove the socket file."""
         self._stop.set()
-        waited(lambda: not self.alive, STOP)
+        wait_until(lambda: not self.alive, STOP)
         for connection in (*self._clients, self._listener):
             connection.close()
         with suppress(OSError):

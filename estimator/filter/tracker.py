@@ -29,9 +29,10 @@ from gritd.estimator.filter.estimate import (
 from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
 from gritd.estimator.filter.plain import PlainEngine
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
+from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
 from gritd.estimator.wheel.chain import Context
-from gritd.estimator.wheel.sync import NS, Snapshot
+from gritd.estimator.wheel.sync import Snapshot
 from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
 
 SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …

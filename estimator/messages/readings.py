@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+NS = 1_000_000_000  # [ns/s]
+
 Value = int | float | tuple[float, ...]
 
 

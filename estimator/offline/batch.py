@@ -27,11 +27,11 @@ from gritd.estimator.filter.account import (
     measured,
 )
 from gritd.estimator.filter.tracker import Account, Tracker, TrackState
+from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.record import NOT_A_NUMBER, TICK_FIELDS
 from gritd.estimator.offline.snapshots import Ints, played, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.wheel.sync import NS
 from gritd.estimator.wheel.wheel_state import wheel_state
 
 Table = NDArray[np.void]  # structured

@@ -11,13 +11,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from gritd.estimator.config.settings import Place, Settings
-from gritd.estimator.messages.readings import CHANNELS, Reading
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.messages.readings import CHANNELS, NS, Reading
 from gritd.estimator.recording.salvage import Message, Recording
-from gritd.estimator.wheel.sync import NS
+from gritd.estimator.recording.topics import CHECKPOINT, TICK
 
-TICK, CHECKPOINT = "/tick", "/checkpoint"
 _RAW = {f"/raw/{channel}": channel for channel in CHANNELS}
 
 
@@ -85,15 +83,6 @@ def _built(recording: Recording, rate: float) -> Iterator[RecordedTick]:
 def _in_order(messages: Iterable[Message]) -> list[Reading]:
     readings = [reading for reading in map(reading_of, messages) if reading is not None]
     return sorted(readings, key=lambda reading: reading.received)
-
-
-def settings_for(settings: Settings, run: RunInfo) -> Settings:
-    """The settings of one run: its place on the bed, and its nominal load where it states one."""
-    settings = replace(settings, place=Place(run.pass_number, run.start_position))
-    if run.nominal_load is None:
-        return settings
-    nominal = replace(settings.load.nominal, value=run.nominal_load)
-    return replace(settings, load=replace(settings.load, nominal=nominal))
 
 
 def without_absent(settings: Settings, recording: Recording) -> Settings:

@@ -17,10 +17,10 @@ from gritd.estimator.offline.playback import Checkpoint, RecordedTick
 from gritd.estimator.online.carry import carried
 from gritd.estimator.online.checkpoint import decode, encode
 from gritd.estimator.online.pipeline import Pipeline, TickRecord
-from gritd.estimator.recording.run import RecordingError
+from gritd.estimator.recording.mcapfile import RecordingError
 
 
-class Course:
+class Rerun:
     """`settings_of` gives the run's settings from a configuration; `engine` replaces the configured
     one.
     """

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Calibration, Settings
-from gritd.estimator.messages.readings import CHANNELS, ENCODERS, WRENCH_FIELDS
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.record import CHANNEL_BITS
-from gritd.estimator.offline.playback import TICK
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
-from gritd.estimator.wheel.sync import NS, STUCK_AFTER, Measured, Snapshot
+from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]

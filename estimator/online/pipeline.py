@@ -11,10 +11,10 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import record
 from gritd.estimator.filter.pull import UNKNOWN, Pull, Search, searched
 from gritd.estimator.filter.tracker import Tracker, TrackState
-from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.record import Flag
 from gritd.estimator.wheel.chain import with_latencies
-from gritd.estimator.wheel.sync import NS, Sync
+from gritd.estimator.wheel.sync import Sync
 
 MOST = (1 << 32) - 1  # a tick's counters go so far
 

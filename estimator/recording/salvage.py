@@ -17,6 +17,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import (
     MAX_CHUNK,
     MAX_WASTE,
@@ -32,15 +33,8 @@ from gritd.estimator.recording.blocks import (
 from gritd.estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
 from gritd.estimator.recording.decoding import Chunk, Source, select
 from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, reported
-from gritd.estimator.recording.run import (
-    CHECKSUM,
-    CONFIG,
-    RAW_TOPICS,
-    RECOVERED,
-    RUN,
-    RunInfo,
-    seal_holds,
-)
+from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RECOVERED, RUN, seal_holds
+from gritd.estimator.recording.topics import RAW_TOPICS
 
 # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_KEPT = 64 << 20
@@ -200,7 +194,7 @@ def _with_metadata(recording: Recording, contents: Contents) -> Recording:
     try:
         recording.run = RunInfo.from_entries(recording.metadata.get(RUN, {}))
     except ValueError as error:
-        recording.damage.append(f"metadata {error}")
+        recording.damage.append(f"metadata {RUN}: {error}")
     return recording
 
 

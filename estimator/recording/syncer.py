@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from gritd.estimator.recording.mcapfile import RecordingError, sync
-from gritd.estimator.recording.patience import waited
+from gritd.estimator.threads.waiting import wait_until
 
 
 class Syncer:
@@ -40,7 +40,7 @@ class Syncer:
         self._wake.set()
         if self._thread.ident is None:
             self._sync()
-        waited(lambda: not self.alive, timeout)
+        wait_until(lambda: not self.alive, timeout)
         return not self.alive
 
     def request(self, fileno: int) -> None:

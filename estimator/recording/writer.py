@@ -25,11 +25,13 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.cdr import Topic, Values
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.patience import waited
-from gritd.estimator.recording.run import RunInfo, RunWriter, part_path
+from gritd.estimator.recording.parts import part_path
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.syncer import Syncer
+from gritd.estimator.threads.waiting import wait_until
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
@@ -146,7 +148,7 @@ class WriterThread:
         self._stopping.set()
         if self._thread.ident is None:  # never started
             self._attempt(self._finish)
-        left = waited(lambda: not self._thread.is_alive(), timeout)
+        left = wait_until(lambda: not self._thread.is_alive(), timeout)
         confirmed, path = self._sync.stop(left), self._parts.files[-1]
         if self._state == "closed" and not confirmed:
             self._error = f"{path}: the medium has not confirmed the last of it"

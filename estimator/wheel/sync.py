@@ -18,11 +18,10 @@ from math import inf, isnan, sqrt
 from typing import Any, NamedTuple
 
 from gritd.estimator.config.settings import Channel, Settings
-from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.record import CHANNEL_BITS
 from gritd.estimator.wheel.geometry import slope_sigma
 
-NS = 1_000_000_000
 STUCK_AFTER = int(0.34 * NS)  # [ns] a live sensor shows noise or motion sooner than this
 
 

@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from gritd.estimator.daemon.daemon import TOPICS
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import TOPICS
 
 path, killed = Path(sys.argv[1]), int(sys.argv[2])
 recording = read(path, TOPICS)

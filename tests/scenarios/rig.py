@@ -23,9 +23,9 @@ import yaml
 from gritd.config import packaged
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.config import configuration as config
-from gritd.estimator.daemon.daemon import TOPICS
-from gritd.estimator.recording.run import parts
+from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import TOPICS
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay
 from gritd.tools.commands.status import connected, reports

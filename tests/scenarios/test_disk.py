@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gritd.estimator.offline.playback import CHECKPOINT
 from gritd.estimator.recording.cdr import TIME, Topic
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.run import parts
+from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import CHECKPOINT
 from tests.scenarios.rig import (
     ROOT,
     WIRES,
@@ -243,7 +243,7 @@ def test_killed_while_logging(tmp_path, seed, figure):
 WRITER = """
 import mmap, os, struct, sys, time
 from gritd.estimator.daemon.daemon import real_time
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.writer import WriterThread
 from gritd.estimator.messages.readings import Reading
 from tests.scenarios.test_disk import MARK, PART

@@ -16,10 +16,10 @@ import pytest
 import gritd.estimator.daemon.clock
 from gritd.drivers.queue import ReadingQueue
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.daemon.daemon import TICK_TOPIC
 from gritd.estimator.daemon.loop import Loop
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.tools.cli.command import CommandError
 from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, rows, service, verified
 

@@ -12,10 +12,10 @@ import pytest
 from gritd.drivers.build import build_decoder
 from gritd.drivers.can_link import packed
 from gritd.drivers.wire import CanWire, SerialWire
-from gritd.estimator.daemon.daemon import TICK_TOPIC
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.record import CHANNEL_BITS, TICK_NAMES, Status
 from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.estimator.wheel.sync import Sync
 from tests.scenarios.rig import TESTBED, driven
 

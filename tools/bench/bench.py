@@ -25,13 +25,15 @@ import numpy as np
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.filter.tracker import ENGINES, Tracker
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import played
 from gritd.estimator.offline.snapshots import played as played_arrays
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.estimator.recording.run import RAW_TOPICS, RunInfo, RunWriter
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.terramechanics import linear, original, scalar
 from gritd.tools.bench import forward as forward_bench
 from gritd.tools.cli.command import DONE, Parser

@@ -19,9 +19,9 @@ from queue import Empty, Queue
 from threading import Thread
 from typing import IO, get_args
 
-from gritd.estimator.daemon.daemon import TOPICS
-from gritd.estimator.daemon.ending import Ending
 from gritd.estimator.recording.salvage import Recording, read
+from gritd.estimator.recording.topics import TOPICS
+from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, number, whole
 from gritd.tools.commands import demo_verdict as verdict
 from gritd.tools.report import figure
@@ -81,11 +81,11 @@ def _parser() -> Parser:
 
 
 @contextmanager
-def interruptible() -> Iterator[Ending]:
+def interruptible() -> Iterator[StopRequest]:
     """What SIGINT and SIGTERM set; they interrupt nothing themselves: no child just started is
     lost.
     """
-    stop = Ending()
+    stop = StopRequest()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
     try:
@@ -95,7 +95,7 @@ def interruptible() -> Iterator[Ending]:
             signal.signal(number, handler)
 
 
-def run(folder: Path, arguments: Namespace, stop: Ending) -> list[str]:
+def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
     """Testbed and daemon side by side for the given time; the daemon's closing lines."""
     told = [
         "--seconds",
@@ -167,7 +167,7 @@ class Child:
     While `stop` is set, waiting for it raises KeyboardInterrupt.
     """
 
-    def __init__(self, stop: Ending, name: str, module: str, *arguments: str) -> None:
+    def __init__(self, stop: StopRequest, name: str, module: str, *arguments: str) -> None:
         self._stop, self._name = stop, name
         self._lines: Queue[str] = Queue()
         self._process = subprocess.Popen(

@@ -21,7 +21,8 @@ from pathlib import Path
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.recording.run import RecordingError, versions
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.metadata import versions
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
 from gritd.tools.commands import diagnose_campaigns as campaigns

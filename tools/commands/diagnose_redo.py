@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gritd.estimator.recording.run import versions
+from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.explain.result import Diagnosis, plain
 from gritd.tools.diagnose.rig.signals import sha256

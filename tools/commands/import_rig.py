@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from gritd.estimator.recording.run import RecordingError
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.files import unwritten
 from gritd.tools.importers.registry import rigs

@@ -9,11 +9,10 @@ from math import isnan
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.messages.readings import CHANNELS, ENCODERS
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS
 from gritd.estimator.offline.batch import window_ends
 from gritd.estimator.offline.snapshots import played, snapshots
 from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.wheel.sync import NS
 
 # required channel -> what a snapshot has of it
 VALUES = {

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
-from gritd.estimator.recording.run import RECOVERED, sealed
+from gritd.estimator.recording.metadata import RECOVERED, sealed
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.tools.cli.command import DAMAGED, DONE, Parser
 from gritd.tools.cli.files import unread, unwritten, vacant

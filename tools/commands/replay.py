@@ -11,16 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.config.configuration import Configuration, load, loads
-from gritd.estimator.config.settings import Settings
-from gritd.estimator.daemon.daemon import TICK_TOPIC, TOPICS
+from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.messages.record import TICK_FIELDS, TICK_NAMES, Status
 from gritd.estimator.offline.batch import estimates
-from gritd.estimator.offline.playback import RecordedTick, played, settings_for, without_absent
-from gritd.estimator.offline.rerun import Course
+from gritd.estimator.offline.playback import RecordedTick, played, without_absent
+from gritd.estimator.offline.rerun import Rerun
 from gritd.estimator.online.pipeline import TickRecord
 from gritd.estimator.recording.cdr import TIME
-from gritd.estimator.recording.run import RecordingError, RunWriter, parts
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.parts import parts
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
@@ -219,14 +221,14 @@ def _target(arguments: Namespace, path: Path) -> Path:
 
 def _course(
     recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool
-) -> Course:
+) -> Rerun:
     """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was
     silent, not absent.
     """
     first = recordings[0]
     recorded = first if not as_it_ran or not first.counts["/tick"] else None
     _told(first, configuration, recorded)
-    return Course(configuration, lambda given: _settings(first, given, recorded), engine)
+    return Rerun(configuration, lambda given: _settings(first, given, recorded), engine)
 
 
 def _told(first: Recording, configuration: Configuration, recorded: Recording | None) -> Settings:
@@ -239,7 +241,7 @@ def _told(first: Recording, configuration: Configuration, recorded: Recording | 
 
 def _settings(first: Recording, given: Configuration, recorded: Recording | None) -> Settings:
     """Settings of the run, without the sensors that `recorded` does not hold."""
-    return settings_for(
+    return settings_of_run(
         without_absent(given.settings, recorded) if recorded else given.settings, first.run
     )
 

@@ -15,7 +15,7 @@ from gritd.estimator.daemon.lock import LockError, locked
 from gritd.tools.cli.command import FAILED, CommandError, Parser, number, whole
 
 if TYPE_CHECKING:
-    from gritd.estimator.recording.run import RunInfo
+    from gritd.estimator.messages.run_info import RunInfo
 
 SOCKET = "gritd.sock"
 

@@ -22,9 +22,11 @@ from gritd.estimator.config.schema import Quantity
 from gritd.estimator.config.settings import Calibration, Channel, Settings, Wrench
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.readings import ENCODERS, WRENCH_FIELDS, Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import Response, simulate_arrays
 from gritd.estimator.offline.measured import measured_run
-from gritd.estimator.recording.run import RecordingError, RunInfo, RunWriter
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil

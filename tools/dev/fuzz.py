@@ -35,8 +35,10 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.tracker import ENGINES
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.record import TICK_NAMES
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline, State
-from gritd.estimator.recording.run import RecordingError, RunInfo, RunWriter
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import DONE, FAILED, Parser
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.mcapfile import reported
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers._files import Array, RigFileError
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.cli.command import number as number_of
 from gritd.tools.importers._files import (
     Array,

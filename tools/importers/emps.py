@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers._files import LARGEST, Array, RigFileError, find, increasing
 from gritd.tools.importers._recording import Stream, configuration, stamps, write
 from gritd.tools.importers._segments import START

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers._files import Array, RigFileError, find, increasing, numbers, read_table
 from gritd.tools.importers._recording import UNKNOWN, Stream, configuration, counts, stamps, write
 from gritd.tools.importers.registry import Progress, positive

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers._files import (
     RigFileError,
     Table,

@@ -13,10 +13,13 @@ from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.daemon.daemon import WARNING, Daemon, DaemonError, real_time, run_path
+from gritd.estimator.daemon.daemon import WARNING, Daemon, DaemonError
 from gritd.estimator.daemon.publish import Publisher, PublishError
+from gritd.estimator.daemon.scheduling import real_time
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.parts import run_path
 from gritd.estimator.recording.retention import sweep
-from gritd.estimator.recording.run import RecordingError, RunInfo
 from gritd.estimator.recording.writer import WriterStatus
 from gritd.tools.cli.command import DONE, FAILED, CommandError
 from gritd.tools.service.telemetry import Reporter

@@ -138,9 +138,11 @@ class Watcher:
         if len(status.files) > self._files:
             self._files = len(status.files)
             self._tell(daemon, INFO, f"logging to {status.files[-1]}")
-            while daemon.deleted:
+            while daemon.rotation.deleted:
                 self._tell(
-                    daemon, WARNING, f"{daemon.deleted.pop()}: was deleted while it was written"
+                    daemon,
+                    WARNING,
+                    f"{daemon.rotation.deleted.pop()}: was deleted while it was written",
                 )
 
     def _follow_health(self, daemon: Daemon) -> None:

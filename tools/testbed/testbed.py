@@ -26,10 +26,10 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config import effects
 from gritd.estimator.config.configuration import Configuration
-from gritd.estimator.daemon.daemon import real_time
-from gritd.estimator.daemon.ending import Ending
+from gritd.estimator.daemon.scheduling import real_time
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.terramechanics.soil import Soil
+from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import DONE, Parser, number, whole
 from gritd.tools.cli.main import guarded
 from gritd.tools.commands import simulate
@@ -155,9 +155,9 @@ def write_truth(folder: Path, prepared: Experiment) -> None:
     )
 
 
-def _stop_on_signals() -> Ending:
+def _stop_on_signals() -> StopRequest:
     """Set by SIGTERM and SIGINT."""
-    stop = Ending()
+    stop = StopRequest()
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda *_: stop.set())
     return stop

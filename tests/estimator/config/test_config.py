@@ -24,7 +24,7 @@ from gritd.estimator.config.settings import (
     Rates,
     Uncertain,
 )
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 
 TESTBED = packaged().read_text(encoding="utf-8")
 

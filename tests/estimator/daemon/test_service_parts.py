@@ -23,16 +23,16 @@ from pathlib import Path
 import pytest
 
 from gritd.estimator.daemon import notify
-from gritd.estimator.daemon.health import Pulse, silent
 from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.record import CHANNEL_BITS
-from gritd.estimator.recording import patience
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.retention import sweep, trim
-from gritd.estimator.recording.run import RunInfo
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.writer import WriterThread
+from gritd.estimator.threads import waiting
+from gritd.estimator.threads.pulse import Pulse, silent
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import monitor, status
 
@@ -160,15 +160,18 @@ def test_a_pulse_is_lost_after_its_patience_and_found_again():
 
 def test_patience_counts_looks_not_the_time_in_which_it_was_held_up(monkeypatch):
     looks = []
-    monkeypatch.setattr(patience.time, "sleep", looks.append)
+    monkeypatch.setattr(waiting.time, "sleep", looks.append)
     assert (
-        patience.waited(lambda: False, 1.0) == 0.0
+        waiting.wait_until(lambda: False, 1.0) == 0.0
         and len(looks) == 100
         and sum(looks) == pytest.approx(1.0)
     )
     looks.clear()
-    assert patience.waited(lambda: len(looks) == 25, 1.0) == pytest.approx(0.75)
-    assert patience.waited(lambda: True, 1.0) == 1.0 and patience.waited(lambda: True, 0.0) == 0.0
+    assert waiting.wait_until(lambda: len(looks) == 25, 1.0) == pytest.approx(0.75)
+    assert (
+        waiting.wait_until(lambda: True, 1.0) == 1.0
+        and waiting.wait_until(lambda: True, 0.0) == 0.0
+    )
 
 
 def test_what_a_killed_daemon_had_only_begun_is_swept_away(tmp_path):

@@ -10,16 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.estimator.config.settings import Rates
-from gritd.estimator.daemon.daemon import TICK_TOPIC
-from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.readings import CHANNELS, NS, Reading
 from gritd.estimator.messages.record import TICK_NAMES, Flag
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import ESTIMATES, SIGNALS, estimates, signals, window_ends
 from gritd.estimator.offline.playback import played as replayed
 from gritd.estimator.offline.snapshots import Played, Stream, snapshots
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
-from gritd.estimator.wheel.sync import NS, Sync
+from gritd.estimator.recording.topics import TICK_TOPIC
+from gritd.estimator.wheel.sync import Sync
 from tests.linear_plant import readings as plant
 from tests.rig import CHANNELS as CHANNEL_SETTINGS
 from tests.rig import SETTINGS, WRENCH, readings_of

@@ -10,10 +10,11 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.offline.measured import SENSED, MeasuredRun, measured_run
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.tools.commands.simulate import Run, simulate_run, soil_of, write
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of

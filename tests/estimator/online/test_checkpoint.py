@@ -13,11 +13,13 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config.configuration import load, loads
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.daemon.daemon import CHECKPOINT_TOPIC, TICK_TOPIC, TOPICS
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online import checkpoint
 from gritd.estimator.online.carry import carried, needs_restart
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.estimator.recording.run import RunInfo, RunWriter, part_path
+from gritd.estimator.recording.parts import part_path
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.estimator.recording.topics import CHECKPOINT_TOPIC, TICK_TOPIC, TOPICS
 from gritd.tools.commands import replay
 from tests.linear_plant import readings
 

@@ -13,19 +13,14 @@ from mcap.records import ChunkIndex
 
 from gritd.estimator.messages.readings import CHANNELS, Reading
 from gritd.estimator.messages.record import TICK_FIELDS
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
 from gritd.estimator.recording.chunk_index import ChunkIndexes
-from gritd.estimator.recording.mcapfile import record_bytes
-from gritd.estimator.recording.run import (
-    LOG_TOPIC,
-    RAW_TOPICS,
-    RecordingError,
-    RunInfo,
-    RunWriter,
-    part_path,
-    parts,
-)
+from gritd.estimator.recording.mcapfile import RecordingError, record_bytes
+from gritd.estimator.recording.parts import part_path, parts
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import LOG_TOPIC, RAW_TOPICS
 
 T0 = 1_700_000_000_123_456_789
 MIXED = Topic(

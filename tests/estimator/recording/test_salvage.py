@@ -18,11 +18,13 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType, Writer
 
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import records
 from gritd.estimator.recording.cdr import Codec
-from gritd.estimator.recording.mcapfile import MAGIC
-from gritd.estimator.recording.run import RAW_TOPICS, RecordingError, RunInfo, RunWriter
+from gritd.estimator.recording.mcapfile import MAGIC, RecordingError
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import RAW_TOPICS
 from tests.estimator.recording.test_recording import T0, write_sample
 
 ENCODER = RAW_TOPICS[0]

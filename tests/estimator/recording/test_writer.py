@@ -16,8 +16,9 @@ from pathlib import Path
 import pytest
 
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.recording.mcapfile import McapFile
-from gritd.estimator.recording.run import RecordingError, RunInfo, parts
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError
+from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.syncer import Syncer
 from gritd.estimator.recording.writer import WriterStatus, WriterThread
@@ -295,7 +296,7 @@ TMPFS = """
 import os, sys, time
 from pathlib import Path
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.writer import WriterThread
 folder = Path(sys.argv[1])
 if os.system(f"mount -t tmpfs -o size=256k tmpfs {folder}"):
@@ -366,7 +367,7 @@ def test_a_folder_that_cannot_be_written_is_said_at_the_start(tmp_path: Path) ->
 LOGGING = """
 import sys, time
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.writer import WriterThread
 thread = WriterThread(sys.argv[1], [], "a: 1", RunInfo("killed"))
 thread.start()

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.record import CHANNEL_BITS
-from gritd.estimator.wheel.sync import NS, Sync
+from gritd.estimator.wheel.sync import Sync
 from tests.rig import SETTINGS, readings_of
 
 MS = 1_000_000

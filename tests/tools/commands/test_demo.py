@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gritd.estimator.daemon.daemon import TICK_TOPIC
-from gritd.estimator.daemon.ending import Ending
+from gritd.estimator.recording.topics import TICK_TOPIC
+from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import demo
 from gritd.tools.commands import demo_verdict as verdict
@@ -91,7 +91,7 @@ def test_a_child_that_dies_is_named_with_its_last_words():
         pytest.raises(
             CommandError, match=r"the daemon ended early \(exit 2\): gritd: nowhere.yaml: .*"
         ),
-        demo.Child(Ending(), "daemon", "gritd", "run", "--config", "nowhere.yaml") as child,
+        demo.Child(StopRequest(), "daemon", "gritd", "run", "--config", "nowhere.yaml") as child,
     ):
         child.wait_for("device ", 120.0)
 

@@ -10,7 +10,8 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.commands import simulate
 from gritd.tools.commands.diagnose import main

@@ -12,11 +12,12 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config.configuration import load
-from gritd.estimator.daemon.daemon import TICK_TOPIC, TOPICS
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
 from gritd.tools.cli import main as cli
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay

@@ -15,7 +15,8 @@ from gritd.estimator import effects
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands.simulate import main, simulate_run, soil_of

@@ -11,7 +11,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.measurement import COMPONENTS
 from gritd.estimator.offline import batch
-from gritd.estimator.recording.run import RecordingError
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.result import Diagnosis

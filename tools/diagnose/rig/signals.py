@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import median_filter, minimum_filter
 
 from gritd.estimator.config.settings import Calibration, Channel, Settings
-from gritd.estimator.recording.run import RunInfo
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError

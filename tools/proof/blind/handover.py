@@ -12,7 +12,8 @@ import yaml
 
 from gritd.config import packaged
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.recording.run import RunInfo, RunWriter
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.proof.blind import campaign
 from gritd.tools.proof.blind.cases import Case
 from gritd.tools.proof.blind.knowledge import Instrument, Knowledge, Stated

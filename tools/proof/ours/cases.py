@@ -16,8 +16,8 @@ import numpy as np
 
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.effects.base import Effect
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.recording.run import RunInfo
 from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil

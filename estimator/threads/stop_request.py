@@ -11,7 +11,7 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 
 
-class Ending:
+class StopRequest:
     """Set once, by any thread or signal handler; waited for by one thread."""
 
     def __init__(self) -> None:

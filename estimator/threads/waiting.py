@@ -12,7 +12,7 @@ from collections.abc import Callable
 LOOK = 0.01  # [s] between looks
 
 
-def waited(over: Callable[[], bool], seconds: float) -> float:
+def wait_until(over: Callable[[], bool], seconds: float) -> float:
     """Look until it is over, for so many seconds at most; what is left of them, 0 where it is not
     over.
     """

@@ -6,20 +6,20 @@ import subprocess
 import sys
 from threading import Thread
 
-from gritd.estimator.daemon.ending import Ending
+from gritd.estimator.threads.stop_request import StopRequest
 
 SIGNALS = 1000  # a threading.Event hangs within the first few hundred
 MANY = f"""
 import faulthandler, random, signal
-from gritd.estimator.daemon.ending import Ending
+from gritd.estimator.threads.stop_request import StopRequest
 rng = random.Random(1)
 for number in range({SIGNALS}):
     if number % 100 == 0:
         faulthandler.dump_traceback_later(300.0, exit=True)
-    ending = Ending()
-    signal.signal(signal.SIGALRM, lambda *_: ending.set())
+    stop = StopRequest()
+    signal.signal(signal.SIGALRM, lambda *_: stop.set())
     signal.setitimer(signal.ITIMER_REAL, rng.uniform(20e-6, 300e-6))
-    while not ending.wait(1e-5):
+    while not stop.wait(1e-5):
         pass
 """
 
@@ -30,14 +30,14 @@ def test_no_signal_is_lost_and_none_blocks():
 
 
 def test_it_is_not_set_before_and_stays_set_after():
-    ending = Ending()
+    ending = StopRequest()
     assert not ending.is_set() and not ending.wait(0.001)
     ending.set()
     assert ending.is_set() and ending.wait(0.0) and ending.wait(0.0)
 
 
 def test_another_thread_wakes_the_waiting_one():
-    ending = Ending()
+    ending = StopRequest()
     thread = Thread(target=ending.set)
     thread.start()
     assert ending.wait(60.0)

@@ -1,5 +1,4 @@
-"""The recording contract: topics of the raw channels, run metadata, and the writer of one run's
-file.
+"""The writer of one run's file.
 
 File order is the order of the calls, and replay relies on it: the readings a tick consumed stand
 before that tick. See docs/recording.md.
@@ -7,174 +6,21 @@ before that tick. See docs/recording.md.
 
 from __future__ import annotations
 
-import platform
 import struct
-import zlib
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
-from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from gritd.estimator.messages.readings import WRENCH_FIELDS, Reading
-from gritd.estimator.recording.cdr import ENCAPSULATION, TIME, Field, Topic, Values
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.cdr import ENCAPSULATION, Topic, Values
 from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
-
-__all__ = [
-    "LOG_TOPIC",
-    "RAW_TOPICS",
-    "RecordingError",
-    "RunInfo",
-    "RunWriter",
-    "Topic",
-    "part_path",
-    "parts",
-]
+from gritd.estimator.recording.metadata import CONFIG, RUN, sealed, versions
+from gritd.estimator.recording.topics import LOG_TOPIC, RAW_TOPICS
 
 CHUNK_SIZE = 1 << 20  # [bytes] a chunk is closed at this size even if nobody flushes
-CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
-CHECKSUM = "crc32"
-
-_STAMP: Field = ("stamp", TIME, "when the sample was taken")
-
-
-def _raw(channel: str, schema: str, *fields: Field) -> Topic:
-    return Topic(f"/raw/{channel}", f"gritd_msgs/msg/{schema}", (_STAMP, *fields))
-
-
-_COUNT: Field = ("count", "int64", "encoder counts as read, unwrapped")
-_VOLTS: Field = ("volts", "float64", "as read by the ADC [V]")
-_FORCE = ("drawbar pull", "lateral force", "vertical load")
-
-RAW_TOPICS: tuple[Topic, ...] = (
-    _raw("wheel_encoder", "EncoderCount", _COUNT),
-    _raw("carriage_encoder", "EncoderCount", _COUNT),
-    _raw("sinkage_pot", "Voltage", _VOLTS),
-    _raw("motor_shunt", "Voltage", _VOLTS),
-    _raw(
-        "wrench",
-        "Wrench",
-        *(
-            (name, "float64", f"{doc} [N]")
-            for name, doc in zip(WRENCH_FIELDS[:3], _FORCE, strict=True)
-        ),
-        *((name, "float64", f"moment about {name[1]} [N·m]") for name in WRENCH_FIELDS[3:]),
-    ),
-    _raw(
-        "motor_temperature",
-        "Temperature",
-        ("celsius", "float64", "winding or housing temperature [°C]"),
-    ),
-)
-
-# Text for people; the ROS log message, so that Foxglove's and rqt's log panels show it.
-LOG_TOPIC = Topic(
-    "/log",
-    "rcl_interfaces/msg/Log",
-    (
-        ("stamp", TIME, ""),
-        ("level", "uint8", "10 debug, 20 info, 30 warning, 40 error, 50 fatal"),
-        ("name", "string", "who says it"),
-        ("msg", "string", ""),
-        ("file", "string", ""),
-        ("function", "string", ""),
-        ("line", "uint32", ""),
-    ),
-)
-
-
-@dataclass(frozen=True)
-class RunInfo:
-    """What one run was: kept in the metadata record `gritd.run`.
-
-    A recording has no gaps. Where messages had to be dropped (a full disk) a new file begins:
-    `part` counts these, and `lost_before` says how many messages are missing between the part
-    before and this one.
-    """
-
-    name: str = ""
-    nominal_load: float | None = None  # [N]
-    pass_number: int = 1  # how many times the wheel has gone over this soil, this run included
-    start_position: float = 0.0  # [m] of the carriage on the bed
-    notes: str = ""
-    part: int = 0
-    lost_before: int = 0
-
-    def entries(self) -> dict[str, str]:
-        return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
-
-    @classmethod
-    def from_entries(cls, entries: Mapping[str, str]) -> RunInfo:
-        """The inverse of `entries`; unknown keys are ignored. Raises ValueError naming a key that
-        cannot be read.
-        """
-        return cls(
-            name=entries.get("name", ""),
-            nominal_load=_number(entries, "nominal_load", float),
-            pass_number=_number(entries, "pass_number", int, 1),
-            start_position=_number(entries, "start_position", float, 0.0),
-            notes=entries.get("notes", ""),
-            part=_number(entries, "part", int, 0),
-            lost_before=_number(entries, "lost_before", int, 0),
-        )
-
-
-def _number(
-    entries: Mapping[str, str], key: str, kind: type[int] | type[float], default: Any = None
-) -> Any:
-    text = entries.get(key, "")
-    try:
-        return kind(text) if text else default
-    except ValueError:
-        raise ValueError(f"{RUN}: {key}: {text!r} is not a number") from None
-
-
-def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
-    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not
-    pass for a setting.
-    """
-    kept = {key: value for key, value in entries.items() if key != CHECKSUM}
-    return {**kept, CHECKSUM: _checksum(name, kept)}
-
-
-def seal_holds(name: str, entries: Mapping[str, str], required: bool) -> bool:
-    """Whether the entries are as sealed; without a seal (another writer's), whether none is
-    required.
-    """
-    return sealed(name, entries) == entries if CHECKSUM in entries else not required
-
-
-def _checksum(name: str, entries: Mapping[str, str]) -> str:
-    text = "\0".join((name, *(part for item in sorted(entries.items()) for part in item)))
-    return f"{zlib.crc32(text.encode()):08x}"
-
-
-@cache
-def versions() -> Mapping[str, str]:
-    """What computed this run: a replay that differs can say what changed."""
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for package in ("gritd", "numpy", "filterpy", "scipy"):
-        with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
-
-
-def part_path(path: Path, part: int) -> Path:
-    """run.mcap, run.1.mcap, run.2.mcap, …"""
-    return path if part == 0 else path.with_suffix(f".{part}{path.suffix}")
-
-
-def parts(path: Path) -> list[Path]:
-    """The recording and the files that continue it, in order, as far as they exist."""
-    found = [path]
-    while (following := part_path(path, len(found))).exists():
-        found.append(following)
-    return found
 
 
 class RunWriter:

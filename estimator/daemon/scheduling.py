@@ -1,0 +1,35 @@
+"""How the process is scheduled: real-time priority, interpreter switches, garbage collection."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from another thread
+PRIORITY = 20  # SCHED_FIFO, for all threads: for the loop alone it would starve the readers
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Short switch interval and no garbage collection of what was built at start."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(interval)
+
+
+def real_time() -> str:
+    """Real-time scheduling for this thread and those it starts; '' or one line why not."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        return ""
+    except (OSError, AttributeError) as error:
+        return f"no real-time scheduling ({getattr(error, 'strerror', None) or error}): ticks may be late under load"

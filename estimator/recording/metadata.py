@@ -1,0 +1,43 @@
+"""The metadata records of a recording: their names, their checksums, and the versions they keep."""
+
+from __future__ import annotations
+
+import platform
+import zlib
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
+CHECKSUM = "crc32"
+
+
+def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
+    """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not
+    pass for a setting.
+    """
+    kept = {key: value for key, value in entries.items() if key != CHECKSUM}
+    return {**kept, CHECKSUM: _checksum(name, kept)}
+
+
+def seal_holds(name: str, entries: Mapping[str, str], required: bool) -> bool:
+    """Whether the entries are as sealed; without a seal (another writer's), whether none is
+    required.
+    """
+    return sealed(name, entries) == entries if CHECKSUM in entries else not required
+
+
+def _checksum(name: str, entries: Mapping[str, str]) -> str:
+    text = "\0".join((name, *(part for item in sorted(entries.items()) for part in item)))
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """What computed this run: a replay that differs can say what changed."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for package in ("gritd", "numpy", "filterpy", "scipy"):
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found

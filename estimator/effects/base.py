@@ -48,7 +48,7 @@ class Parameter:
 
     role:   a strength turns the effect off at `off`; a shape says where, how fast, or how often.
     centre: prior mean (a strength's is its off value); sigma: prior standard deviation, the size to
-        be expected.
+    be expected.
     scan:   the fit has many local optima along it, so walk a grid before descending.
     """
 
@@ -179,7 +179,7 @@ class Effect:
         return sensed
 
     def remember(self, memory: float, step: float, situation: Situation) -> float:
-        """On line: the memory one `step` [s] later; situation.memory hands it to the other methods."""
+        """On line: the memory one `step` [s] later; others find it in situation.memory."""
         return memory
 
     @classmethod
@@ -224,6 +224,6 @@ def turning(wheel_speed: Scalar) -> Scalar:
     """Sign of the rotation, −1 … 1, smooth over ±TURNING so that a standing wheel has none.
 
     tanh instead of a jump: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30,
-        1083-1138, section 3.
+    1083-1138, section 3.
     """
     return np.tanh(wheel_speed / TURNING)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from pathlib import Path
 
 from gritd.estimator.effects.base import STAGES, Effect
 
@@ -20,8 +20,8 @@ SHARED = ("base", "library")  # modules of this package that are no effect
 
 def _find() -> dict[str, type[Effect]]:
     found = {}
-    folder = str(Path(__file__).parent)
-    for module in sorted(m.name for m in pkgutil.iter_modules([folder]) if m.name not in SHARED):
+    folders = sys.modules[__package__].__path__
+    for module in sorted(m.name for m in pkgutil.iter_modules(folders) if m.name not in SHARED):
         members = vars(importlib.import_module(f"{__package__}.{module}")).values()
         own = [
             m
@@ -50,7 +50,8 @@ def make(name: str, values: Mapping[str, float]) -> Effect:
         bounds = known[key]
         if not bounds.low <= value <= bounds.high:
             raise ValueError(
-                f"effects.{name}.{key}: {value:g} is outside {bounds.low:g} … {bounds.high:g} {bounds.unit}"
+                f"effects.{name}.{key}: {value:g} is outside"
+                f" {bounds.low:g} … {bounds.high:g} {bounds.unit}"
             )
     return effect(**values)
 

@@ -17,7 +17,7 @@ class PulleySlip(Effect):
     v = (1 + s) v_read,   x = (1 + s) x_read
 
     Source: elastic creep of a belt drive, Johnson (1985), Contact Mechanics, chapter 8: a share of
-        the travel.
+    the travel.
     """
 
     share: float = strength("travel not seen, s", "", typical=0.03, low=-0.1, high=0.4)

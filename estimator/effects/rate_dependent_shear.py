@@ -25,7 +25,7 @@ class RateDependentShear(Effect):
     standing wheel finite
 
     Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten
-        per cent a decade.
+    per cent a decade.
     """
 
     per_decade: float = strength(

@@ -25,7 +25,7 @@ class RateDependentSinkage(Effect):
     K · ((r|ω| + v_f)/(v₀ + v_f))^m,   v₀ = 20 mm/s,   v_f = 1 mm/s keeps a standing wheel finite
 
     Source: Grahn (1991), J. Terramechanics 28: p = k ż^m zⁿ; the penetration rate ż scales with
-        speed.
+    speed.
     """
 
     power: float = strength("exponent of speed, m", "", typical=0.08, low=-0.3, high=0.5)

@@ -15,7 +15,7 @@ class RearContact(Effect):
     θ₂ = −c₃ θ₁, in the rear zone of Eq. (4) and in the integrals (8)-(10)
 
     Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98; Ishigami et al. (2007), J. Field
-        Robotics 24, 233-250.
+    Robotics 24, 233-250.
     """
 
     ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=0.8)
@@ -24,7 +24,8 @@ class RearContact(Effect):
     fingerprint = Fingerprint(
         "sinkage",
         "load",
-        "rides higher, the more the heavier; torque and drawbar pull rise; c seems larger than it is",
+        "rides higher, the more the heavier; torque and drawbar pull rise; c seems larger than it "
+        "is",
     )
     confusable_with = told_apart(
         stress_peak_shift="penetration", multipass="penetration", shear_peak="slip_step"

@@ -24,7 +24,7 @@ class ShearPeak(Effect):
     peaks stand at other displacements: Oida's (1979) hump x e^(1 − x), x = j/k, has its top at k,
     not at 0.69 k, and is this one with K_w = 1.4 k within 7 %.
     Source: Wong (2008), Theory of Ground Vehicles, 4th ed., section 2.4.3; Wong and Preston-Thomas
-        (1983).
+    (1983).
     """
 
     overshoot: float = strength(
@@ -38,7 +38,8 @@ class ShearPeak(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull",
         "sinkage",
-        "more pull and torque where j is about k, less gain where j is far beyond; φ seems larger than it is",
+        "more pull and torque where j is about k, less gain where j is far beyond; φ seems larger "
+        "than it is",
     )
     confusable_with = told_apart(
         rear_contact="slip_step", stress_peak_shift="slip_step", rate_dependent_shear="slip_step"

@@ -17,7 +17,7 @@ class SideWallRubbing(Effect):
 
     The sideways force of a slightly skewed wheel is a share of W, its friction a share of that.
     Source: Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6, who add 0.25 of the
-        sideways force.
+    sideways force.
     """
 
     share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=0.5)

@@ -38,7 +38,8 @@ class SidewallFriction(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull",
         "slip",
-        "torque grows with sinkage faster than the rim explains; pull gains at high slip, loses at low",
+        "torque grows with sinkage faster than the rim explains; pull gains at high slip, loses at "
+        "low",
     )
     confusable_with = told_apart(
         bulldozing="slip_step", coulomb_friction="slip_step", torque_constant_error="slip_step"

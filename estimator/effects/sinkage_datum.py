@@ -15,7 +15,7 @@ class SinkageDatum(Effect):
     z_read = z + z₀
 
     Source: calibration model. A wheel that is zeroed while it rests on the soil hides its static
-        sinkage this way.
+    sinkage this way.
     """
 
     offset: float = strength(

@@ -18,7 +18,7 @@ class SlipSinkage(Effect):
     n = n₀ + n₁ |i|, in Eqs. (3) and (4)
 
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in
-        i.
+    i.
     """
 
     growth: float = strength(

@@ -16,7 +16,7 @@ class StressPeakShift(Effect):
     θₘ = (c₁ + Δc₁ + (c₂ + Δc₂) i) θ₁, Eq. (5)
 
     Source: Wong and Reece (1967), J. Terramechanics 4(1), 81-98: c₁ ≈ 0.18-0.43, c₂ ≈ 0.32-0.41 in
-        sand.
+    sand.
     """
 
     share: float = strength("added to c₁", "", typical=0.1, low=-0.3, high=0.3)

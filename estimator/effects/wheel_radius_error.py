@@ -25,7 +25,8 @@ class WheelRadiusError(Effect):
     fingerprint = Fingerprint(
         "drawbar_pull",
         "sinkage",
-        "drawbar pull, torque and sinkage off, more where the wheel rides deep; slip off most where it is low",
+        "drawbar pull, torque and sinkage off, more where the wheel rides deep; slip off most "
+        "where it is low",
     )
     confusable_with = told_apart(
         pulley_slip="tape", grousers="tape", torque_constant_error="slip_step"

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from gritd.config import packaged
+from gritd.estimator import effects
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config import effects
+from gritd.estimator.config.effects import configured
+from gritd.estimator.effects import library
 from gritd.estimator.effects.base import Effect
 from gritd.tools.commands import simulate
 from gritd.tools.dev import effect_figures
@@ -35,7 +37,7 @@ def cable_drag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[type
     """The page's file, saved under the page's name into a folder that belongs to the package."""
     (tmp_path / "cable_drag.py").write_text(block("python"))
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
-    found = effects._find()
+    found = library._find()
     monkeypatch.setitem(effects.EFFECTS, "cable_drag", found["cable_drag"])
     yield found["cable_drag"]
     sys.modules.pop("gritd.estimator.effects.cable_drag")
@@ -87,7 +89,7 @@ def test_the_configuration_takes_it(cable_drag: type[Effect]) -> None:
     text = packaged().read_text(encoding="utf-8")
     text = re.sub(r"(?ms)^effects:.*?(?=^\w|\Z)", block("yaml"), text)
     read = config.loads(text, "testbed.yaml")
-    (effect,) = effects.configured(read.settings.effects)
+    (effect,) = configured(read.settings.effects)
     assert effect == cable_drag(force=2.0)  # type: ignore[call-arg]
     assert read.settings.effects[0].parameters["force"].sigma == pytest.approx(0.3)
 

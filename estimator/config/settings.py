@@ -8,6 +8,8 @@ from typing import Literal
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
+ENGINES = ("filterpy", "plain")  # of the filter
+
 
 @dataclass(frozen=True)
 class Uncertain:
@@ -127,7 +129,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class FilterSettings:
-    engine: Literal["filterpy", "plain"] = "filterpy"
+    engine: Literal["filterpy", "plain"] = "filterpy"  # of ENGINES
     cohesion_walk: float = 2.0  # [Pa/√s]
     tan_phi_walk: float = 2e-4  # [1/√s]
     ln_k_walk: float = 1e-4  # [1/√s]

@@ -33,6 +33,7 @@ from gritd.estimator.config.schema import (
     entries,
 )
 from gritd.estimator.config.settings import (
+    ENGINES,
     Calibration,
     Channel,
     ConfiguredEffect,
@@ -304,9 +305,7 @@ RATES = {
 }
 
 FILTER = {
-    "engine": Key(
-        Choice(("filterpy", "plain")), "same numbers from both; plain is the faster", "filterpy"
-    ),
+    "engine": Key(Choice(ENGINES), "same numbers from both; plain is the faster", "filterpy"),
     "cohesion_walk": Key(Quantity("Pa/sqrt(s)", low=0), "random walk of c", "2 Pa/sqrt(s)"),
     "tan_phi_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of tan φ", "2e-4 1/sqrt(s)"),
     "ln_k_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of ln k", "1e-4 1/sqrt(s)"),

@@ -1,25 +1,16 @@
-"""The extended Kalman filter on c, tan φ and ln k, with considered nuisances (Schmidt).
+"""What the extended Kalman filter knows of c, tan φ and ln k, and the algebra on it.
 
-Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance.
-They, and ln k while
-slip does not vary, are considered: their uncertainty and their correlation with the state take part
-in every innovation covariance, but their own value and variance never change. Without them a filter
-fed ten windows a second soon claims to know c far better than the calibration of the sensors
-allows.
-
-Two engines share one interface: `FilterpyEngine` is filterpy's ExtendedKalmanFilter with the
-Schmidt gain, and `plain.PlainEngine` the same algebra in plain floats. Both use the Joseph form
-with the gain that was really applied, zeroed rows included, so the covariance stays symmetric and
-positive.
+Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance. They,
+and ln k while slip does not vary, are considered (Schmidt): their uncertainty and their correlation
+with the state take part in every innovation covariance, but their own value and variance never
+change. Without them a filter fed ten windows a second soon claims to know c far better than the
+calibration of the sensors allows.
 """
 
 from __future__ import annotations
 
 from operator import mul
-from typing import NamedTuple, Protocol
-
-import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
+from typing import NamedTuple
 
 C = 0  # cohesion [kPa]
 TAN_PHI = 1  # tangent of the internal friction angle [-]
@@ -48,64 +39,6 @@ class Update(NamedTuple):
     R: Matrix  # (m, m) noise
 
 
-class Engine(Protocol):
-    """The algebra of one step. It knows the nuisances' variances and holds no estimate of its own."""
-
-    def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
-        """Apply a measurement. With consider_k, ln k keeps its value and variance."""
-
-
-class _SchmidtFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy carries no types
-    """filterpy's EKF, whose gain is set to zero for considered states before it is applied
-    anywhere.
-    """
-
-    x: np.ndarray
-    P: np.ndarray
-
-    def consider(self, y: np.ndarray, H: np.ndarray, R: np.ndarray, considered: slice) -> None:
-        cross = self.P @ H.T
-        self.S = H @ cross + R
-        self.K = cross @ np.linalg.inv(self.S)
-        self.K[considered] = 0.0
-        self.y = y
-        self.x = self.x + self.K @ self.y
-        kept = self._I - self.K @ H
-        self.P = kept @ self.P @ kept.T + self.K @ R @ self.K.T
-
-
-class FilterpyEngine:
-    """filterpy behind the Engine interface: one augmented vector [state, nuisances]."""
-
-    def __init__(self, nuisance_variances: Vector) -> None:
-        self._size = size = STATES + len(nuisance_variances)
-        self._prior = np.diag((*(0.0,) * STATES, *nuisance_variances))
-        # made once: a filter's construction costs more than its update; every update sets all that
-        # it reads
-        self._filters = {m: _SchmidtFilter(dim_x=size, dim_z=m) for m in (1, 2)}
-
-    def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
-        ekf = self._filters[len(update.innovation)]
-        ekf.x, ekf.P = np.zeros(self._size), self._prior.copy()
-        ekf.x[:STATES], ekf.P[:STATES, :STATES] = estimate.x, estimate.P
-        ekf.P[:STATES, STATES:] = estimate.cross
-        ekf.P[STATES:, :STATES] = ekf.P[:STATES, STATES:].T
-        H = np.array([h + g for h, g in zip(update.H, update.G, strict=True)])
-        y, R = np.array(update.innovation), np.array(update.R)
-        if consider_k or self._size > STATES:
-            ekf.consider(y, H, R, slice(LN_K if consider_k else STATES, None))
-        else:
-            ekf.update(y, lambda _: H, lambda _: np.zeros_like(y), R=R)
-        P = 0.5 * (ekf.P + ekf.P.T)
-        return Estimate(
-            tuple(ekf.x[:STATES].tolist()), _rows(P[:STATES, :STATES]), _rows(P[:STATES, STATES:])
-        )
-
-
-def _rows(matrix: np.ndarray) -> Matrix:
-    return tuple(tuple(row) for row in matrix.tolist())
-
-
 def predict(estimate: Estimate, walk: Vector) -> Estimate:
     """Random walk: add the variances `walk` (3,) to the diagonal of P."""
     (a, b, c), (_, d, e), (_, _, f) = estimate.P
@@ -113,7 +46,9 @@ def predict(estimate: Estimate, walk: Vector) -> Estimate:
     return Estimate(estimate.x, ((a, b, c), (b, d, e), (c, e, f)), estimate.cross)
 
 
-def crossed(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> tuple[Vector, Vector]:
+def cross_covariances(
+    estimate: Estimate, variances: Vector, h: Vector, g: Vector
+) -> tuple[Vector, Vector]:
     """Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and
     g (q,).
     """

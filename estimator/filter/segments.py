@@ -94,7 +94,7 @@ class Memory(NamedTuple):
         slips = [stretch.mean.slip.value for stretch in self.stretches if stretch.windows >= STEADY]
         return max(slips) - min(slips) if slips else 0.0
 
-    def waited(self, elapsed: float) -> Memory:
+    def paused(self, elapsed: float) -> Memory:
         """Time passed without an accepted window."""
         return self._replace(pending=self.pending + elapsed)
 

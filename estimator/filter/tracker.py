@@ -11,14 +11,13 @@ from math import exp, hypot, log, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
     KPA,
     STATES,
     TAN_PHI,
     C,
-    Engine,
     Estimate,
-    FilterpyEngine,
     Update,
     Vector,
     dot,
@@ -27,7 +26,6 @@ from gritd.estimator.filter.estimate import (
     variance,
 )
 from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
-from gritd.estimator.filter.plain import PlainEngine
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
@@ -55,11 +53,6 @@ PATIENCE = 5.0  # [s] after a reset before the next
 # …
 RELAPSE = 20.0
 WIDEST = 6  # … so often
-
-ENGINES: dict[str, type[FilterpyEngine] | type[PlainEngine]] = {
-    "filterpy": FilterpyEngine,
-    "plain": PlainEngine,
-}
 
 
 Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
@@ -126,7 +119,7 @@ class Tracker:
     def __init__(self, settings: Settings, engine: str | None = None) -> None:
         self.settings = settings
         self.measurement = Measurement(settings)
-        self.engine: Engine = ENGINES[engine or settings.filter.engine](self.measurement.variances)
+        self.engine = make_engine(engine or settings.filter.engine, self.measurement.variances)
         self._window = round(NS / settings.rates.update)
         self._required = REQUIRED_BITS | (
             CHANNEL_BITS["wrench"] if settings.wrench is not None else 0
@@ -210,7 +203,7 @@ class Tracker:
             )
             state = self._remember(state, now, taken, elapsed)
         else:
-            state = state._replace(memory=state.memory.waited(elapsed))
+            state = state._replace(memory=state.memory.paused(elapsed))
         return self._judge(state, aids, elapsed), aids
 
     def _walk(self, estimate: Estimate, elapsed: float) -> Estimate:

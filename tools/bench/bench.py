@@ -24,7 +24,9 @@ import numpy as np
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
-from gritd.estimator.filter.tracker import ENGINES, Tracker
+from gritd.estimator.config.settings import ENGINES
+from gritd.estimator.filter.engine import make_engine
+from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import played
@@ -44,7 +46,6 @@ from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 SEED = 2005
 RIM_SPEED = 0.02  # [m/s]
 LEVELS = [(load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6)]
-ENGINE_NAMES = tuple(ENGINES)
 
 Figures = dict[str, float]
 
@@ -140,7 +141,7 @@ def replay(subject: Subject) -> Figures:
     def run(engine: str) -> None:
         estimates(subject.configuration.settings, read(subject.path), engine)
 
-    spent: dict[str, list[float]] = {engine: [] for engine in ENGINE_NAMES}
+    spent: dict[str, list[float]] = {engine: [] for engine in ENGINES}
     for _ in range(subject.sizes.repeats):
         for engine, times in spent.items():
             times.append(_timed(partial(run, engine)))
@@ -197,7 +198,7 @@ def update(subject: Subject) -> Figures:
     offered = measurement.linearise(account.now, measurement.predict(estimate, account.now))
 
     def cost(engine: str) -> float:
-        apply = ENGINES[engine](measurement.variances).update
+        apply = make_engine(engine, measurement.variances).update
         return (
             statistics.median(
                 subject.repeated(lambda: [apply(estimate, offered, False) for _ in range(200)])
@@ -205,7 +206,7 @@ def update(subject: Subject) -> Figures:
             / 200
         )
 
-    costs = {engine: cost(engine) for engine in ENGINE_NAMES}
+    costs = {engine: cost(engine) for engine in ENGINES}
     return {
         **costs,
         "ratio": costs["filterpy"] / costs["plain"],
@@ -316,7 +317,7 @@ def report(figures: dict[str, Figures]) -> str:
             *(
                 f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to estimates, "
                 f"best {r[f'{name}_best']:.0f}"
-                for name in ENGINE_NAMES
+                for name in ENGINES
             ),
             f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
             f"ratio {f['ratio']:.1f}",

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.config.configuration import Configuration, load, loads
-from gritd.estimator.config.settings import Settings, settings_of_run
+from gritd.estimator.config.settings import ENGINES, Settings, settings_of_run
 from gritd.estimator.messages.record import TICK_FIELDS, TICK_NAMES, Status
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import RecordedTick, played, without_absent
@@ -271,9 +271,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--verify", action="store_true", help="compare every field of every /tick, bit for bit"
     )
-    parser.add_argument(
-        "--engine", choices=("filterpy", "plain"), help="instead of the configured filter engine"
-    )
+    parser.add_argument("--engine", choices=ENGINES, help="instead of the configured filter engine")
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write readings and recomputed ticks to a recording"
     )

@@ -31,8 +31,7 @@ from gritd.drivers.framing_cobs import CobsFraming
 from gritd.drivers.framing_cobs import encode as encode_cobs
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
-from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.tracker import ENGINES
+from gritd.estimator.config.settings import ENGINES, Settings
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.record import TICK_NAMES
 from gritd.estimator.messages.run_info import RunInfo

@@ -28,8 +28,7 @@ import numpy as np
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config.settings import Rates, Settings
-from gritd.estimator.filter.tracker import ENGINES
+from gritd.estimator.config.settings import ENGINES, Rates, Settings
 from gritd.estimator.messages.readings import ENCODERS, NS, Reading
 from gritd.estimator.messages.record import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
@@ -85,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--engine",
-        choices=tuple(ENGINES),
+        choices=ENGINES,
         default="filterpy",
         help="of the pipeline; default filterpy",
     )

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from gritd.estimator.filter.estimate import FilterpyEngine
+from gritd.estimator.filter.filterpy_engine import FilterpyEngine
 from gritd.tools.bench import bench
 
 SMALL = bench.Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, simulated=3.0)
@@ -41,9 +41,9 @@ def test_each_replay_runs_the_engine_it_names(tmp_path, monkeypatch):
         FilterpyEngine, "update", lambda *given: applied.append(1) or honest(*given)
     )
     subject = bench._subject(SMALL, tmp_path)
-    monkeypatch.setattr(bench, "ENGINE_NAMES", ("plain",))
+    monkeypatch.setattr(bench, "ENGINES", ("plain",))
     assert set(bench.replay(subject)) == {"plain_speed", "plain_best"} and not applied
-    monkeypatch.setattr(bench, "ENGINE_NAMES", ("filterpy",))
+    monkeypatch.setattr(bench, "ENGINES", ("filterpy",))
     bench.replay(subject)
     assert applied
 

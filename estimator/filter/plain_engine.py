@@ -16,13 +16,13 @@ from gritd.estimator.filter.estimate import (
     Matrix,
     Update,
     Vector,
-    crossed,
+    cross_covariances,
     dot,
 )
 
 
 class PlainEngine:
-    """See filter.Engine. One or two measured components, written out: loops over two cost more than
+    """See engine.Engine. One or two measured components, written out: loops over two cost more than
     the algebra.
     """
 
@@ -35,7 +35,7 @@ class PlainEngine:
 
     def _one(self, estimate: Estimate, update: Update, states: int) -> Estimate:
         (y,), (h,), (g,), ((r,),) = update
-        m, n = crossed(estimate, self._variances, h, g)
+        m, n = cross_covariances(estimate, self._variances, h, g)
         s = dot(h, m) + dot(g, n) + r
         gain = _kept([value / s for value in m], states)
         x = tuple([value + k * y for value, k in zip(estimate.x, gain, strict=True)])
@@ -54,8 +54,8 @@ class PlainEngine:
 
     def _two(self, estimate: Estimate, update: Update, states: int) -> Estimate:
         (y, z), (h_y, h_z), (g_y, g_z), ((r_y, r_yz), (_, r_z)) = update
-        m_y, n_y = crossed(estimate, self._variances, h_y, g_y)
-        m_z, n_z = crossed(estimate, self._variances, h_z, g_z)
+        m_y, n_y = cross_covariances(estimate, self._variances, h_y, g_y)
+        m_z, n_z = cross_covariances(estimate, self._variances, h_z, g_z)
         s_y = dot(h_y, m_y) + dot(g_y, n_y) + r_y
         s_yz = dot(h_y, m_z) + dot(g_y, n_z) + r_yz
         s_z = dot(h_z, m_z) + dot(g_z, n_z) + r_z

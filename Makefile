@@ -63,6 +63,7 @@ uninstall: ## take it away again; configuration and recordings stay
 	@PYTHON="$(PYTHON)" DESTDIR="$(DESTDIR)" tools/install uninstall
 
 wheel: $(READY) ## dist/gritd-….whl
+	@rm -rf build  # setuptools packs what an earlier build left there
 	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir dist .
 	@ls dist/*.whl
 

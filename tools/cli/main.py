@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
+from gritd import __version__
 from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
@@ -129,18 +130,8 @@ class _Version(argparse.Action):
     """Say the version and end."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        print(f"gritd {version()}")
+        print(f"gritd {__version__}")
         parser.exit()
-
-
-def version() -> str:
-    """The installed version."""
-    from importlib import metadata  # only for whoever asks: every command would wait for it
-
-    try:
-        return metadata.version("gritd")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _fail(error: Exception) -> int:

@@ -7,13 +7,13 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from string import Template
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.readings import CHANNELS, Reading
 from gritd.estimator.messages.run_info import RunInfo
@@ -23,7 +23,6 @@ from gritd.tools.cli.command import USAGE
 from gritd.tools.importers._files import Array, RigFileError
 
 NS = 1_000_000_000
-TEMPLATES = resources.files("config")
 UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measure: no information
 
 
@@ -63,7 +62,7 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
     """Fill a template of config/ and write it into the output folder; returns it as loaded. Raises
     RigFileError.
     """
-    text = Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(values)
+    text = Template(packaged(template).read_text(encoding="utf-8")).substitute(values)
     path = output / name
     try:
         output.mkdir(parents=True, exist_ok=True)

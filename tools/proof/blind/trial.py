@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
+import gritd
 from gritd.tools.proof.blind import cases, handover, seal
 from gritd.tools.proof.blind.strata import Assignment
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(gritd.__file__).parents[1]  # of the checkout, or site-packages
 DIAGNOSE = (sys.executable, "-m", "gritd", "diagnose")
 PATIENCE = 1200.0  # [s] after which a diagnosis is given up and counts as failed
 OUTCOME = "outcome.json"

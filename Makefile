@@ -6,7 +6,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow lint format type docs proof scenarios fuzz soak install uninstall wheel clean
+.PHONY: help venv demo test slow package lint format type docs proof scenarios fuzz soak install uninstall wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -30,6 +30,9 @@ test: $(READY) ## the tests, without the slow ones
 
 slow: $(READY) ## the slow tests
 	@$(BIN)/python -m pytest --quiet -m slow
+
+package: $(READY) ## the wheel, installed beside foreign packages of our folders' names
+	@$(BIN)/python -m pytest --quiet -m slow tests/test_package.py
 
 lint: $(READY) ## ruff: lint and format
 	@$(BIN)/ruff check --quiet .

@@ -1,8 +1,8 @@
 """gritd: learns the soil under a rover wheel while the wheel drives.
 
 `import gritd` loads nothing else. The command line is `gritd` or `python -m gritd`. The subpackages
-`gritd.estimator`, `gritd.drivers`, `gritd.config` and `gritd.tools` are imported by their full names
-and may change with every version.
+`gritd.estimator`, `gritd.drivers`, `gritd.config` and `gritd.tools` are imported by their full
+names and may change with every version.
 """
 
 __all__ = ["__version__"]

@@ -1,7 +1,7 @@
 """A diagnoser that knows nothing of soil: it stands for `gritd diagnose` where only the trial
 around it is tested.
 
-    python -m tests.proof.stub FILES --config F --json OUT
+    python -m tests.tools.proof.blind.stub FILES --config F --json OUT
 
 It always names coulomb_friction, and tells what it saw of its folder and environment.
 """

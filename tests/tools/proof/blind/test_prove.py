@@ -14,7 +14,7 @@ from gritd.tools.cli.command import CommandError
 from gritd.tools.proof.blind import batch, command, trial
 
 ROOT = Path(__file__).resolve().parents[4]
-STUB = (sys.executable, "-m", "tests.proof.stub")
+STUB = (sys.executable, "-m", "tests.tools.proof.blind.stub")
 DRAWN = ("case", "seed", "stratum", "effects", "soil", "habits", "runs", "chain", "noise_factor")
 SMALL = ["--cases", "2", "--seed", "3", "--jobs", "1", "--strata", "none"]
 

@@ -15,6 +15,7 @@ from gritd import __version__
 from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
+from gritd.tools.cli.terminal import shown
 
 # command -> (module, what it does)
 COMMANDS = {
@@ -66,8 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
     _speak_as_the_terminal_does()
     _calculate_alike_everywhere()
+    with shown(sys.stdout, sys.stderr):
+        return _main(sys.argv[1:] if argv is None else argv)
+
+
+def _main(given: Sequence[str]) -> int:
     parser = _parser()
-    given = sys.argv[1:] if argv is None else argv
     if not given:
         parser.error("expected a command")
     arguments = parser.parse_args(given)

@@ -8,6 +8,9 @@ import sys
 import time
 from types import TracebackType
 
+from gritd.estimator.visible import visible
+from gritd.tools.cli.terminal import control
+
 QUIET = 2.0  # [s] nothing is shown before
 EVERY = {True: 0.2, False: 5.0}  # [s] between lines on a terminal, and elsewhere
 
@@ -41,14 +44,14 @@ class Progress:
             self._show(now - self._start)
 
     def _show(self, elapsed: float) -> None:
-        text = f"{self._what}: {self._done}"
+        text = f"{visible(self._what)}: {self._done}"
         if self._total:
             left = elapsed * (self._total - self._done) / max(self._done, 1)
             text += f" of {self._total} ({self._done / self._total:.0%}), {left:.0f} s left"
         print(
             f"\r\033[K{text}" if self._terminal else text,
             end="" if self._terminal else "\n",
-            file=sys.stderr,
+            file=control(sys.stderr),
             flush=True,
         )
         self._shown = True

@@ -22,7 +22,9 @@ from typing import IO, get_args
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.topics import TOPICS
 from gritd.estimator.threads.stop_request import StopRequest
+from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, number, whole
+from gritd.tools.cli.terminal import control
 from gritd.tools.commands import demo_verdict as verdict
 from gritd.tools.report import figure
 from gritd.tools.testbed.plant import PlantKind
@@ -154,8 +156,12 @@ def live_line() -> Iterator[Callable[[str], None]]:
     if not sys.stdout.isatty():
         yield lambda text: print(text, flush=True)
         return
+    out = control(sys.stdout)
     yield lambda text: print(
-        f"\r\033[K{text[: os.get_terminal_size().columns - 1]}", end="", flush=True
+        f"\r\033[K{visible(text[: os.get_terminal_size().columns - 1])}",
+        end="",
+        file=out,
+        flush=True,
     )
     print()
 

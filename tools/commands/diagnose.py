@@ -24,7 +24,9 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
+from gritd.tools.cli.terminal import control
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands import diagnose_redo as redo
 from gritd.tools.diagnose.explain import provenance
@@ -242,7 +244,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _said(what: str) -> None:
     if sys.stderr.isatty():
-        print(f"\r\033[K{what} …", end="", file=sys.stderr, flush=True)
+        out = control(sys.stderr)
+        print(f"\r\033[K{visible(what)} …", end="", file=out, flush=True)
 
 
 def _foreseen(following: NextExperiment) -> str:
@@ -290,4 +293,5 @@ def text(found: Diagnosis) -> str:
         lines.append(f"  on-line filter: {found.fit.innovation_note}")
     if found.next_experiment is not None:
         lines.append(f"  next: {found.next_experiment.action}{_foreseen(found.next_experiment)}")
-    return "\n".join([*lines, found.remaining, *(f"note: {c}" for c in found.caveats)])
+    lines += [found.remaining, *(f"note: {c}" for c in found.caveats)]
+    return "\n".join(map(visible, lines))

@@ -11,7 +11,15 @@ from math import degrees
 from typing import Any
 
 from gritd.tools.cli.command import DONE, Parser
-from gritd.tools.commands.status import Report, add_socket, connected, disagreement, reports
+from gritd.tools.cli.terminal import control
+from gritd.tools.commands.status import (
+    Report,
+    add_socket,
+    connected,
+    disagreement,
+    reports,
+    told,
+)
 
 EVERY = 0.2  # [s] between pictures
 OPEN, CLOSE = (
@@ -47,7 +55,7 @@ def main(argv: Sequence[str]) -> int:
     arguments = parser.parse_args(argv)
     with connected(arguments.socket) as connection:
         if arguments.once or not redrawable():
-            print("\n".join(lines(next(reports(connection)))))
+            print("\n".join(told(lines, next(reports(connection)))))
             return DONE
         with screen() as show:
             shown = 0.0
@@ -70,17 +78,19 @@ def redrawable() -> bool:
 @contextmanager
 def screen() -> Iterator[Callable[[Report], None]]:
     """A picture that is redrawn in place; the terminal is left as it was found."""
-    print(OPEN, end="", flush=True)
+    out = control(sys.stdout)
+    print(OPEN, end="", file=out, flush=True)
     try:
         yield _redraw
     finally:
-        print(CLOSE, end="", flush=True)
+        print(CLOSE, end="", file=out, flush=True)
 
 
 def _redraw(report: Report) -> None:
     size = os.get_terminal_size()
-    kept = [_fitting(line, size.columns) for line in lines(report)][: size.lines]
-    print(HOME + f"{CLEAR_LINE}\n".join(kept) + CLEAR_LINE + CLEAR_BELOW, end="", flush=True)
+    kept = [_fitting(line, size.columns) for line in told(lines, report)][: size.lines]
+    picture = HOME + f"{CLEAR_LINE}\n".join(kept) + CLEAR_LINE + CLEAR_BELOW
+    print(picture, end="", file=control(sys.stdout), flush=True)
 
 
 def _fitting(line: str, columns: int) -> str:

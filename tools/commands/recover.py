@@ -11,6 +11,7 @@ from pathlib import Path
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.metadata import RECOVERED, sealed
 from gritd.estimator.recording.salvage import Recording, read
+from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, DONE, Parser
 from gritd.tools.cli.files import unread, unwritten, vacant
 
@@ -36,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     except RecordingError as error:
         raise unwritten(error) from None
     for line in recording.damage:
-        print(f"{source}: {line}", file=sys.stderr)
+        print(visible(f"{source}: {line}"), file=sys.stderr)
     print(f"{target}: {summary(recording)}")
     return DONE if recording.saved and not recording.attachments else DAMAGED
 

@@ -23,6 +23,7 @@ from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
+from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
@@ -57,7 +58,7 @@ def _replay(path: Path, arguments: Namespace) -> int:
         for line in recording.damage or (
             [] if recording.closed else ["was not closed: replayed as far as it goes"]
         ):
-            print(f"{recording.path}: {line}", file=sys.stderr)
+            print(visible(f"{recording.path}: {line}"), file=sys.stderr)
     damaged = any(recording.damage for recording in recordings)
     configuration = _configuration(recordings[0], arguments.config)
     if arguments.verify:

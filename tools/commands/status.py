@@ -9,16 +9,18 @@ import os
 import socket
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser
 from gritd.tools.commands.run import SOCKET
 
 PLACES = (Path("/run/gritd") / SOCKET, Path("runs") / SOCKET)
 PATIENCE = 10.0  # [s] with a daemon, or a computer, that is held up
 MAX_LINE = 1 << 20  # [bytes] of a report
+NO_GRITD = "what answers on this socket is no gritd"
 
 Report = dict[str, Any]
 
@@ -89,8 +91,16 @@ def add_socket(parser: Parser) -> None:
 
 def _text(arguments: Namespace, report: Report) -> str:
     if arguments.json:
-        return json.dumps(report, indent=2, ensure_ascii=False)
-    return "\n".join(prometheus(report)) if arguments.prometheus else "\n".join(summary(report))
+        return json.dumps(report, indent=2)
+    return "\n".join(told(prometheus if arguments.prometheus else summary, report))
+
+
+def told(form: Callable[[Report], Iterator[str]], report: Report) -> list[str]:
+    """A report in lines, whoever sent it. Raises CommandError where it has not the fields of one."""
+    try:
+        return [visible(line) for line in form(report)]
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        raise CommandError(NO_GRITD) from None
 
 
 # --- the socket -----------------------------------------------------------------------------------
@@ -143,7 +153,7 @@ def _parsed(line: bytes) -> Report:
         not isinstance(report, dict)
         or not {"healthy", "status", "tick", "loop", "log", "devices"} <= report.keys()
     ):
-        raise CommandError("what answers on this socket is no gritd")
+        raise CommandError(NO_GRITD)
     return report
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gritd.estimator.visible import visible
 from gritd.tools.diagnose.explain.result import SoilFit, Trace
 from gritd.tools.report import figures, redo
 from gritd.tools.report.html import Markup, page, section, table, tag
@@ -189,4 +190,5 @@ def printed(found: Comparison) -> str:
             f"{name_of(k):20}{quantity(found.soil.prior[k])}  →  {quantity(q)}"
             for k, q in found.soil.after.items()
         ]
-    return "\n".join([*lines, *(f"note: {caveat}" for caveat in found.caveats)])
+    lines += [f"note: {caveat}" for caveat in found.caveats]
+    return "\n".join(map(visible, lines))

@@ -1,0 +1,18 @@
+"""Text from a file, a device or a socket, fit to be shown.
+
+A terminal obeys what stands between letters: escape sequences, a carriage return, marks that turn
+the direction of writing. Shown text has none of them.
+"""
+
+from __future__ import annotations
+
+
+def visible(text: str) -> str:
+    """The text in one line: what cannot be printed stands as an escape, such as `\\x1b`."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else _escape(c) for c in text)
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -148,9 +148,9 @@ class Logging:
     compression: Literal["zstd", "lz4", "none"] = "zstd"
     part_size: float = 256e6  # [bytes] a new part of the recording begins beyond it …
     part_time: float = 3600.0  # [s] … and after this time
-    disk_cap: float = float(
-        "inf"
-    )  # [bytes] of all recordings in the folder; the oldest closed ones are deleted
+    # [bytes] of all recordings in the folder; the oldest closed ones are deleted
+    disk_cap: float = float("inf")
+    readable_by: Literal["owner", "group"] = "owner"
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from gritd.estimator.config.devices import NAME, device
+from gritd.estimator.config.names import EXPECTED, PATTERN
 from gritd.estimator.config.schema import (
     ABSENT,
     NEEDED,
@@ -342,10 +343,13 @@ LOGGING = {
         "all recordings in the folder together; beyond it the oldest closed ones are deleted",
         UNLIMITED,
     ),
+    "readable_by": Key(
+        Choice(("owner", "group")), "who may read the recordings: mode 0600 or 0640", "owner"
+    ),
 }
 
 RUN = {
-    "name": Key(Text(), "name of the run", "''"),
+    "name": Key(Text(EXPECTED, PATTERN), "name of the run and its files", "''"),
     "load": Key(Quantity("N", above=0), "nominal load of the run", ABSENT),
     "pass": Key(Integer(1, 1000), "how often the wheel goes over this track, from 1", "1"),
     "start": Key(Quantity("m"), "starting position of the wheel on the bed", "0 m"),

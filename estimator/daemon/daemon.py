@@ -37,6 +37,7 @@ INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
 # [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s
 # more
 STOP = 1.5
+MODES = {"owner": 0o600, "group": 0o640}  # of a recording, by logging.readable_by
 WALL_STEP = 0.05  # [s] a jump of the wall clock worth a line in the log
 
 # Looks (of WATCH) without a sign of life before a thread is said to hang.
@@ -218,6 +219,7 @@ def _writer(path: Path, configuration: Configuration, run: RunInfo) -> WriterThr
         run,
         compression=logging.compression,
         flush_interval=logging.flush_interval,
+        mode=MODES[logging.readable_by],
     )
 
 

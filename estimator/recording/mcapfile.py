@@ -11,12 +11,15 @@ from __future__ import annotations
 import errno
 import os
 import random
+import stat
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from io import FileIO
 from pathlib import Path
+from typing import BinaryIO
 
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
@@ -80,6 +83,20 @@ def reported(path: Path, doing: str) -> Iterator[None]:
         ) from error
 
 
+def opened(path: Path) -> BinaryIO:
+    """A file to read. A pipe or a device is refused without waiting for it. Raises OSError."""
+    file = open(  # noqa: SIM115 - for the caller to close
+        path,
+        "rb",
+        buffering=1 << 18,
+        opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK),
+    )
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise OSError(errno.EINVAL, "it is no regular file")
+
+
 def sync(fileno: int) -> None:
     """fdatasync, where the file system knows it."""
     try:
@@ -116,9 +133,17 @@ class McapFile:
 
     A write that fails takes back what it wrote in part, so the file ends at its last whole record
     and the same call can be made again. Raises RecordingError.
+
+    mode: the file's permissions; None leaves them to the umask.
     """
 
-    def __init__(self, path: Path, compression: str = "zstd", library: str = LIBRARY) -> None:
+    def __init__(
+        self,
+        path: Path,
+        compression: str = "zstd",
+        library: str = LIBRARY,
+        mode: int | None = None,
+    ) -> None:
         if compression not in ("zstd", "lz4", "none"):
             raise RecordingError(
                 f"{path}: compression {compression!r} is not one of zstd, lz4, none"
@@ -136,9 +161,11 @@ class McapFile:
         self._crc = 0
         self._draft = path.with_name(f".{path.name}{DRAFT}")
         with reported(path, "create"):
-            if path.exists():
+            if os.path.lexists(path):
                 raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
-            self._file = open(self._draft, "wb", buffering=0)  # noqa: SIM115 - it lives as long as the run
+            self._file = _created(self._draft)
+            if mode is not None:
+                os.fchmod(self._file.fileno(), mode)
         with self._discarding():
             self._append(MAGIC + record_bytes(Header(PROFILE, library)))
 
@@ -312,6 +339,17 @@ class McapFile:
             metadata_count=len(self._metadata_index),
             schema_count=schemas,
         )
+
+
+def _created(draft: Path) -> FileIO:
+    """A new file, in place of one that was begun and left. Raises OSError where the name leads to
+    something else: a link, a pipe, a folder.
+    """
+    if os.path.lexists(draft):
+        if not stat.S_ISREG(draft.lstat().st_mode):
+            raise OSError(errno.EEXIST, f"{draft.name} is there and is no regular file")
+        draft.unlink()
+    return open(draft, "xb", buffering=0)
 
 
 def _compressor(kind: str) -> Callable[[bytes], bytes]:

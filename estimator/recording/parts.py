@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import time
+from itertools import count, takewhile
 from pathlib import Path
 
 
@@ -10,7 +12,7 @@ def run_path(folder: Path, name: str, started: int) -> Path:
     """RUN-YYYYmmdd-HHMMSS.mcap, in UTC, not yet taken."""
     stem = f"{name or 'run'}-{time.strftime('%Y%m%d-%H%M%S', time.gmtime(started / 1e9))}"
     paths = (folder / f"{stem}{suffix}.mcap" for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
-    return next(path for path in paths if not path.exists())
+    return next(path for path in paths if not os.path.lexists(path))
 
 
 def part_path(path: Path, part: int) -> Path:
@@ -19,8 +21,8 @@ def part_path(path: Path, part: int) -> Path:
 
 
 def parts(path: Path) -> list[Path]:
-    """The recording and the files that continue it, in order, as far as they exist."""
-    found = [path]
-    while (following := part_path(path, len(found))).exists():
-        found.append(following)
-    return found
+    """The recording and the files that continue it, in order, as far as they exist. What has a
+    part's name and is no file is passed over, as the writer did.
+    """
+    names = takewhile(os.path.lexists, (part_path(path, part) for part in count(1)))
+    return [path, *(name for name in names if name.is_file())]

@@ -4,7 +4,9 @@ never.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import os
+import stat
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,9 +24,11 @@ def sweep(folder: Path) -> list[Path]:
     for draft in sorted(folder.glob(f".*.mcap{DRAFT}")):
         path = draft.with_name(draft.name[1:].removesuffix(DRAFT))
         with suppress(OSError):  # one that cannot be read is left for whoever can
+            if not _is_file(draft):
+                continue
             if not _messages(draft):
                 draft.unlink()
-            elif not path.exists():
+            elif not os.path.lexists(path):
                 found.append(draft.rename(path))
     return found
 
@@ -37,23 +41,43 @@ def _messages(draft: Path) -> bool:
             return False
 
 
-def trim(folder: Path, cap: float, open_files: Collection[Path]) -> list[Path]:
-    """Delete the oldest recordings until all of them take no more than `cap` [bytes]; what was
-    deleted.
+def trim(folder: Path, cap: float, open_files: Collection[Path]) -> Iterator[Path]:
+    """Delete the oldest recordings until all of them take no more than `cap` [bytes]; each that was
+    deleted. Only files count: a link or a folder of a recording's name is passed over.
 
-    Raises OSError where the folder cannot be read or a file cannot be deleted.
+    Raises OSError where the folder cannot be read; where a file cannot be deleted, after all the
+    others were tried.
     """
-    found = [
-        (entry.stat().st_mtime_ns, entry.stat().st_size, entry) for entry in folder.glob("*.mcap")
-    ]
+    found = sorted(_sizes(folder))
     kept = {path.absolute() for path in open_files}
     excess = sum(size for _, size, _ in found) - cap
-    deleted = []
-    for _, size, path in sorted(found):
+    failure = None
+
+    for _, size, path in found:
         if excess <= 0:
             break
-        if path.absolute() not in kept:
-            path.unlink()
-            deleted.append(path)
-            excess -= size
-    return deleted
+        if path.absolute() in kept:
+            continue
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            failure = error
+            continue
+        excess -= size
+        yield path
+
+    if failure is not None:
+        raise failure
+
+
+def _sizes(folder: Path) -> Iterator[tuple[int, int, Path]]:
+    """When each recording was written last [ns], its size [bytes] and its path."""
+    for path in folder.glob("*.mcap"):
+        with suppress(FileNotFoundError):  # deleted meanwhile
+            status = path.lstat()
+            if stat.S_ISREG(status.st_mode):
+                yield status.st_mtime_ns, status.st_size, path
+
+
+def _is_file(path: Path) -> bool:
+    return stat.S_ISREG(path.lstat().st_mode)

@@ -30,6 +30,8 @@ class RunWriter:
     memory until `flush`, or until a chunk is full. After an error the messages not yet written are
     kept, and `flush` may be called again.
 
+    mode: the file's permissions; None leaves them to the umask.
+
     Raises RecordingError where the file cannot be created or written, ValueError where a message
     does not fit its topic.
     """
@@ -43,11 +45,12 @@ class RunWriter:
         *,
         compression: str = "zstd",
         chunk_size: int = CHUNK_SIZE,
+        mode: int | None = None,
     ) -> None:
         self.path = Path(path)
         self._chunk_size = chunk_size
         self._pending = _Pending()
-        self._file = McapFile(self.path, compression)
+        self._file = McapFile(self.path, compression, mode=mode)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
         with self._file.beginning():
             self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **versions()}))

@@ -32,7 +32,7 @@ from gritd.estimator.recording.blocks import (
 )
 from gritd.estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
 from gritd.estimator.recording.decoding import Chunk, Source, select
-from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, reported
+from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, opened, reported
 from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RECOVERED, RUN, seal_holds
 from gritd.estimator.recording.topics import RAW_TOPICS
 
@@ -90,7 +90,7 @@ class Recording:
 
     def chunks(self) -> Iterator[Chunk]:
         """The good messages, block by block in file order, still encoded."""
-        with reported(self.path, "read"), open(self.path, "rb", buffering=1 << 18) as file:
+        with reported(self.path, "read"), opened(self.path) as file:
             for number, block in enumerate(self._blocks):
                 yield self._kept.get(number) or self._chunk(file, block)
 
@@ -156,7 +156,7 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
     lacks a field in it.
     """
     path = Path(path)
-    with reported(path, "read"), open(path, "rb", buffering=1 << 18) as file:
+    with reported(path, "read"), opened(path) as file:
         try:
             contents = Walk(file, path.stat().st_size).run()
         except RecordingError as error:

@@ -86,11 +86,16 @@ class WriterThread:
         flush_interval: float = 0.2,
         capacity: int = CAPACITY,
         retry: float = RETRY,
+        mode: int | None = None,
     ) -> None:
         self._queue = _Queue(capacity)
         self._sync = Syncer()
         self._parts = _Parts(
-            Path(path), tuple(topics), config_yaml, run, compression, self._sync.request
+            Path(path),
+            config_yaml,
+            run,
+            partial(RunWriter, topics=tuple(topics), compression=compression, mode=mode),
+            self._sync.request,
         )
         self._interval = flush_interval
         self._retry = retry
@@ -320,17 +325,14 @@ class _Parts:
     def __init__(
         self,
         path: Path,
-        topics: tuple[Topic, ...],
         config_yaml: str,
         run: RunInfo,
-        compression: str,
+        make: Callable[..., RunWriter],
         sync: Callable[[int], None],
     ) -> None:
         self._run, self._sync = run, sync
         self._config = config_yaml
-        self._make = partial(
-            RunWriter, topics=topics, compression=compression, chunk_size=sys.maxsize
-        )  # see _flush
+        self._make = partial(make, chunk_size=sys.maxsize)  # see _flush
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
         self.writer.expect(LARGEST)
         self.files = [path]
@@ -342,8 +344,8 @@ class _Parts:
 
         Raises RecordingError, and nothing has changed.
         """
-        number = next(n for n in count(len(self.files)) if not part_path(self.files[0], n).exists())
-        path = part_path(self.files[0], number)
+        paths = ((n, part_path(self.files[0], n)) for n in count(len(self.files)))
+        number, path = next((n, path) for n, path in paths if not os.path.lexists(path))
         run = replace(self._run, part=number, lost_before=lost)
         new = self._make(path, config_yaml=config_yaml or self._config, run=run)
         self._config = config_yaml or self._config

@@ -2,26 +2,41 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import re
 import socket
 import subprocess
 import sys
-from contextlib import contextmanager
-from dataclasses import asdict
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from threading import Thread
 
-import pytest
-
 from gritd.config import packaged
-from gritd.estimator.daemon.daemon import TOPICS
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.cdr import Topic
-from gritd.estimator.recording.run import RunInfo, RunWriter
-from tests.scenarios.rig import ROOT, TESTBED, driven
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.estimator.recording.topics import TOPICS
+from tests.scenarios.rig import (
+    ROOT,
+    TESTBED,
+    WIRES,
+    DaemonProcess,
+    Wires,
+    driven,
+    log_lines,
+    until,
+)
 
 QUICK = True
 ESCAPES = "terminal escapes in names"
+OUTSIDE = "names that lead out of the folder"
+OBSTACLES = "symlinked lock, FIFO, killed parent"
+READABLE = "world-writable configuration, readable recordings"
+COMMANDS = "the commands as processes"
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r\nfake line"
 CONTROL = re.compile(r"[^\S\n ]|[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
@@ -118,6 +133,154 @@ def test_escapes_are_shown_not_sent(tmp_path, figure):
     assert [said[name][0] for name in ("replay", "recover")] == [3, 3]
     assert r"\x1b[2J" in said["status"][1] and r"\x1b[2J" in said["monitor --once"][1]
     assert json.loads(said["status --json"][1])["status"] == EVIL
-    level = "the commands as processes"
-    figure(ESCAPES, level, "outputs looked at", len(said))
-    figure(ESCAPES, level, "control characters sent", sum(map(len, sent.values())), limit=0)
+    figure(ESCAPES, COMMANDS, "outputs looked at", len(said))
+    figure(ESCAPES, COMMANDS, "control characters sent", sum(map(len, sent.values())), limit=0)
+
+
+def refused(code, out, error, expected=(1, 2)):
+    """Whether a command ended with one line and nothing else."""
+    one_line = error.count("\n") == 1 and error.startswith("gritd: ") and "internal" not in error
+    return code in expected and not out and one_line
+
+
+def files_below(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def test_names_that_lead_elsewhere(tmp_path, figure):
+    """A run's name on the command line and in the configuration, and a report that names files of
+    its reader.
+    """
+    inside = tmp_path / "a" / "b"
+    inside.mkdir(parents=True)
+    text = TESTBED.text.replace("directory: runs", f"directory: {inside}")
+    config = tmp_path / "c.yaml"
+    config.write_text(text)
+    before = files_below(tmp_path)
+    names = ("../../evil", "/tmp/evil", "..", ".hidden", "a/b", "a\nb", "x" * 200)
+    leaks = [
+        name for name in names if not refused(*gritd("run", "--config", config, "--name", name))
+    ]
+
+    for name in names:
+        config.write_text(f"{text}run: {{name: {json.dumps(name)}}}\n")
+        leaks += [] if refused(*gritd("run", "--config", config)) else [name]
+
+    secret, report = tmp_path / "secret", inside / "report.json"
+    secret.write_bytes(b"secret")
+    (inside / "link").symlink_to(secret)
+    for name in (str(secret), "../../secret", "link"):
+        redo = {"files": {name: "0" * 64}, "configuration": "", "seed": 0, "versions": {}}
+        document = {"redo": redo, "verdict": "", "hypotheses": []}
+        report.write_text(json.dumps(document))
+        said = gritd("diagnose", "--redo", report)
+        shown = hashlib.sha256(b"secret").hexdigest()[:8] in said[2]
+        leaks += [name] if shown or not refused(*said) else []
+    left = files_below(tmp_path) - before - {"secret", "a/b/report.json", "a/b/link"}
+    assert left <= {"a/b/.gritd.lock"}, left
+    figure(OUTSIDE, COMMANDS, "names tried", 2 * len(names) + 3)
+    figure(OUTSIDE, COMMANDS, "not refused with one line", len(leaks), limit=0)
+
+
+def test_what_lies_in_the_way(tmp_path, figure):
+    """A lock that is a link, and pipes in place of files: nobody waits, nothing is lost."""
+    logs, precious = tmp_path / "logs", tmp_path / "precious"
+    logs.mkdir()
+    precious.write_bytes(b"kept")
+    (logs / ".gritd.lock").symlink_to(precious)
+    config = tmp_path / "c.yaml"
+    config.write_text(TESTBED.text.replace("directory: runs", f"directory: {logs}"))
+    said = {"lock": gritd("run", "--config", config, timeout=30)}
+
+    campaign = tmp_path / "campaigns" / "one"
+    campaign.mkdir(parents=True)
+    os.mkfifo(campaign / "run.mcap")
+    (campaign / "c.yaml").write_text(TESTBED.text)
+    one = ("diagnose", "--campaigns", campaign.parent, "--jobs", "1")
+    said["campaign"] = gritd(*one, timeout=60)
+    said |= {
+        command: gritd(command, campaign / "run.mcap", *more, timeout=60)
+        for command, more in {
+            "replay": (), "recover": (), "compare": ("--config", config),
+            "diagnose": ("--config", config),
+        }.items()
+    }  # fmt: skip
+    os.mkfifo(tmp_path / ".x.mcap.new")
+    said["draft"] = gritd("simulate", "--config", config, "-o", tmp_path / "x.mcap", timeout=60)
+
+    code, out, error = said.pop("campaign")
+    assert code == 1 and "one: not diagnosed: " in out and "no regular file" in out and not error
+    wrong = {name: each for name, each in said.items() if not refused(*each, expected=(1, 2, 3))}
+    assert precious.read_bytes() == b"kept" and not wrong, wrong
+    figure(OBSTACLES, COMMANDS, "obstacles not refused with one line", len(wrong), limit=0)
+
+
+WORKING = """
+import sys, time
+from pathlib import Path
+from gritd.tools.cli.workers import workers
+if __name__ == "__main__":
+    with workers(2, None) as (pool, _):
+        jobs = [pool.submit(Path.touch, Path(f"{sys.argv[1]}/{n}")) for n in range(2)]
+        [job.result() for job in jobs]
+        more = [pool.submit(time.sleep, 100.0) for n in range(2)]
+        print("working", flush=True)
+        more[0].result()
+"""
+
+
+def test_workers_end_with_a_killed_parent(tmp_path, seed, figure):
+    script = tmp_path / "work.py"
+    script.write_text(WORKING)
+    parent = subprocess.Popen(
+        [sys.executable, script, tmp_path],
+        stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert parent.stdout.readline() == b"working\n"
+    children = children_of(parent.pid)
+    assert len(children) >= 2
+    parent.kill()
+    began = time.monotonic()
+    parent.wait()
+    until(lambda: not any(map(runs, children)))
+    took = time.monotonic() - began
+    assert took < 60.0  # they have work for longer
+    level = "processes of diagnose --campaigns"
+    figure(OBSTACLES, level, "workers end after their killed parent", took, "s", 1.0, real=True)
+
+
+def children_of(pid):
+    """Processes whose parent this is, by their ids."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            fields = path.read_text().rpartition(")")[2].split()
+            found += [int(path.parent.name)] if int(fields[1]) == pid else []
+    return found
+
+
+def runs(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def test_who_may_write_the_configuration_and_read_the_recordings(tmp_path, figure):
+    wrong = 0
+    for number, (readable, mode) in enumerate({"owner": 0o600, "group": 0o640}.items()):
+        folder = tmp_path / readable
+        folder.mkdir()
+        with Wires(folder, logging={"readable_by": readable}) as wires:
+            wires.config.chmod((0o600, 0o666)[number])
+            with DaemonProcess(wires.config) as daemon:
+                daemon.ready()
+                warned = any("anybody may change it" in text for _, text in daemon.said)
+                assert warned == (readable == "group"), daemon.text
+                daemon.stop()
+        wrong += daemon.path().stat().st_mode & 0o777 != mode
+        assert any("anybody may change it" in line for line in log_lines(daemon.path())) == warned
+        _, _, error = gritd("check-config", wires.config)
+        assert ("anybody may change it" in error) == warned
+    figure(READABLE, WIRES, "recordings of another mode than configured", wrong, limit=0)
+    figure(READABLE, WIRES, "world-writable configurations without a warning", 0, limit=0)

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from math import inf, nan
 from typing import NoReturn
 
+from gritd.estimator.config.names import EXPECTED, is_file_name
+
 DONE, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
@@ -56,3 +58,10 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
         return value
 
     return read
+
+
+def file_name(text: str) -> str:
+    """An argparse type: a name that can begin a file's."""
+    if not is_file_name(text):
+        raise argparse.ArgumentTypeError(f"found {text[:40]!r}; expected {EXPECTED}")
+    return text

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
+from contextlib import suppress
 from pathlib import Path
 
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -36,6 +38,19 @@ def recording(path: Path) -> Recording:
 def unread(path: Path, error: RecordingError) -> CommandError:
     """What a command says of an input that cannot be read."""
     return CommandError(error, DAMAGED if path.exists() else USAGE)
+
+
+def open_to_all(path: Path) -> str:
+    """One line where anybody may change a file that is trusted; '' otherwise."""
+    for place in (path, path.resolve().parent):
+        with suppress(OSError):
+            mode = place.stat().st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                return (
+                    f"{path}: anybody may change it, by the permissions of {place};"
+                    " whoever does decides which devices are opened and where files go"
+                )
+    return ""
 
 
 def vacant(path: Path) -> Path:

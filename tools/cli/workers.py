@@ -12,6 +12,7 @@ from multiprocessing import active_children, get_context
 from typing import Any
 
 from gritd.tools.cli.command import FAILED, USAGE, CommandError
+from gritd.tools.cli.offspring import bind_to
 
 
 @contextmanager
@@ -31,12 +32,12 @@ def workers(jobs: int, scheduler: str | None) -> Iterator[tuple[Executor, int]]:
 @contextmanager
 def _processes(jobs: int) -> Iterator[Executor]:
     """Workers in process groups of their own: when we are stopped, what they started stops with
-    them.
+    them. Where we are killed, they end as well.
     """
     ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         with ProcessPoolExecutor(
-            jobs, get_context("spawn"), initializer=os.setpgid, initargs=(0, 0)
+            jobs, get_context("spawn"), initializer=_begin, initargs=(os.getpid(),)
         ) as pool:
             try:
                 yield pool
@@ -47,6 +48,11 @@ def _processes(jobs: int) -> Iterator[Executor]:
                 raise
     finally:
         signal.signal(signal.SIGTERM, ended)
+
+
+def _begin(parent: int) -> None:
+    os.setpgid(0, 0)
+    bind_to(parent)
 
 
 @contextmanager

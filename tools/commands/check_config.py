@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 from gritd.config import packaged
 from gritd.drivers.build import build_decoder, build_link, used_devices
@@ -23,6 +24,7 @@ from gritd.estimator.config.table import UNITS
 from gritd.estimator.messages.readings import ENCODERS
 from gritd.estimator.wheel import geometry
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.files import open_to_all
 
 RIM_SPEED = 0.02  # [m/s] at which slip resolution is stated
 SLIP = 0.2
@@ -50,6 +52,8 @@ def main(argv: Sequence[str]) -> int:
         check_devices(read.settings)
     except DeviceSettingsError as error:
         raise CommandError(f"{arguments.file}: {error}", USAGE) from None
+    if warning := open_to_all(Path(arguments.file)):
+        print(warning, file=sys.stderr)
     sys.stdout.write(
         read.text if arguments.effective else f"{arguments.file}: valid\n\n{summary(read.settings)}"
     )

@@ -24,6 +24,7 @@ from gritd.estimator.recording.topics import TOPICS
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, number, whole
+from gritd.tools.cli.offspring import ends_with_us
 from gritd.tools.cli.terminal import control
 from gritd.tools.commands import demo_verdict as verdict
 from gritd.tools.report import figure
@@ -184,6 +185,7 @@ class Child:
             text=True,
             encoding="utf-8",
             start_new_session=True,  # Ctrl-C reaches us alone: we stop them in order
+            preexec_fn=ends_with_us(),
         )
         assert self._process.stdout is not None
         self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)

@@ -60,6 +60,8 @@ def main(argv: Sequence[str]) -> int:
             _check_output(path, [*arguments.files, *([arguments.redo] if arguments.redo else [])])
     if arguments.redo is not None:
         return _again(arguments)
+    if arguments.data is not None:
+        raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
     if arguments.campaigns is not None:
         return _many(arguments)
     if not arguments.files or arguments.config is None:
@@ -83,7 +85,7 @@ def _again(arguments: argparse.Namespace) -> int:
             "diagnose --redo: expected no recordings, --config or --seed: they are in the file",
             USAGE,
         )
-    then = redo.read(arguments.redo)
+    then = redo.read(arguments.redo, arguments.data)
     redo.check(then)
     configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
     found, _ = of_files(
@@ -220,6 +222,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report"
+    )
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="with --redo: the recordings are in DIR, not in the folder of FILE",
     )
     parser.add_argument(
         "--campaigns",

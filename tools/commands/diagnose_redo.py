@@ -27,6 +27,7 @@ ALIKE = 0.02  # difference of a probability that other versions of the libraries
 class Record:
     """What was diagnosed, with what, and what was found."""
 
+    folder: Path  # of its files
     files: Mapping[Path, str]  # with their SHA-256
     configuration: str
     seed: int
@@ -38,17 +39,15 @@ class Record:
 
     @classmethod
     def of(cls, found: Diagnosis) -> Record:
-        return cls.parsed(json.loads(as_json(found)), Path())
+        return cls.parsed(json.loads(as_json(found)), Path("/"))
 
     @classmethod
     def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
-        """Of the JSON; files that are not found under their name are looked for in a folder. Raises
-        KeyError, …
-        """
+        """Of the JSON; its files are looked for in a folder. Raises KeyError, …"""
         redo, hypotheses = document["redo"], document["hypotheses"]
-        named = {Path(name): str(value) for name, value in redo["files"].items()}
         return cls(
-            {name if name.exists() else folder / name: value for name, value in named.items()},
+            folder,
+            {_within(folder, Path(name)): str(value) for name, value in redo["files"].items()},
             str(redo["configuration"]),
             int(redo["seed"]),
             str(redo.get("command", "")),
@@ -57,6 +56,17 @@ class Record:
             tuple(str(h["effect"]) for h in hypotheses if h["accepted"]),
             {str(h["effect"]): float(h["probability"]) for h in hypotheses},
         )
+
+
+def _within(folder: Path, name: Path) -> Path:
+    """A file of the folder: of this name, or of this name from the folder; else its place there."""
+    places = (name, folder / name)
+    return next((place for place in places if _lies_in(folder, place)), folder / name.name)
+
+
+def _lies_in(folder: Path, path: Path) -> bool:
+    """Whether a file is there, and in the folder: a report that somebody sent has no other read."""
+    return path.is_file() and path.resolve().is_relative_to(folder.resolve())
 
 
 def as_json(found: Diagnosis) -> str:
@@ -71,8 +81,13 @@ def as_json(found: Diagnosis) -> str:
     )
 
 
-def read(path: Path) -> Record:
-    """Raises CommandError where it is neither the JSON nor the report of a diagnosis."""
+def read(path: Path, data: Path | None = None) -> Record:
+    """A diagnosis whose recordings lie in the folder `data`, or beside it.
+
+    Raises CommandError where the file is neither the JSON nor the report of one.
+    """
+    if path.exists() and not path.is_file():
+        raise CommandError(f"{path}: found no regular file; expected a diagnosis to redo", USAGE)
     try:
         with path.open(encoding="utf-8") as stream:
             text = stream.read(MOST_BYTES)
@@ -84,7 +99,7 @@ def read(path: Path) -> Record:
     embedded = ELEMENT.search(text)
     try:
         return Record.parsed(
-            json.loads(html.unescape(embedded[1]) if embedded else text), path.parent
+            json.loads(html.unescape(embedded[1]) if embedded else text), data or path.parent
         )
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         expected = "the JSON or the report that gritd diagnose wrote"
@@ -94,14 +109,16 @@ def read(path: Path) -> Record:
 def check(record: Record) -> None:
     """Raises CommandError for the first file that is missing or not the one that was diagnosed."""
     for path, expected in record.files.items():
-        if not path.is_file():
+        if not _lies_in(record.folder, path):
             raise CommandError(
-                f"{path}: found no such file; expected the recording that was diagnosed", USAGE
+                f"{path}: found no such file there; expected the recording that was diagnosed"
+                " (--data says where they are)",
+                USAGE,
             )
-        found = sha256(path)
-        if found != expected:
+        if sha256(path) != expected:
             raise CommandError(
-                f"{path}: found SHA-256 {found[:16]}…; expected {expected[:16]}…, as diagnosed",
+                f"{path}: found another file; expected the recording that was diagnosed, by its"
+                " SHA-256",
                 DAMAGED,
             )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
 from gritd.estimator.daemon.lock import LockError, locked
-from gritd.tools.cli.command import FAILED, CommandError, Parser, number, whole
+from gritd.tools.cli.command import FAILED, CommandError, Parser, file_name, number, whole
 
 if TYPE_CHECKING:
     from gritd.estimator.messages.run_info import RunInfo
@@ -97,7 +97,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--socket", metavar="PATH", help=f"status socket (default: {SOCKET} beside the logs)"
     )
-    parser.add_argument("--name", help="name of the run")
+    parser.add_argument("--name", type=file_name, help="name of the run")
     parser.add_argument(
         "--load", type=number(above=0.0), metavar="N", help="nominal load of the run [N]"
     )

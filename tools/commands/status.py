@@ -96,7 +96,7 @@ def _text(arguments: Namespace, report: Report) -> str:
 
 
 def told(form: Callable[[Report], Iterator[str]], report: Report) -> list[str]:
-    """A report in lines, whoever sent it. Raises CommandError where it has not the fields of one."""
+    """A report in lines, whoever sent it. Raises CommandError where a field is missing."""
     try:
         return [visible(line) for line in form(report)]
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):

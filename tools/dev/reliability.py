@@ -56,6 +56,10 @@ ROWS = (
     "garbage-collector pause",
     "second instance",
     "unprivileged user",
+    "terminal escapes in names",
+    "names that lead out of the folder",
+    "symlinked lock, FIFO, killed parent",
+    "world-writable configuration, readable recordings",
 )
 
 Figure = dict[str, Any]

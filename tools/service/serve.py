@@ -22,6 +22,7 @@ from gritd.estimator.recording.parts import run_path
 from gritd.estimator.recording.retention import sweep
 from gritd.estimator.recording.writer import WriterStatus
 from gritd.tools.cli.command import DONE, FAILED, CommandError
+from gritd.tools.cli.files import open_to_all
 from gritd.tools.service.telemetry import Reporter
 from gritd.tools.service.watcher import Watcher, say
 
@@ -65,9 +66,9 @@ def _serve(
         signal.signal(ending, lambda *_: daemon.stop())
     signal.signal(signal.SIGHUP, lambda *_: watcher.ask_reload())
     say(f"logging to {path}")
-    if notice:
-        say(notice, sys.stderr)
-        daemon.say(WARNING, notice)
+    for warning in filter(None, (notice, open_to_all(Path(configuration.source)))):
+        say(warning, sys.stderr)
+        daemon.say(WARNING, warning)
     threading.excepthook = _say_in_a_line
     logging.getLogger("can").setLevel(logging.CRITICAL)  # a reader says the same, once
     with closing(publisher):

@@ -23,11 +23,13 @@ from pathlib import Path
 import pytest
 
 from gritd.estimator.daemon import notify
+from gritd.estimator.daemon.lock import LockError, locked
 from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.record import CHANNEL_BITS
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.retention import sweep, trim
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.writer import WriterThread
@@ -200,10 +202,65 @@ def test_the_oldest_closed_recordings_go_first(tmp_path):
         path.write_bytes(bytes(1000))
         os.utime(path, (1000 - age, 1000 - age))  # the last is the oldest
     (tmp_path / "notes.txt").write_bytes(bytes(10_000))
-    assert trim(tmp_path, 3000, [paths[4]]) == [paths[3], paths[2]]
-    assert trim(tmp_path, 0, [paths[4]]) == [paths[1], paths[0]]
+    assert list(trim(tmp_path, 3000, [paths[4]])) == [paths[3], paths[2]]
+    assert list(trim(tmp_path, 0, [paths[4]])) == [paths[1], paths[0]]
     assert paths[4].exists() and (tmp_path / "notes.txt").exists()
-    assert trim(tmp_path, math.inf, []) == []
+    assert list(trim(tmp_path, math.inf, [])) == []
+
+
+def test_the_cap_holds_beside_links_and_folders_named_like_recordings(tmp_path):
+    """Whatever lies in the folder under a recording's name: what is a file goes, and only that."""
+    outside = tmp_path / "outside"
+    outside.write_bytes(bytes(5000))
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    (folder / "0.mcap").symlink_to(tmp_path / "nothing")
+    (folder / "1.mcap").symlink_to(outside)
+    (folder / "2.mcap").mkdir()
+    os.mkfifo(folder / "3.mcap")
+    (folder / "4.mcap").write_bytes(bytes(1000))
+    assert list(trim(folder, 500, [])) == [folder / "4.mcap"]
+    assert outside.exists() and (folder / "1.mcap").is_symlink()
+
+
+def test_a_recording_that_cannot_be_deleted_does_not_keep_the_others(tmp_path, monkeypatch):
+    for n in range(3):
+        (tmp_path / f"{n}.mcap").write_bytes(bytes(1000))
+        os.utime(tmp_path / f"{n}.mcap", (n, n))
+    unlink = Path.unlink
+
+    def refusing(path, missing_ok=False):
+        if path.name == "0.mcap":
+            raise PermissionError(1, "not permitted", str(path))
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", refusing)
+    deleted = []
+    with pytest.raises(PermissionError):
+        deleted.extend(trim(tmp_path, 0, []))
+    assert not (tmp_path / "1.mcap").exists() and not (tmp_path / "2.mcap").exists()
+
+
+@pytest.mark.parametrize("what", ["link", "pipe"])
+def test_a_lock_that_is_no_file_is_refused_and_left_alone(tmp_path, what):
+    target = tmp_path / "precious"
+    target.write_bytes(b"kept")
+    lock = tmp_path / ".gritd.lock"
+    lock.symlink_to(target) if what == "link" else os.mkfifo(lock)
+    with (
+        pytest.raises(LockError, match=r"cannot keep logs here: \.gritd\.lock is "),
+        locked(tmp_path),
+    ):
+        pass
+    assert target.read_bytes() == b"kept"
+
+
+def test_what_is_no_draft_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / ".run.mcap.new")
+    assert sweep(tmp_path) == []
+    with pytest.raises(RecordingError, match=r"create: \.run\.mcap\.new is there and is no"):
+        McapFile(tmp_path / "run.mcap")
+    assert not (tmp_path / "run.mcap").exists()
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ def saved(found: Diagnosis, folder: Path, form: str) -> Path:
 @pytest.mark.parametrize("form", ["json", "html"])
 def test_json_and_report_hold_all_it_takes(found: Diagnosis, tmp_path: Path, form: str) -> None:
     record = redo.read(saved(found, tmp_path, form))
-    assert record == redo.Record.of(found)
+    assert record == replace(redo.Record.of(found), folder=tmp_path)
     assert record.configuration == "wheel: <r> & 'b'\n" and record.seed == 7
     assert record.accepted == ("coulomb_friction",)
     redo.check(record)
@@ -61,12 +61,37 @@ def test_the_files_may_have_moved_with_the_report(found: Diagnosis, tmp_path: Pa
     assert list(redo.read(saved(moved, tmp_path, "json")).files) == [tmp_path / name]
 
 
+@pytest.mark.parametrize("how", ["absolute", "relative", "link"])
+def test_a_file_outside_the_reports_folder_is_not_looked_at(
+    found: Diagnosis, tmp_path: Path, how: str
+) -> None:
+    """A report that somebody sent must not tell him of the reader's other files."""
+    secret, folder = tmp_path / "secret", tmp_path / "sent"
+    secret.write_bytes(b"secret")
+    folder.mkdir()
+    name = {"absolute": str(secret), "relative": "../secret", "link": "link"}[how]
+    (folder / "link").symlink_to(secret)
+    path = saved(replace(found, redo={**found.redo, "files": {name: "0" * 64}}), folder, "json")
+    with pytest.raises(CommandError, match="found no such file there") as error:
+        main(["--redo", str(path)])
+    assert error.value.code == USAGE and sha256(secret)[:8] not in str(error.value)
+
+
+def test_the_recordings_may_lie_elsewhere_if_the_user_says_so(
+    found: Diagnosis, tmp_path: Path
+) -> None:
+    folder = tmp_path / "reports"
+    folder.mkdir()
+    record = redo.read(saved(found, folder, "json"), data=tmp_path)
+    redo.check(record)
+
+
 def test_another_file_is_refused_in_one_line(found: Diagnosis, tmp_path: Path) -> None:
     path = saved(found, tmp_path, "html")
     next(iter(redo.read(path).files)).write_bytes(b"others")
     with pytest.raises(CommandError) as error:
         main(["--redo", str(path)])
-    assert "more.mcap: found SHA-256" in str(error.value) and error.value.code == DAMAGED
+    assert "more.mcap: found another file" in str(error.value) and error.value.code == DAMAGED
     assert "\n" not in str(error.value)
 
 

@@ -8,6 +8,8 @@ import multiprocessing
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from gritd.tools.cli.offspring import ends_with_us
+
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
@@ -23,7 +25,8 @@ def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list
     global _work
     _work = lambda place: work(items[place])  # noqa: E731  (a closure is the point: it is inherited, never pickled)
     try:
-        with multiprocessing.get_context("fork").Pool(min(jobs, len(items))) as pool:
+        fork = multiprocessing.get_context("fork")
+        with fork.Pool(min(jobs, len(items)), initializer=ends_with_us()) as pool:
             return pool.map(_forked, range(len(items)), chunksize=1)
     finally:
         _work = None

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import gritd
+from gritd.tools.cli.offspring import ends_with_us
 from gritd.tools.proof.blind import cases, handover, seal
 from gritd.tools.proof.blind.strata import Assignment
 
@@ -119,6 +120,7 @@ def _run(command: list[str], folder: Path) -> tuple[int, str]:
             text=True,
             timeout=PATIENCE,
             check=False,
+            preexec_fn=ends_with_us(),
         )
     except subprocess.TimeoutExpired:
         return -1, f"no answer within {PATIENCE:g} s"

@@ -19,6 +19,7 @@ ALLOWED = {
     "gritd.estimator.messages.run_info",
     "gritd.estimator.recording.run_writer",
     "gritd.tools.cli.command",
+    "gritd.tools.cli.offspring",
     "gritd.tools.cli.progress",
     "gritd.tools.cli.workers",
 }

@@ -16,9 +16,9 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
-from gritd.tools.diagnose.fit.prepare import prepare
 from gritd.tools.diagnose.fit.problem import Fitted
-from gritd.tools.diagnose.noise import colour as noise
+from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
@@ -89,11 +89,11 @@ def compare(
         )
     configured = np.zeros(len(rig.constants))
     if fitted:
-        prepared = prepare(rig, np.random.default_rng(0))
-        fit, sizes = prepared.base, prepared.problem.noise
+        base = fit_base(rig, np.random.default_rng(0))
+        fit, noise = base.fitted, base.problem.noise
     else:
-        fit, sizes = None, noise.first_guess(stack, stack.predict(configured))
-    sigma = {c: colour.sigma for c, colour in zip(rig.channels, sizes.colours, strict=True)}
+        fit, noise = None, first_guess(stack, stack.predict(configured))
+    sigma = {c: colour.sigma for c, colour in zip(rig.channels, noise.colours, strict=True)}
     return Comparison(
         settings.testbed,
         _traces(rig, _names(rig, paths), (configured, fit.u if fit else configured), sigma),

@@ -20,10 +20,8 @@ from pathlib import Path
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
-from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
-from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.terminal import control
@@ -34,18 +32,8 @@ from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.innovations import with_innovations
 from gritd.tools.diagnose.explain.result import Diagnosis, NextExperiment
 from gritd.tools.diagnose.method import diagnose
-from gritd.tools.diagnose.rig.drive import RATE as DRIVE_RATE
-from gritd.tools.diagnose.rig.drive import DriveRig
-from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.rig.signals import distinct, drive_series, is_drive, read_all, signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
-
-RATES = (
-    (400.0, 10.0),
-    (1200.0, 5.0),
-    (float("inf"), 2.5),
-)  # all runs together up to so long [s]: grid [Hz]
-FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
+from gritd.tools.diagnose.rig.adapter import rig_of
+from gritd.tools.diagnose.rig.signals import distinct, read_all
 
 
 def main(argv: Sequence[str]) -> int:
@@ -170,7 +158,7 @@ def of_files(
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
     recordings, hashes = read_all(files), distinct(files)
-    rig, rate = _rig(recordings, configuration.settings)
+    rig, rate = rig_of(recordings, configuration.settings)
     if not rig.channels:
         raise CommandError(
             f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
@@ -185,27 +173,13 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
-        found = with_innovations(found, configuration, recordings, soil=isinstance(rig, WheelRig))
+        found = with_innovations(found, configuration, recordings, soil=found.soil is not None)
     damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
     said = [
         *provenance.remarks(recordings, configuration.settings),
         *(f"Damaged: {line}" for line in damage),
     ]
     return replace(found, caveats=(*found.caveats, *said)), damage
-
-
-def _rig(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:
-    """The adapter that fits the recordings, and its grid [Hz]."""
-    if is_drive(recordings):
-        series = [drive_series(r, settings) for r in recordings]
-        return DriveRig(
-            series, [r.run.name or r.path.stem for r in recordings], settings
-        ), DRIVE_RATE
-    coarse = [signals(r, settings, FIRST) for r in recordings]
-    length = sum(float(s.time[-1]) for s in coarse)
-    rate = next(hertz for limit, hertz in RATES if length <= limit)
-    in_time = sorted(zip(recordings, coarse, strict=True), key=lambda pair: pair[1].start)
-    return WheelRig([signals(r, settings, rate) for r, _ in in_time], settings), rate
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -11,19 +11,11 @@ from typing import Any
 import numpy as np
 
 from gritd.estimator.visible import visible
+from gritd.tools.cli.wording import listed, number, shown
 from gritd.tools.diagnose.explain.result import SoilFit, Trace
 from gritd.tools.report import figures, redo
 from gritd.tools.report.html import Markup, page, section, table, tag
-from gritd.tools.report.words import (
-    counted,
-    held,
-    listed,
-    name_of,
-    number,
-    quantity,
-    sentence,
-    shown,
-)
+from gritd.tools.report.words import counted, held, name_of, quantity, sentence
 
 ALL = "all runs"
 KEY = {

@@ -9,6 +9,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from gritd.tools.cli.wording import listed, number, percent, shown, spaced
 from gritd.tools.commands import diagnose_redo as diagnosed
 from gritd.tools.diagnose.explain.result import (
     STRAINED,
@@ -23,16 +24,11 @@ from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
     counted,
     held,
-    listed,
     name_of,
     nats,
-    number,
-    percent,
     probability,
     quantity,
     sentence,
-    shown,
-    spaced,
     with_unit,
 )
 

@@ -10,18 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.wording import covariate_shown, number, shown
 from gritd.tools.diagnose.explain.result import Quantity, Scatter, SoilFit, Trace
 from gritd.tools.report import plot
 from gritd.tools.report.html import Child, Markup, tag
-from gritd.tools.report.words import (
-    counted,
-    covariate_shown,
-    held,
-    name_of,
-    number,
-    quantity,
-    shown,
-)
+from gritd.tools.report.words import counted, held, name_of, quantity
 
 BINS = 12  # of a scatter's running mean
 FEWEST = 4  # values in a bin

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from gritd.tools.cli.wording import listed, number, percent
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis
 from gritd.tools.report.html import Child, Markup, table, tag
-from gritd.tools.report.words import counted, held, listed, name_of, nats, number, percent
+from gritd.tools.report.words import counted, held, name_of, nats
 
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.wording import fixed
 from gritd.tools.report.html import Child, Markup, tag
-from gritd.tools.report.words import fixed
 
 W = 360.0  # [px] of every picture
 LEFT, RIGHT = 44.0, 8.0  # margins of the axes: room for tick labels

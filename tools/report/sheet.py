@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gritd.tools.cli.wording import number, shown
 from gritd.tools.diagnose.explain.result import Trace
 from gritd.tools.report import figures
 from gritd.tools.report.comparison import Comparison
 from gritd.tools.report.figure import DPI, ESTIMATE, IDLE, MEASURED, PREDICTED, plain
-from gritd.tools.report.words import name_of, number, shown
+from gritd.tools.report.words import name_of
 
 ACROSS = 4  # runs side by side
 COLUMN, ROW = 4.8, 2.6  # [in] of one run, of one channel

@@ -7,22 +7,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from gritd.tools.cli.wording import NOTHING, covariate_shown, listed, number, percent, spaced
 from gritd.tools.diagnose.explain.result import Diagnosis, Location, Quantity
-from gritd.tools.diagnose.rig.wheel import UNITS
+from gritd.tools.diagnose.rig.constants import UNITS
 from gritd.tools.report.html import Markup, section, table, tag
-from gritd.tools.report.words import (
-    NOTHING,
-    covariate_shown,
-    listed,
-    name_of,
-    number,
-    percent,
-    probability,
-    quantity,
-    sentence,
-    spaced,
-    with_unit,
-)
+from gritd.tools.report.words import name_of, probability, quantity, sentence, with_unit
 
 UNSEEN = (
     "Root mean square errors on data the fit did not see: the noise, what is still left out, and what the soil's "

@@ -1,37 +1,29 @@
-"""Numbers and names as a person reads them: SI inside, millimetres and degrees on the page."""
+"""Quantities and sentences of a report, as a person reads them."""
 
 from __future__ import annotations
 
 import math
 import re
 
+from gritd.tools.cli.wording import (
+    NOTHING,
+    SCIENTIFIC,
+    fixed,
+    magnitude,
+    number,
+    shown,
+    spaced,
+    spelled,
+)
 from gritd.tools.diagnose.explain.result import SOIL, Quantity
 
-NOTHING = "–"
-PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
-SHOWN = {  # unit inside -> unit shown, factor
-    "m": ("mm", 1e3),
-    "rad": ("°", math.degrees(1.0)),
-    "Pa/m^n": ("kPa/mⁿ", 1e-3),
-    "-": ("", 1.0),
-    "1/A^2": ("1/A²", 1.0),
-    "N/m^3": ("kN/m³", 1e-3),
-    "kg·m^2": ("kg·m²", 1.0),
-    "m/N": ("mm/kN", 1e6),
-}
-COVARIATES = {  # inside -> unit shown, factor; the others by their unit
-    "slip": ("%", 100.0),
-    "speed": ("mm/s", 1e3),
-    "position": ("m", 1.0),
-}
 LARGE = 0.3  # [m] lengths from here on are read in metres
-SCIENTIFIC = (1e-4, 1e6)
 HELD = re.compile(r"(?<=[0-9±<>]) (?=[0-9±%σ°]|(?:N|m|mm|s|Pa|kPa|nats)\b)|(?<=[0-9]) (?=±)")
 
 
 def name_of(key: str) -> str:
     """A channel, effect, soil parameter or covariate in words."""
-    return SOIL.get(key) or " ".join(PROPER.get(word, word) for word in key.split("_"))
+    return SOIL.get(key) or spelled(key)
 
 
 def held(words: str) -> str:
@@ -47,42 +39,6 @@ def sentence(words: str) -> str:
         + words[1:]
         + ("" if words.endswith((".", "!", "?")) or not words else ".")
     )
-
-
-def shown(unit: str) -> tuple[str, float]:
-    """The unit to show for one inside, and the factor to it."""
-    return SHOWN.get(unit, (unit, 1.0))
-
-
-def covariate_shown(covariate: str, unit: str) -> tuple[str, float]:
-    """A drive's speed and position are angles, and are shown as such."""
-    return shown(unit) if unit.startswith("rad") else COVARIATES.get(covariate) or shown(unit)
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A few significant digits, never an exponent where a plain number can be read."""
-    if value is None or not math.isfinite(value):
-        return NOTHING
-    if value == 0.0:
-        return "0"
-    if not SCIENTIFIC[0] <= abs(value) < SCIENTIFIC[1]:
-        return _scientific(value, digits)
-    return fixed(value, max(digits - 1 - _magnitude(value), 0))
-
-
-def fixed(value: float, places: int) -> str:
-    """With a true minus sign."""
-    return f"{value:.{places}f}".replace("-", "−")
-
-
-def _magnitude(value: float) -> int:
-    return math.floor(math.log10(abs(value)))
-
-
-def _scientific(value: float, digits: int) -> str:
-    mantissa, exponent = f"{value:.{max(digits - 1, 0)}e}".split("e")
-    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{mantissa.replace('-', '−')}·10{raised}"
 
 
 def quantity(q: Quantity | None) -> str:
@@ -109,19 +65,8 @@ def uncertain(value: float, sigma: float) -> str:
         return number(value, 4)
     if not (SCIENTIFIC[0] / 10 <= sigma and max(abs(value), sigma) < SCIENTIFIC[1]):
         return f"{number(value)} ± {number(sigma, 2)}"
-    places = min(max(1 - _magnitude(sigma), 0), 6)
+    places = min(max(1 - magnitude(sigma), 0), 6)
     return f"{fixed(value, places)} ± {fixed(sigma, places)}"
-
-
-def percent(share: float | None) -> str:
-    """A share; what is nearly none or nearly all is said so."""
-    if share is None or not math.isfinite(share):
-        return NOTHING
-    if 0.0 < share < 0.01:
-        return "< 1 %"
-    if 0.99 < share < 1.0:
-        return "> 99 %"
-    return f"{fixed(100.0 * share, 0)} %"
 
 
 def probability(p: float | None) -> str:
@@ -129,12 +74,6 @@ def probability(p: float | None) -> str:
     if p is None or not math.isfinite(p):
         return NOTHING
     return "< 0.001" if p < 0.001 else number(p, 2)
-
-
-def spaced(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number and its unit, both as shown."""
-    said = number(value, digits)
-    return said if said == NOTHING else f"{said} {unit}".rstrip()
 
 
 def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
@@ -155,8 +94,3 @@ def nats(value: float | None) -> str:
 def counted(count: int, what: str) -> str:
     """1 run, 2 runs."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def listed(names: list[str]) -> str:
-    """a; a and b; a, b and c."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

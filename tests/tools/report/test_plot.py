@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gritd.tools.report as report_package
+from gritd.tools.cli.wording import listed, number, percent
 from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.report import figures, plot
-from gritd.tools.report.words import held, listed, number, percent, quantity
+from gritd.tools.report.words import held, quantity
 
 SIZES = st.floats(-1e6, 1e6, allow_nan=False)
 

@@ -19,33 +19,27 @@ from itertools import islice, pairwise
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain.scores import WIDE, Beside, Scores, alone
-from gritd.tools.diagnose.fit import functions as generic
-from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.fit.evidence import log_bayes, log_evidence_singly
+from gritd.tools.diagnose.fit.functions import LEVELS as VARIES
+from gritd.tools.diagnose.fit.functions import SIZE
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.projection import WIDE, Projected, Projection
+from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.screen.screen import tail_quantile
-from gritd.tools.diagnose.search.search import Model, Search
+from gritd.tools.diagnose.screen.screening import Screening
 
 ALONG = ("position", "time", "slip", "run")
-CURVES = (
-    "load",
-    "speed",
-    "sinkage",
-    "heat",
-    "elapsed",
-)  # along which a misfit may curve; not tried for a start
+# along which a misfit may curve; not tried for a start
+CURVES = ("load", "speed", "sinkage", "heat", "elapsed")
 PLACES = 32  # tried along a covariate
-WIDTHS = (
-    0.015,
-    0.05,
-)  # of a change, relative to the whole stretch: a wheel is on both sides of it for a while
+# of a change, relative to the whole stretch: a wheel is on both sides of it for a while
+WIDTHS = (0.015, 0.05)
 # cosines of a smooth function; their size falls with the square of their number, as a kink's does
 WAVES = 12
 FEW = 8  # values on either side of a change
-LEVELS, HELD = (
-    8,
-    0.015,
-)  # least number of levels of a covariate, and share of the values that makes one
+# least number of levels of a covariate, and share of the values that makes one
+LEVELS, HELD = 8, 0.015
 LEVEL = 0.01  # chance of any change point by noise alone
 LEAST = 3.0  # [nats]
 ROUNDS = 6
@@ -86,37 +80,42 @@ NONE = Part(-np.inf, Steps("", np.zeros(0), slice(0, 0)), ())
 
 
 @dataclass(frozen=True)
-class Board:
+class Competition:
     """Everything that competes for one channel's misfit."""
 
     channel: str
-    scores: Scores
+    projected: Projected
     steps: tuple[Steps, ...]
     smooth: tuple[slice, ...]
 
 
-def find(search: Search, model: Model) -> Changes:
+def find_changes(screening: Screening, model: Model) -> Changes:
     """Change points of every channel; empty where there are none. Of runs, halfway between their
     numbers.
     """
-    beside, channels = Beside(search, model), search.problem.stack.rig.channels
-    boards = [board for channel in channels if (board := _board(search, model, beside, channel))]
-    if not boards:
+    projection = model.fitted.projection(screening.surrogates)
+    tried = (
+        _competition(screening, model, projection, channel)
+        for channel in screening.problem.stack.rig.channels
+    )
+    competitions = [competition for competition in tried if competition is not None]
+    if not competitions:
         return {}
-    nulls = np.max([largest for board in boards for largest in _nulls(board)], axis=0)
+
+    nulls = np.max([largest for each in competitions for largest in _nulls(each)], axis=0)
     threshold = max(tail_quantile(nulls, LEVEL), LEAST)
+
     found: Changes = {}
-    for board in boards:
-        runs = _between_runs(board, threshold)
-        for part in (*runs, *_taken_apart(board, runs, threshold)):
-            key = (board.channel, part.steps.covariate)
+    for competition in competitions:
+        runs = _between_runs(competition, threshold)
+        for part in (*runs, *_taken_apart(competition, runs, threshold)):
+            key = (competition.channel, part.steps.covariate)
             places = [float(part.steps.places[i]) for i in part.places]
             found[key] = tuple(sorted({*found.get(key, ()), *places}))
     return found
 
 
-# ---- what competes
-# -------------------------------------------------------------------------------------------------
+# ---- what competes -----------------------------------------------------------------------------
 
 
 def values(stack: Stack, name: str) -> Array | None:
@@ -138,22 +137,24 @@ def columns(stack: Stack, channel: str, covariate: str, places: Sequence[float])
     along, own = values(stack, covariate), stack.of(channel)
     assert along is not None
     moving = own & (stack.covariate("speed") > 0.0)
-    size = generic.SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    size = SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
     rise = _rise(along, np.array(places), WIDTHS[0] * float(np.ptp(along[moving])))
     return np.where(moving[:, None], size * rise, 0.0)
 
 
-def _board(search: Search, model: Model, beside: Beside, channel: str) -> Board | None:
+def _competition(
+    screening: Screening, model: Model, projection: Projection, channel: str
+) -> Competition | None:
     """None where nothing varies along which the channel could change."""
-    stack = search.problem.stack
+    stack = screening.problem.stack
     own = stack.of(channel)
     moving = stack.covariate("speed")[own] > 0.0
     if not moving.any():
         return None
-    size = generic.SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    size = SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
     forms = [
         np.where(moving, size, 0.0)[:, None],
-        np.where(moving, generic.SIZE * model.fitted.predicted[own], 0.0)[:, None],
+        np.where(moving, SIZE * model.fitted.predicted[own], 0.0)[:, None],
     ]
     blocks = [
         (name, places, form * block)
@@ -163,16 +164,16 @@ def _board(search: Search, model: Model, beside: Beside, channel: str) -> Board 
     if not blocks:
         return None
     curves = [form * block for block in _curves(stack, own, moving) for form in forms]
-    joined = [*(block for _, _, block in blocks), *curves, *_generics(search, channel, own)]
-    spans = [
-        slice(a, b)
-        for a, b in pairwise(np.cumsum([0, *(block.shape[1] for block in joined)]).tolist())
-    ]
+    joined = [*(block for _, _, block in blocks), *curves, *_smooth(screening, channel, own)]
+
+    ends = np.cumsum([0, *(block.shape[1] for block in joined)]).tolist()
+    spans = [slice(first, last) for first, last in pairwise(ends)]
     steps = [
         Steps(name, places, span) for (name, places, _), span in zip(blocks, spans, strict=False)
     ]
-    weighed = beside.scores(np.column_stack(joined), own)
-    return Board(channel, weighed, tuple(steps), tuple(spans[len(steps) :]))
+    ready = whiten_rows(screening.problem.noise, np.column_stack(joined), own)
+    projected = projection.project_rows(ready, own)
+    return Competition(channel, projected, tuple(steps), tuple(spans[len(steps) :]))
 
 
 def _along(
@@ -181,10 +182,7 @@ def _along(
     """Covariates (n,) of a channel's values that vary while the wheel moves."""
     for name in names:
         along = values(stack, name)
-        if (
-            along is not None
-            and np.ptp(along[own][moving]) > generic.LEVELS * np.abs(along[own]).max()
-        ):
+        if along is not None and np.ptp(along[own][moving]) > VARIES * np.abs(along[own]).max():
             yield name, along[own]
 
 
@@ -239,110 +237,105 @@ def _curves(stack: Stack, own: Bools, moving: Bools) -> Iterator[Array]:
             yield np.cos(np.pi * number * share[:, None]) / number**2
 
 
-def _generics(search: Search, channel: str, own: Bools) -> Iterator[Array]:
+def _smooth(screening: Screening, channel: str, own: Bools) -> Iterator[Array]:
     """The functions in which misfits without a name are looked for."""
-    for signature in search.generics:
-        if signature.name.partition("~")[0] == channel and not signature.name.endswith("~run"):
+    for signature in screening.functions:
+        if signature.shape.channel == channel and signature.shape.along != ("run",):
             yield signature.columns[own]
 
 
-# ---- taking it apart
-# -----------------------------------------------------------------------------------------------
+# ---- taking it apart ---------------------------------------------------------------------------
 
 
-def _nulls(board: Board) -> Iterator[Array]:
+def _nulls(competition: Competition) -> Iterator[Array]:
     """Largest evidence of a step or window along each covariate in every surrogate (draws,)."""
-    for steps in board.steps:
-        for evidence, _ in _weighed(board.scores, steps, slice(1, None)):
+    for steps in competition.steps:
+        for evidence, _ in _weighed(competition.projected, steps, slice(1, None)):
             yield evidence.max(axis=0)
 
 
 def _weighed(
-    of: Scores, steps: Steps, which: slice
+    of: Projected, steps: Steps, which: slice
 ) -> Iterator[tuple[Array, Sequence[tuple[int, ...]]]]:
     """Evidence (candidates, draws) of all steps, then of all windows, and their places."""
     a, b = of.a[steps.own, steps.own], of.b[steps.own, which]
     count = len(a)
-    price = np.log(
-        4.0 * len(ALONG) * len(WIDTHS)
-    )  # of the choice of step or window, form, covariate and width
-    yield alone(np.diag(a), b) - np.log(count) - price, [(i,) for i in range(count)]
+    # of the choice of step or window, form, covariate and width
+    price = np.log(4.0 * len(ALONG) * len(WIDTHS))
+    single = log_evidence_singly(np.diag(a), b)
+    yield single - np.log(count) - price, [(i,) for i in range(count)]
     if count > 1:
         i, j = np.triu_indices(count, 1)
         inside = np.diag(a)[i] + np.diag(a)[j] - 2.0 * a[i, j]
-        yield (
-            alone(inside, b[i] - b[j]) - np.log(len(i)) - price,
-            list(zip(i.tolist(), j.tolist(), strict=True)),
-        )
+        window = log_evidence_singly(inside, b[i] - b[j])
+        pairs = list(zip(i.tolist(), j.tolist(), strict=True))
+        yield window - np.log(len(i)) - price, pairs
 
 
-def _taken_apart(board: Board, runs: Sequence[Part], threshold: float) -> Iterator[Part]:
+def _taken_apart(
+    competition: Competition, runs: Sequence[Part], threshold: float
+) -> Iterator[Part]:
     """Steps inside runs that stand beside what steps between runs and smooth functions take, the
     largest first.
     """
-    left, first = board.scores, max((part.evidence for part in runs), default=0.0)
+    left, first = competition.projected, max((part.evidence for part in runs), default=0.0)
     for part in runs:
         left = left.without(part.direction(len(left.a)))
+
     for _ in range(ROUNDS):
         part = max(
-            (_best(left, s) for s in board.steps if s.covariate != "run"),
+            (_best(left, s) for s in competition.steps if s.covariate != "run"),
             key=lambda p: p.evidence,
             default=NONE,
         )
-        curves = [_evidence(left, block) for block in board.smooth]
+        curves = [_evidence(left, block) for block in competition.smooth]
         curve = max(curves, default=-np.inf)
         first = first or max(part.evidence, curve)
         if max(part.evidence, curve) < max(threshold, WORTH * first):
             return
         if curve >= part.evidence:
-            left = left.without_columns(board.smooth[int(np.argmax(curves))])
+            left = left.without_columns(competition.smooth[int(np.argmax(curves))])
         else:
             left = left.without(part.direction(len(left.a)))
             yield part
 
 
-def _between_runs(board: Board, threshold: float) -> list[Part]:
+def _between_runs(competition: Competition, threshold: float) -> list[Part]:
     """A few steps between runs that do nearly all that an offset of every run could: drift needs
     one at every run.
     """
-    runs = [steps for steps in board.steps if steps.covariate == "run"]
+    runs, whole = [s for s in competition.steps if s.covariate == "run"], competition.projected
     if not runs:
         return []
-    everything = slice(0, len(board.scores.a))
-    offsets = max(_nats(board.scores, steps.own) for steps in runs)
-    if offsets < MOSTLY * _nats(board.scores, everything):
+    offsets = max(_nats(whole, steps.own) for steps in runs)
+    if offsets < MOSTLY * _nats(whole, slice(0, len(whole.a))):
         return []
-    left, found = board.scores, list[Part]()
+
+    left, found = whole, list[Part]()
     while len(found) < min(FEW_RUNS, len(runs[0].places) - 1):
         part = max((_best(left, steps, windows=False) for steps in runs), key=lambda p: p.evidence)
         if part.evidence < threshold:
             return []
         found.append(part)
         taken = np.column_stack([p.direction(len(left.a)) for p in found])
-        if _nats(_turned(board.scores, taken), slice(0, len(found))) >= NEARLY * offsets:
+        if _nats(whole.combined(taken), slice(0, len(found))) >= NEARLY * offsets:
             return found
         left = left.without(part.direction(len(left.a)))
     return []
 
 
-def _turned(of: Scores, directions: Array) -> Scores:
-    """Of combinations of the columns."""
-    return Scores(directions.T @ of.a @ directions, directions.T @ of.b)
-
-
-def _nats(of: Scores, own: slice) -> float:
+def _nats(of: Projected, own: slice) -> float:
     """Log likelihood that a block gains."""
     a, b = of.a[own, own], of.b[own, 0]
     return float(0.5 * b @ np.linalg.solve(a + np.eye(b.size) / WIDE**2, b))
 
 
-def _evidence(left: Scores, block: slice) -> float:
-    return float(
-        log_bayes(left.a[block, block], left.b[block, 0], (0,) * (block.stop - block.start))
-    )
+def _evidence(left: Projected, block: slice) -> float:
+    sign = (0,) * (block.stop - block.start)
+    return float(log_bayes(left.a[block, block], left.b[block, 0], sign))
 
 
-def _best(left: Scores, steps: Steps, windows: bool = True) -> Part:
+def _best(left: Projected, steps: Steps, windows: bool = True) -> Part:
     found = []
     for evidence, places in islice(_weighed(left, steps, slice(0, 1)), None if windows else 1):
         at = int(np.argmax(evidence[:, 0]))

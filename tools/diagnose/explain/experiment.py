@@ -19,10 +19,10 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import NextExperiment
-from gritd.tools.diagnose.rig.proposals import driving
-from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.search.search import Model, Search
-from gritd.tools.diagnose.verdict.decide import Decision
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.rig.interface import Foreseen
+from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.verdict.decision import Decision
 
 DRIVEN = (  # by effort
     "standstill",
@@ -35,10 +35,20 @@ DRIVEN = (  # by effort
     "lifted_spin",
 )
 ALONG = {  # the covariate along which a misfit lives -> what shows its shape
-    "slip": "slip_step", "speed": "speed_step", "acceleration": "speed_step", "load": "load_step",
-    "sinkage": "load_step", "position": "shifted_start", "time": "long_run", "heat": "long_run", "run": "second_pass",
-    "direction": "reversal", "velocity": "reversal", "wheel_angle": "lifted_spin", "constant": "lifted_spin",
-}  # fmt: skip
+    "slip": "slip_step",
+    "speed": "speed_step",
+    "acceleration": "speed_step",
+    "load": "load_step",
+    "sinkage": "load_step",
+    "position": "shifted_start",
+    "time": "long_run",
+    "heat": "long_run",
+    "run": "second_pass",
+    "direction": "reversal",
+    "velocity": "reversal",
+    "wheel_angle": "lifted_spin",
+    "constant": "lifted_spin",
+}
 INSTRUMENT = 0.2  # of an expected size: what tape, level or clamp meter can tell
 MODELLED = 0.02  # of a channel's size: no rival predicts an experiment better than this
 EVERY = 10  # foreseen values that count as one: neighbours share their noise
@@ -92,8 +102,7 @@ def _by_hand(names: Sequence[str]) -> NextExperiment | None:
     return None
 
 
-# ---- rivals --------------------------------------------------------------------------------------
-# ------------------
+# ---- rivals ------------------------------------------------------------------------------------
 
 
 def _rivals(search: Search, decision: Decision) -> list[Model]:
@@ -111,11 +120,16 @@ def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
     """Expected gain between the first and every other rival [nats]."""
     rig = search.problem.stack.rig
     first, *others = rivals
-    if not isinstance(rig, WheelRig):
+    here = rig.foresee(key, first.fitted.u, first.fitted.acting)
+    if here is None:
         return [0.0] * len(others)
-    here, slopes = _foreseen(search, key, first.fitted.u, first.fitted.acting)
-    seen = [_values(rig.foresee(key, m.fitted.u, m.fitted.acting)) for m in others]
-    return [_gain(search, key, here, values - _values(here), slopes) for values in seen]
+
+    slopes = _slopes(search, key, here, first.fitted.u, first.fitted.acting)
+    gains = []
+    for other in others:
+        there = rig.foresee(key, other.fitted.u, other.fitted.acting)
+        gains.append(_gain(search, here, _values(there) - _values(here), slopes))
+    return gains
 
 
 def _measured(rivals: list[Model]) -> dict[str, list[float]]:
@@ -146,37 +160,34 @@ def _read(one: Model, other: Model, key: str) -> float:
     return gain
 
 
-# ---- insufficient, and not in the list
-# -----------------------------------------------------------------------------
+# ---- insufficient, and not in the list ---------------------------------------------------------
 
 
 def _unseen_shown(search: Search) -> dict[str, float]:
     """Of every driven experiment the median gain over effects that these recordings could not show
     [nats].
     """
-    rig, base = search.problem.stack.rig, search.models[0]
-    if not isinstance(rig, WheelRig):
-        return {}
+    rig, base = search.problem.stack.rig, search.base
     unseen = [_expected(rig.effects[name]) for name in _not_shown(search)]
     out = {}
     for key in DRIVEN if unseen else ():
-        here, slopes = _foreseen(search, key, base.fitted.u, ())
-        changes = [
-            _values(rig.foresee(key, base.fitted.u, (effect,))) - _values(here) for effect in unseen
-        ]
-        out[key] = float(
-            np.median([_gain(search, key, here, change, slopes) for change in changes])
-        )
+        here = rig.foresee(key, base.fitted.u, ())
+        if here is None:
+            continue
+        slopes = _slopes(search, key, here, base.fitted.u, ())
+        there = [rig.foresee(key, base.fitted.u, (effect,)) for effect in unseen]
+        gains = [_gain(search, here, _values(one) - _values(here), slopes) for one in there]
+        out[key] = float(np.median(gains))
     return out
 
 
 def _not_shown(search: Search) -> list[str]:
     """Effects whose signature, at their expected size, is below the alarm."""
-    base, found = search.models[0].fitted.base(), search.screens[()]
+    projection, found = search.base.fitted.projection(), search.first
     size = {
-        name: float(np.trace(base.projected(w.columns)[0]))
+        name: float(np.trace(projection.project(w.columns)[0]))
         for name, w in found.best.items()
-        if "~" not in name
+        if isinstance(name, str)
     }
     return [name for name, squared in size.items() if 0.5 * squared < found.threshold]
 
@@ -197,56 +208,48 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     """A step of the condition along which the misfit lives; the gain is its evidence so far, for as
     much again.
     """
-    evidence = {name: e for name, e in search.screens[()].evidence.items() if "~" in name}
+    evidence = search.first.nameless
     if not evidence:
         return None
-    name = max(evidence, key=lambda n: evidence[n])
-    key = ALONG.get(name.partition("~")[2].partition("·")[0].partition(" ")[0], "slip_step")
-    gain = float(np.clip(evidence[name] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
+    shape = max(evidence, key=lambda s: evidence[s])
+    key = ALONG.get(shape.along[0], "slip_step")
+    gain = float(np.clip(evidence[shape] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
     return _foretold(key, gain)
 
 
-# ---- what is foreseen
-# ----------------------------------------------------------------------------------------------
-
-Foreseen = Mapping[str, Array]
+# ---- what is foreseen --------------------------------------------------------------------------
 
 
-def _foreseen(
-    search: Search, key: str, u: Array, effects: Sequence[Effect]
-) -> tuple[Foreseen, Array]:
-    """Channels under an experiment, and their change (values, q) for one σ of each soil constant as
-    fitted so far.
-    """
+def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequence[Effect]) -> Array:
+    """Change of what is foreseen (values, q) for one σ of each soil constant as fitted so far."""
     rig = search.problem.stack.rig
-    assert isinstance(rig, WheelRig)
-    here = rig.foresee(key, u, effects)
-    sigma = np.sqrt(np.diag(search.models[0].fitted.covariance()))
+    sigma = np.sqrt(np.diag(search.base.fitted.covariance()))
     slopes = []
     for i, known in enumerate(rig.constants):
         if known.soil:
             moved = u.copy()
             moved[i] += STEP
-            slopes.append(
-                (_values(rig.foresee(key, moved, effects)) - _values(here)) / STEP * sigma[i]
-            )
-    return here, np.column_stack(slopes)
+            change = _values(rig.foresee(key, moved, effects)) - _values(here)
+            slopes.append(change / STEP * sigma[i])
+    return np.column_stack(slopes)
 
 
-def _values(foreseen: Foreseen) -> Array:
-    return np.concatenate([np.asarray(values)[::EVERY] for values in foreseen.values()])
+def _values(foreseen: Foreseen | None) -> Array:
+    assert foreseen is not None
+    return np.concatenate([np.asarray(v)[::EVERY] for v in foreseen.channels.values()])
 
 
-def _gain(search: Search, key: str, here: Foreseen, change: Array, slopes: Array) -> float:
+def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float:
     """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST
     [nats].
     """
     stack = search.problem.stack
     sigma = []
-    for channel, colour in zip(here, search.problem.noise.colours, strict=True):
+    for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
         usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
-        counts = driving(key) | (channel == "torque")
-        sigma.append(np.where(counts, np.hypot(colour.sigma, MODELLED * usual), np.inf)[::EVERY])
+        known = np.where(here.tells[channel], np.hypot(colour.sigma, MODELLED * usual), np.inf)
+        sigma.append(known[::EVERY])
+
     scale = np.concatenate(sigma)
     ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
     pulled = soil.T @ ready

@@ -14,53 +14,56 @@ import numpy as np
 from scipy.stats import norm
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain import changes
-from gritd.tools.diagnose.explain import words_of_place as where
+from gritd.tools.diagnose.explain import changes, wording
 from gritd.tools.diagnose.explain.result import Location
-from gritd.tools.diagnose.explain.scores import Beside, Scores
 from gritd.tools.diagnose.fit import heldout
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
 from gritd.tools.diagnose.fit.functions import size_of
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.projection import Projected, Projection
+from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.fit.signatures import highest_order
+from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
-from gritd.tools.diagnose.screen.scans import WAVE, candidates
+from gritd.tools.diagnose.screen.scans import candidates
 from gritd.tools.diagnose.screen.screen import tail_chance
-from gritd.tools.diagnose.search.search import Model, Search, rescreen
+from gritd.tools.diagnose.screen.screening import Screening, chance_of
 
 DISCOVERY = 0.05  # false-discovery rate of the list
 MOST = 8
 RIPPLE = 0.01  # chance of the strongest order by noise alone
 FAR = 3.0  # [σ]
-STRAINED = {
-    "scale": "constant",
-    "offset": "constant",
-}  # of a channel's calibration, and the covariate it stands for
+STRAINED = ("scale", "offset")  # constants of a channel's calibration
 LEAST = 0.05  # share below which a place is not worth naming
 # [nats] that a covariate gains beside those already named, and the LEAST share of what they gain
 BESIDE = 3.0
 
-Found = tuple[float, Location]  # with the nats that it takes
+
+@dataclass(frozen=True)
+class Place:
+    """A place of the misfit with the nats that it takes."""
+
+    nats: float
+    location: Location
 
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Functions of a covariate in one channel: their columns, nats beyond chance and the chance of
-    as many.
+    """Functions of a covariate in one channel, with their columns in common with all others.
+
+    nats: gained beyond chance; p: the chance of as many.
+    wave: in time or along the bed, the likeliest of all frequencies; prior: its log share.
     """
 
-    channel: str
-    name: str
+    shape: Shape
     own: Index
     nats: float
     p: float
-    wave: Signature | None = None  # in time or along the bed, the likeliest of all frequencies
-
-    @property
-    def log_share(self) -> float:
-        return self.wave.prior if self.wave else 0.0
+    wave: Signature | None = None
+    prior: float = 0.0
 
 
-def bare(search: Search, accepted: Model) -> Model:
+def unmoved(screening: Screening, accepted: Model) -> Model:
     """The base model held at the constants found beside the accepted effects: what it misses is
     what they do.
 
@@ -68,120 +71,153 @@ def bare(search: Search, accepted: Model) -> Model:
     the misfit, and what is left shows where they cannot follow, not where the misfit was made.
     """
     fit = accepted.fitted
-    alone = search.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
+    alone = screening.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
     held = replace(
-        alone, u=np.zeros_like(fit.u), jacobian=np.zeros_like(alone.jacobian),
-        residual=alone.residual - search.problem.tolerance @ fit.slack,
-    )  # fmt: skip
-    return Model(held, (), 0.0)
+        alone,
+        u=np.zeros_like(fit.u),
+        jacobian=np.zeros_like(alone.jacobian),
+        residual=alone.residual - screening.problem.tolerance @ fit.slack,
+    )
+    return Model(held)
 
 
-def locate(search: Search, model: Model, predicted: Array | None = None) -> tuple[Location, ...]:
+def locate(
+    screening: Screening, model: Model, predicted: Array | None = None
+) -> tuple[Location, ...]:
     """Places of the misfit of a model, by share; only those that survive false-discovery control.
 
     predicted: (N,) against which the sentences are said; without it the model's, each value's own
         run held out.
     """
-    stack = search.problem.stack
+    stack = screening.problem.stack
     if predicted is None:
         predicted = heldout.held_out(model.fitted, heldout.run_folds(stack)).predicted
     residual = stack.measured - predicted
-    points = changes.find(search, model)
-    beside = Beside(search, model)
-    board, families = _families(search, model, beside, points)
+
+    points = changes.find_changes(screening, model)
+    projection = model.fitted.projection(screening.surrogates)
+    projected, families = _families(screening, model, projection, points)
+
+    places = _smooth_places(stack, residual, projected, families, points)
+    places += _strains(stack, model) + _ripples(screening, projection, projected, families)
+    places.sort(key=lambda place: -place.nats)
+    named = {(p.location.channel, p.location.covariate): p.location for p in reversed(places)}
+    return tuple(named.values())[::-1][:MOST]
+
+
+def _smooth_places(
+    stack: Stack,
+    residual: Array,
+    projected: Projected,
+    families: list[Family],
+    points: changes.Changes,
+) -> list[Place]:
+    """In each channel the families that are taken up and survive."""
     q = dict(zip(families, _false_discovery(np.array([f.p for f in families])), strict=True))
-    found: list[Found] = []
+    places = []
     for channel in stack.rig.channels:
-        here = [f for f in families if f.channel == channel]
-        whole = _gain(board, _joined(here))[0]
+        here = [f for f in families if f.shape.channel == channel]
+        whole = _gain(projected, _joined(here))[0]
+
         told: list[Family] = []
-        for family in _taken_up(board, here):
-            before, told = _gain(board, _joined(told))[0], [*told, family]
-            nats = _gain(board, _joined(told))[0] - before
+        for family in _taken_up(projected, here):
+            before, told = _gain(projected, _joined(told))[0], [*told, family]
+            nats = _gain(projected, _joined(told))[0] - before
             share = float(np.clip(nats / max(whole, 1e-9), 0.0, 1.0))
             if q[family] <= DISCOVERY and share >= LEAST:
-                found.append(
-                    (nats, _place(stack, residual, family, here, points, share, float(q[family])))
-                )
-    found += _strains(stack, model) + ripples(search, beside, board, families)
-    found.sort(key=lambda item: -item[0])
-    return tuple(
-        {(place.channel, place.covariate): place for _, place in reversed(found)}.values()
-    )[::-1][:MOST]
+                chance = float(q[family])
+                location = _location(stack, residual, family, here, points, share, chance)
+                places.append(Place(nats, location))
+    return places
 
 
 def _families(
-    search: Search, model: Model, beside: Beside, points: changes.Changes
-) -> tuple[Scores, list[Family]]:
+    screening: Screening, model: Model, projection: Projection, points: changes.Changes
+) -> tuple[Projected, list[Family]]:
     """All smooth functions, steps at the change points of a covariate among them; and the likeliest
     waves.
 
     Each about a mean of its own: what grows with slip from nothing is not told as a constant and a
         slope.
     """
-    stack, waves = search.problem.stack, _waves(search, model, beside)
-    names, columns = [s.name for s in (*search.generics, *waves)], []
-    for signature in search.generics:
-        channel, _, covariate = signature.name.partition("~")
-        steps = points.get((channel, covariate), ())
-        more = [changes.columns(stack, channel, covariate, steps)] if steps else []
-        columns.append(np.column_stack((signature.columns, *more)))
-    columns += [wave.columns for wave in waves]
-    board = beside.scores(np.column_stack(columns), np.ones(stack.size, bool))
+    stack, waves = screening.problem.stack, _waves(screening, model, projection)
+    smooth = [(s.shape, _with_steps(stack, s, points)) for s in screening.functions]
+    every = [*smooth, *((w.shape.family, w.columns) for w in waves)]
+    shapes, columns = [shape for shape, _ in every], [block for _, block in every]
+
+    ready = whiten_rows(screening.problem.noise, np.column_stack(columns), everything(stack))
+    projected = projection.project_rows(ready, everything(stack))
+
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     spans = [np.arange(start, end) for start, end in pairwise(ends.tolist())]
-    smooth = len(search.generics)
-    always = {
-        n.partition("~")[0]: own
-        for n, own in zip(names, spans, strict=True)
-        if n.endswith("~constant")
+    means = {
+        shape.channel: own
+        for shape, own in zip(shapes, spans, strict=True)
+        if shape.along == ("constant",)
     }
     spans = [
-        np.union1d(own, always[n.partition("~")[0]]) for n, own in zip(names, spans, strict=True)
+        np.union1d(own, means[shape.channel]) for shape, own in zip(shapes, spans, strict=True)
     ]
     families = [
-        _family(board, name, own) for name, own in zip(names[:smooth], spans[:smooth], strict=True)
+        Family(shape, own, *_gain(projected, own)) for shape, own in zip(shapes, spans, strict=True)
     ]
-    chance = (search.screens.get(model.names) or rescreen(search, model)).chance
-    for wave, own in zip(waves, spans[smooth:], strict=True):
-        families.append(replace(_family(board, wave.name, own), p=chance[wave.name], wave=wave))
-    return board, families
+
+    chance = chance_of(screening, screening.base, [w.shape.family for w in waves])
+    first = len(smooth)
+    return projected, families[:first] + [
+        replace(family, p=chance[family.shape], wave=wave, prior=wave.prior)
+        for family, wave in zip(families[first:], waves, strict=True)
+    ]
 
 
-def _waves(search: Search, model: Model, beside: Beside) -> list[Signature]:
+def everything(stack: Stack) -> Bools:
+    return np.ones(stack.size, bool)
+
+
+def _with_steps(stack: Stack, signature: Signature, points: changes.Changes) -> Array:
+    """Columns (N, m) of a smooth function, with steps at the change points of its covariate."""
+    channel, along = signature.shape.channel, signature.shape.along
+    places = points.get((channel, along[0]), ()) if len(along) == 1 else ()
+    more = [changes.columns(stack, channel, along[0], places)] if places else []
+    return np.column_stack((signature.columns, *more))
+
+
+def _waves(screening: Screening, model: Model, projection: Projection) -> list[Signature]:
     """The likeliest wave of each channel and axis, where no ripple of the wheel is as likely: at a
     steady speed, or in one run, a ripple of the wheel is a wave in time and along the bed too.
     """
-    every = [f for f in search.scans if f.kind == WAVE]
-    found: dict[str, Signature] = {}
-    for wave in candidates(every, search.problem, model.fitted):
-        found.setdefault(wave.name, wave)
-    turning = {c: _turning(search, beside, c) for c in {name.partition("~")[0] for name in found}}
+    problem = screening.problem
+    searched = [f for f in screening.families if f.shape.kind == "wave"]
+    found: dict[Shape, Signature] = {}
+    for wave in candidates(searched, problem, model.fitted):
+        found.setdefault(wave.shape.family, wave)
+    turning = {c: _turning(screening, projection, c) for c in {shape.channel for shape in found}}
+
     kept = []
     for wave in found.values():
-        own = search.problem.stack.of(channel := wave.name.partition("~")[0])
-        alone = beside.scores(wave.columns[own], own)
-        if (
-            float(log_bayes(alone.a, alone.b[:, 0], (0,) * len(alone.a))) + wave.prior
-            > turning[channel]
-        ):
+        own = problem.stack.of(wave.shape.channel)
+        ready = whiten_rows(problem.noise, wave.columns[own], own)
+        alone = projection.project_rows(ready, own)
+        evidence = float(log_bayes(alone.a, alone.b[:, 0], (0,) * len(alone.a)))
+        if evidence + wave.prior > turning[wave.shape.channel]:
             kept.append(wave)
     return kept
 
 
-def _turning(search: Search, beside: Beside, channel: str) -> float:
+def _turning(screening: Screening, projection: Projection, channel: str) -> float:
     """Evidence of the likeliest ripple of the wheel in a channel."""
-    stack = search.problem.stack
+    stack = screening.problem.stack
     orders = np.arange(1.0, highest_order(stack))
     if not orders.size:
         return -np.inf
     own = stack.of(channel)
+
     waves = _turns(stack, own, orders) * np.sqrt(2.0) * size_of(stack, channel)
-    left = beside.scores(np.column_stack((waves.real, waves.imag)), own)
+    columns = np.column_stack((waves.real, waves.imag))
+    left = projection.project_rows(whiten_rows(screening.problem.noise, columns, own), own)
     pairs = ([k, k + orders.size] for k in range(orders.size))
-    return max(float(log_bayes(left.a[np.ix_(k, k)], left.b[k, 0], (0, 0))) for k in pairs) - float(
-        np.log(orders.size)
-    )
+    best = max(float(log_bayes(left.a[np.ix_(k, k)], left.b[k, 0], (0, 0))) for k in pairs)
+    return best - float(np.log(orders.size))
 
 
 def _turns(stack: Stack, own: Bools, orders: Array) -> Array:
@@ -194,7 +230,7 @@ def _turns(stack: Stack, own: Bools, orders: Array) -> Array:
     )
 
 
-def _place(
+def _location(
     stack: Stack,
     residual: Array,
     family: Family,
@@ -204,27 +240,22 @@ def _place(
     q: float,
 ) -> Location:
     """A product of covariates is filed under the one that takes most alone."""
+    channel, along = family.shape.channel, family.shape.along
     if family.wave:
-        axis, at = family.name.partition(" ")[0], family.wave.shape["at"]
-        said = where.wave(stack, residual, family.channel, axis, at, share)
-        return Location(family.channel, axis, share, family.p, q, said)
-    alone = {f.name: f.nats for f in here}
-    covariate = max(family.name.split("·"), key=lambda n: alone.get(n, 0.0))
-    places = points.get((family.channel, covariate), ())
-    if covariate == "run" and places and not where.shows(stack, residual, family.channel, places):
+        words = wording.wave(stack, residual, family.wave.shape, share)
+        return Location(channel, along[0], share, family.p, q, words)
+
+    alone = {f.shape.along: f.nats for f in here if not f.wave}
+    covariate = max(along, key=lambda name: alone.get((name,), 0.0))
+    places = points.get((channel, covariate), ())
+    if covariate == "run" and places and not wording.shows(stack, residual, channel, places):
         places = ()
-    said = where.sentence(stack, residual, family.channel, family.name, places, share)
+    words = wording.sentence(stack, residual, family.shape, places, share)
     first = tuple(float(np.ceil(place)) for place in places) if covariate == "run" else places
-    return Location(family.channel, covariate, share, family.p, q, said, first)
+    return Location(channel, covariate, share, family.p, q, words, first)
 
 
-# ---- which covariates
-# ----------------------------------------------------------------------------------------------
-
-
-def _family(board: Scores, name: str, own: Index) -> Family:
-    channel, _, covariate = name.partition("~")
-    return Family(channel, covariate, own, *_gain(board, own))
+# ---- which covariates --------------------------------------------------------------------------
 
 
 def _joined(families: list[Family]) -> Index:
@@ -232,35 +263,34 @@ def _joined(families: list[Family]) -> Index:
     return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(f.own for f in families)]))
 
 
-def _gain(board: Scores, own: Index) -> tuple[float, float]:
+def _gain(projected: Projected, own: Index) -> tuple[float, float]:
     """Nats gained beyond chance, and the chance of as many."""
     if not own.size:
         return 0.0, 1.0
-    smooth = np.linalg.inv(board.a[np.ix_(own, own)] + np.eye(own.size))
-    nats = 0.5 * np.sum(board.b[own] * (smooth @ board.b[own]), axis=0)
+    smooth = np.linalg.inv(projected.a[np.ix_(own, own)] + np.eye(own.size))
+    nats = 0.5 * np.sum(projected.b[own] * (smooth @ projected.b[own]), axis=0)
     value, nulls = float(nats[0]), nats[1:]
     return max(value - float(nulls.mean()), 0.0), tail_chance(nulls, value)
 
 
-def _taken_up(board: Scores, families: list[Family]) -> list[Family]:
+def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
     """Families of a channel by evidence, each beside those before it."""
     taken: list[Family] = []
     best = 0.0
     while True:
-        tried = {f: _evidence(board, [*taken, f]) for f in families if f not in taken}
-        if not tried or tried[first := max(tried, key=lambda f: tried[f])] < best + max(
-            BESIDE, LEAST * best
-        ):
+        tried = {f: _evidence(projected, [*taken, f]) for f in families if f not in taken}
+        first = max(tried, key=lambda f: tried[f], default=None)
+        if first is None or tried[first] < best + max(BESIDE, LEAST * best):
             return taken
         taken, best = [*taken, first], tried[first]
 
 
-def _evidence(board: Scores, families: list[Family]) -> float:
+def _evidence(projected: Projected, families: list[Family]) -> float:
     if not families:
         return 0.0
     own = _joined(families)
-    found = log_bayes(board.a[np.ix_(own, own)], board.b[own, 0], (0,) * own.size)
-    return float(found) + sum(f.log_share for f in families)
+    found = log_bayes(projected.a[np.ix_(own, own)], projected.b[own, 0], (0,) * own.size)
+    return float(found) + sum(f.prior for f in families)
 
 
 def _false_discovery(p: Array) -> Array:
@@ -272,68 +302,79 @@ def _false_discovery(p: Array) -> Array:
     return out
 
 
-# ---- ripples and strains
-# -------------------------------------------------------------------------------------------
+# ---- ripples and strains -----------------------------------------------------------------------
 
 
-def ripples(search: Search, beside: Beside, board: Scores, families: list[Family]) -> list[Found]:
+def _ripples(
+    screening: Screening, projection: Projection, projected: Projected, families: list[Family]
+) -> list[Place]:
     """The strongest order of the wheel angle in each channel beside all smooth functions, against
     every surrogate's.
     """
-    stack = search.problem.stack
+    stack = screening.problem.stack
     orders = np.arange(3.0, highest_order(stack))
-    found: list[Found] = []
+    places = []
     for channel in stack.rig.channels if orders.size else ():
-        own, here = stack.of(channel), [f for f in families if f.channel == channel]
-        waves, size = _turns(stack, own, orders), size_of(stack, channel)
+        here, size = [f for f in families if f.shape.channel == channel], size_of(stack, channel)
         if size <= 0.0 or not here:
             continue
-        smooth = [s.columns[own] for s in search.generics if s.name.startswith(f"{channel}~")]
-        others = np.column_stack((*smooth, *(f.wave.columns[own] for f in here if f.wave)))
-        columns = np.column_stack((size * waves.real, size * waves.imag, others))
-        left = beside.scores(columns, own).without_columns(slice(2 * orders.size, columns.shape[1]))
+        left = _beside_smooth(screening, projection, channel, orders, here)
         nats = np.stack([_pair(left, k, k + orders.size) for k in range(orders.size)])
         best = int(np.argmax(nats[:, 0]))
+
         p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
-        whole = _gain(board, _joined(here))[0]
+        whole = _gain(projected, _joined(here))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
         if p <= RIPPLE and share >= LEAST:
             amplitude = size * _amplitude(left, best, best + orders.size)
-            said = where.ripple(stack, channel, float(orders[best]), amplitude, share)
-            found.append(
-                (float(nats[best, 0]), Location(channel, "wheel_angle", share, p, p, said))
-            )
-    return found
+            words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
+            location = Location(channel, "wheel_angle", share, p, p, words)
+            places.append(Place(float(nats[best, 0]), location))
+    return places
 
 
-def _pair(left: Scores, one: int, two: int) -> Array:
+def _beside_smooth(
+    screening: Screening, projection: Projection, channel: str, orders: Array, here: list[Family]
+) -> Projected:
+    """Ripples of every order (cosines, then sines) with all other functions of the channel
+    projected out.
+    """
+    stack = screening.problem.stack
+    own, size = stack.of(channel), size_of(stack, channel)
+    waves = _turns(stack, own, orders)
+    smooth = [s.columns[own] for s in screening.functions if s.shape.channel == channel]
+    others = np.column_stack((*smooth, *(f.wave.columns[own] for f in here if f.wave)))
+
+    columns = np.column_stack((size * waves.real, size * waves.imag, others))
+    ready = whiten_rows(screening.problem.noise, columns, own)
+    beyond = slice(2 * orders.size, columns.shape[1])
+    return projection.project_rows(ready, own).without_columns(beyond)
+
+
+def _pair(left: Projected, one: int, two: int) -> Array:
     """Nats (1 + draws,) that cosine and sine of an order gain."""
     own = [one, two]
     gained = np.linalg.solve(left.a[np.ix_(own, own)] + 1e-9 * np.eye(2), left.b[own])
     return np.asarray(0.5 * np.sum(left.b[own] * gained, axis=0))
 
 
-def _amplitude(left: Scores, one: int, two: int) -> float:
+def _amplitude(left: Projected, one: int, two: int) -> float:
     own = [one, two]
-    return float(
-        np.linalg.norm(np.linalg.solve(left.a[np.ix_(own, own)] + 1e-9 * np.eye(2), left.b[own, 0]))
-    )
+    a = left.a[np.ix_(own, own)] + 1e-9 * np.eye(2)
+    return float(np.linalg.norm(np.linalg.solve(a, left.b[own, 0])))
 
 
-def _strains(stack: Stack, model: Model) -> list[Found]:
+def _strains(stack: Stack, model: Model) -> list[Place]:
     """Calibration constants pulled far off what is known: a misfit that hides there leaves no
     residual.
     """
     nats = 0.5 * model.fitted.u**2
-    found: list[Found] = []
-    for known, u, value in zip(
-        stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True
-    ):
+    places = []
+    constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
+    for known, u, taken in constants:
         channel, _, what = known.name.rpartition("_")
         if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
-            said = where.strain(channel, what, known.of(u), known.unit, u)
-            p = float(2.0 * norm.sf(abs(u)))
-            found.append(
-                (value, Location(channel, STRAINED[what], value / float(nats.sum()), p, p, said))
-            )
-    return found
+            words = wording.strain(channel, what, known.of(u), known.unit, u)
+            p, share = float(2.0 * norm.sf(abs(u))), taken / float(nats.sum())
+            places.append(Place(taken, Location(channel, "constant", share, p, p, words)))
+    return places

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any
 
-Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
+from gritd.tools.diagnose.verdict.decision import Verdict
 
 
 @dataclass(frozen=True)

@@ -11,28 +11,34 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Location, Scatter, Trace
 from gritd.tools.diagnose.fit.heldout import Held
+from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools
-from gritd.tools.diagnose.search.search import Search
 
 PICTURES = 4  # scatters at most
 
 
-def traces(search: Search, before: Held, after: Held) -> tuple[Trace, ...]:
+def traces(problem: Problem, before: Held, after: Held) -> tuple[Trace, ...]:
     """Values that the comparison used, predictions with the value's own run held out."""
-    stack, rig = search.problem.stack, search.problem.stack.rig
+    stack, rig = problem.stack, problem.stack.rig
     out = []
     for channel, number in stack.parts:
         own = stack.of(channel) & (stack.run == number)
         run = rig.runs[number]
         used = run.used[channel]
-        sigma = search.problem.noise.colours[rig.channels.index(channel)].sigma
+        sigma = problem.noise.colours[rig.channels.index(channel)].sigma
         out.append(
             Trace(
-                run.name, channel, rig.units[channel], run.time.tolist(), run.measured[channel].tolist(),
-                _spread(before.predicted[own], used), _spread(after.predicted[own], used),
-                used.astype(int).tolist(), sigma,
+                run.name,
+                channel,
+                rig.units[channel],
+                run.time.tolist(),
+                run.measured[channel].tolist(),
+                _spread(before.predicted[own], used),
+                _spread(after.predicted[own], used),
+                used.astype(int).tolist(),
+                sigma,
             )
-        )  # fmt: skip
+        )
     return tuple(out)
 
 
@@ -44,21 +50,27 @@ def _spread(values: Array, used: Bools) -> list[float]:
 
 
 def scatters(
-    search: Search, location: Sequence[Location], before: Held, after: Held
+    problem: Problem, location: Sequence[Location], before: Held, after: Held
 ) -> tuple[Scatter, ...]:
-    stack, rig = search.problem.stack, search.problem.stack.rig
+    stack, rig = problem.stack, problem.stack.rig
     out = []
     for place in location[:PICTURES]:
-        name = place.covariate.split("·")[0]
+        name = place.covariate
         own = stack.of(place.channel)
         x = stack.run.astype(float) if name == "run" else stack.covariate(name)
         measured = stack.measured[own]
-        sigma = search.problem.noise.colours[rig.channels.index(place.channel)].sigma
+        sigma = problem.noise.colours[rig.channels.index(place.channel)].sigma
         out.append(
             Scatter(
-                place.channel, place.covariate, rig.units[place.channel], rig.units.get(name, ""), x[own].tolist(),
-                (measured - before.predicted[own]).tolist(), (measured - after.predicted[own]).tolist(),
-                stack.run[own].tolist(), sigma,
+                place.channel,
+                place.covariate,
+                rig.units[place.channel],
+                rig.units.get(name, ""),
+                x[own].tolist(),
+                (measured - before.predicted[own]).tolist(),
+                (measured - after.predicted[own]).tolist(),
+                stack.run[own].tolist(),
+                sigma,
             )
-        )  # fmt: skip
+        )
     return tuple(out)

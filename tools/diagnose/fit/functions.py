@@ -13,6 +13,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 
 # of the channel's size: the expected size of a misfit; a third and three times of it are tried too
@@ -20,6 +21,7 @@ SIZE = 0.03
 WAVES = 4  # cosines along time or place
 LEVELS = 1e-3  # relative spread below which a covariate does not vary
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
+LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
 BENDS = 2  # cosines by which a share of an effect may vary along time or place
 ORDERS = (
     1.0,
@@ -27,19 +29,19 @@ ORDERS = (
 )  # ripples a turn that a smooth term could not take; higher ones belong to listed effects
 
 
-def signatures(stack: Stack) -> list[Signature]:
-    """One for each channel and covariate (or product of two) that varies; named
-    'channel~covariate'.
-    """
+def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
+    """One for each channel and covariate (or product of two) that varies."""
     found = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
         size = size_of(stack, channel)
-        for name, columns in _families(stack):
+
+        for along, columns in _families(stack):
             kept = _scaled(np.where(own[:, None], columns, 0.0), own, size)
             if kept.shape[1]:
-                found.append(Signature(f"{channel}~{name}", kept, (0,) * kept.shape[1], {}))
-    return found
+                found.append(Signature(Shape(channel, along), kept, (0,) * kept.shape[1], {}))
+
+    return tuple(found)
 
 
 def size_of(stack: Stack, channel: str) -> float:
@@ -56,10 +58,14 @@ def tolerance(stack: Stack, share: float) -> Array:
     for channel in stack.rig.channels:
         own = stack.of(channel)
         size = share * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
-        families = [f for name, f in _families(stack) if name in TOLERATED or "·" in name]
+        families = [f for along, f in _families(stack) if _tolerated(along)]
         found = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
         columns.append(found * size / np.sqrt(max(found.shape[1], 1)))
     return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
+
+
+def _tolerated(along: tuple[str, ...]) -> bool:
+    return len(along) > 1 or along[0] in TOLERATED
 
 
 def shares(stack: Stack, own: Bools) -> Array:
@@ -67,44 +73,45 @@ def shares(stack: Stack, own: Bools) -> Array:
     place, heat; and 1.
     """
     columns = []
-    for name, family in _families(stack):
-        if name not in ("run", "wheel_angle", "acceleration", "direction"):
-            columns.append(family[:, :BENDS] if name in ("position", "time", "heat") else family)
+    for along, family in _families(stack):
+        if len(along) > 1 or along[0] not in ("run", "wheel_angle", "acceleration", "direction"):
+            bent = len(along) == 1 and along[0] in LONG
+            columns.append(family[:, :BENDS] if bent else family)
     return _scaled(np.column_stack(columns), own, 1.0)
 
 
-def _families(stack: Stack) -> Iterator[tuple[str, Array]]:
+def _families(stack: Stack) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Covariates, and functions of them (N, m) while the wheel turns."""
     moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)
-    yield (
-        "constant",
-        np.column_stack((moving, 1.0 - moving)),
-    )  # friction acts while the wheel turns, an offset always
+    # friction acts while the wheel turns, an offset always
+    yield ("constant",), np.column_stack((moving, 1.0 - moving))
+
     for names in stack.rig.smooth:
         parts = [_standard(stack.covariate(name), moving > 0) for name in names]
         if any(p is None for p in parts):
             continue
         value = np.prod([p for p in parts if p is not None], axis=0) * moving
         powers = (value, value**2 - moving * np.mean(value**2)) if len(names) == 1 else (value,)
-        yield "·".join(names), np.column_stack(powers)
-    for name in ("position", "time", "heat"):
-        along = _waves(stack.covariate(name))
-        if along is not None:
-            yield name, along * moving[:, None]
+        yield names, np.column_stack(powers)
+
+    for name in LONG:
+        waves = _waves(stack.covariate(name))
+        if waves is not None:
+            yield (name,), waves * moving[:, None]
+
     for name in ("acceleration", "direction"):
         part = _standard(stack.covariate(name), moving > 0)
         if part is not None:
-            yield name, part[:, None]
+            yield (name,), part[:, None]
+
     if len(stack.rig.runs) > 2:
-        yield (
-            "run",
-            (stack.run[:, None] == np.arange(len(stack.rig.runs))).astype(float) * moving[:, None],
-        )
+        runs = (stack.run[:, None] == np.arange(len(stack.rig.runs))).astype(float)
+        yield ("run",), runs * moving[:, None]
+
     angle = stack.covariate("wheel_angle")
     if np.ptp(angle) > 2.0 * np.pi:
-        yield (
-            "wheel_angle",
-            np.column_stack([f(o * angle) * moving for o in ORDERS for f in (np.cos, np.sin)]),
-        )
+        turns = [f(o * angle) * moving for o in ORDERS for f in (np.cos, np.sin)]
+        yield ("wheel_angle",), np.column_stack(turns)
 
 
 def _waves(values: Array) -> Array | None:

@@ -15,7 +15,8 @@ from scipy.special import logsumexp
 
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Base, log_bayes
+from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.fit.projection import Projection, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Stack
 
@@ -121,11 +122,11 @@ class Fitted:
         found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
         return float(logsumexp(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
 
-    def base(self) -> Base:
+    def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
         scaled = self.jacobian / self.penalty
-        pulled = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
-        return Base(scaled, self.residual, pulled * self.penalty)
+        centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
+        return Projection(scaled, self.residual, centre * self.penalty, surrogates)
 
 
 def _choices(strengths: list[int]) -> list[list[int]]:

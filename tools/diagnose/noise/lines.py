@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.noise.colour import saturated_mean
+from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Index, Stack
 
 AXES = ("time", "position")
@@ -72,7 +72,7 @@ def waves(x: Array, frequency: Array) -> Array:
     return np.stack((np.cos(phase), np.sin(phase)), axis=-1)
 
 
-def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells: Index) -> Array:
+def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Index) -> Array:
     """Waves (N, m) in a residual (N,) that stand out of their neighbours, whatever the colour of
     the noise.
 
@@ -80,12 +80,13 @@ def standing(stack: Stack, residual: Array, explained: Array, sure: Array, cells
     chance gives one channel in a hundred is none, and is not taken for it; of noise alone nothing
     is taken, so its size and colour stay what they are. Long waves of the bed, the same in all
     runs, have too few neighbours: they are left out of the noise whether they stand out or not, as
-    lost freedom. The others as in `noise.fit`: what else is no noise, left out first.
+    lost freedom. explainable, cells: what else is no noise, left out first.
     """
     columns = [_long(stack, channel) for channel in stack.rig.channels]
     for channel in stack.rig.channels:
         own = np.flatnonzero(stack.of(channel))
-        taken = saturated_mean(residual[own], explained[own], sure[own], cells[own])
+        leading, whole = explainable.leading[own], explainable.whole[own]
+        taken = saturated_mean(residual[own], leading, whole, cells[own])
         left = np.zeros(stack.size)
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
         room = own.size // SHARE

@@ -28,7 +28,7 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.diagnose.rig.interface import Bools, Known, Run
+from gritd.tools.diagnose.rig.interface import Bools, Known, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
 
 RATE = 10.0  # [Hz] of the comparison, as for a wheel
@@ -58,7 +58,7 @@ UNITS = {
 
 
 class DriveRig:
-    """See rig.Rig."""
+    """See interface.Rig."""
 
     channels = ("torque",)
     units: Mapping[str, str] = UNITS
@@ -71,7 +71,8 @@ class DriveRig:
     )
     baseline: tuple[Effect, ...] = ()
     partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
-    blurs = False  # prediction and measurement go through the same filters
+    law = None
+    shortcomings: Sequence[str] = ()
 
     def __init__(
         self, series: Sequence[Mapping[str, Series]], names: Sequence[str], settings: Settings
@@ -144,6 +145,13 @@ class DriveRig:
         if unit == "A":
             return self.unit / self.settings.drive.torque_constant.value
         return self.unit if unit == "N·m" else 1.0
+
+    def blur(self, stack: Stack, predicted: Array) -> Array:
+        """Nothing: prediction and measurement go through the same filters."""
+        return np.zeros(predicted.shape)
+
+    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:
+        """The menu of experiments is a wheel's."""
 
     def _run(self, motion: Moving, name: str) -> Run:
         velocity, torque, angle = (

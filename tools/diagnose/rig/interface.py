@@ -2,7 +2,7 @@
 of its constants.
 
 A rig is one small class: `WheelRig` for a wheel in soil, `DriveRig` for a motor drive without soil.
-All else in this package works on the arrays defined here and knows nothing of wheels.
+The other rooms work on the arrays defined here and know a rig by this interface alone.
 """
 
 from __future__ import annotations
@@ -63,6 +63,36 @@ class Run:
     covariates: Mapping[str, Array]
 
 
+@dataclass(frozen=True)
+class Foreseen:
+    """Channels under an experiment that was not driven yet, and which of their values would tell
+    something; arrays (n,).
+    """
+
+    channels: Mapping[str, Array]
+    tells: Mapping[str, Bools]
+
+
+@dataclass(frozen=True)
+class LawForm:
+    """How an effect of the library expresses a misfit without a name: a sum of few terms in one
+    channel.
+
+    prefix:  of each channel that has a law, how the names of its parameters begin.
+    channel: of each prefix, the channel in which the law is stated.
+    terms:   how the names of the parameters end, and the symbol of each term.
+    note:    what the symbols mean.
+    domain:  covariates of which a domain is kept, and the size of one unit of the effect in SI.
+    """
+
+    effect: type[Effect]
+    prefix: Mapping[str, str]
+    channel: Mapping[str, str]
+    terms: Mapping[str, str]
+    note: str
+    domain: Mapping[str, float]
+
+
 class Rig(Protocol):
     """The adapter."""
 
@@ -110,6 +140,24 @@ class Rig(Protocol):
 
     def stated(self, unit: str) -> float:
         """Factor from a parameter of the library in this unit to what it means for this rig."""
+
+    def blur(self, stack: Stack, predicted: Array) -> Array:
+        """Error (N,) of a prediction (N,) where it changes, by how motion and channels are
+        averaged, in the channels' units.
+        """
+
+    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen | None:
+        """Every channel under an experiment, for constants u and effects; None where the rig cannot
+        foresee it.
+        """
+
+    @property
+    def law(self) -> LawForm | None:
+        """How a misfit without a name is expressed; None where the rig has no such effect."""
+
+    @property
+    def shortcomings(self) -> Sequence[str]:
+        """What these runs cannot show for want of a condition or a channel, a sentence each."""
 
 
 class Stack:

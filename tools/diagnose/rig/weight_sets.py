@@ -12,15 +12,14 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
 
-HELD = (
-    10  # values at exactly one load that make a set of plates: in between, plates are being changed
-)
+# values at exactly one load that make a set of weights: in between, plates are being changed
+HELD = 10
 SAME = 0.02  # relative distance at which weights are others
 MANY = 60  # sets at most
 
 
 @dataclass(frozen=True)
-class Plates:
+class WeightSets:
     """Loads (m,) of the sets [N]; which of them each value of a run has, per run (n,), −1 for none."""
 
     loads: tuple[float, ...]
@@ -31,15 +30,16 @@ class Plates:
         return tuple(f"weights_{load:.3g}" for load in self.loads)
 
 
-def plates_of(loads: Sequence[Array]) -> Plates:
+def weight_sets(loads: Sequence[Array]) -> WeightSets:
     """The sets in use, from the weights (n,) of each run [N]; none where all runs have the same."""
     values, count = np.unique(np.concatenate(loads), return_counts=True)
     held = values[(count >= HELD) & (values > 0.0)]
     sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > SAME) + 1)
     if not 1 < len(sets) <= MANY:
-        return Plates((), tuple(np.full(load.size, -1, dtype=np.intp) for load in loads))
+        none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
+        return WeightSets((), none)
     middle = np.array([one.mean() for one in sets])
-    return Plates(tuple(middle.tolist()), tuple(_nearest(load, middle) for load in loads))
+    return WeightSets(tuple(middle.tolist()), tuple(_nearest(load, middle) for load in loads))
 
 
 def _nearest(load: Array, middle: Array) -> Index:

@@ -11,63 +11,49 @@ from functools import cached_property
 import numpy as np
 
 from gritd.estimator.config.effects import configured
-from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion, situation_of
 from gritd.estimator.terramechanics.soil import Array, Soil
+from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import ORDER, Campaign, sensed_as
-from gritd.tools.diagnose.rig.interface import Bools, Known, Run
-from gritd.tools.diagnose.rig.proposals import proposed
+from gritd.tools.diagnose.rig.constants import UNITS, calibration_sigmas, wheel_constants
+from gritd.tools.diagnose.rig.interface import Bools, Foreseen, LawForm, Run, Stack
+from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import at_rest, states
-from gritd.tools.diagnose.rig.weight_sets import plates_of
+from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import weights_of
 
 HELD = 0.05  # of the driving torque: current at rest that differs by more holds something
 EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
 UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
-TIMING = 5e-3  # [s] by which a channel's stamps may be off
-# second differences by which speeds, slopes over three intervals, cut corners that a channel does
-# not
-BLUR = 0.3
-FLOORS = {
-    "c": 0.05,
-    "tan_phi": 0.02,
-    "k": 0.03,
-    "n": 0.01,
-    "K": 0.02,
-}  # least relative sigma
-SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
-LEAST_WEIGHTS = 2e-3  # nor any weights
-UNITS = {
-    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m", "slip": "-",
-    "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s", "acceleration": "rad/s²", "heat": "A²·s",
-    "run": "-", "direction": "-", "constant": "-",
-}  # fmt: skip
-PHYSICS = (
-    "c",
-    "tan_phi",
-    "k",
-    "n",
-    "K",
-    "weights",
-    "carriage_scale",
-)  # what needs the forward model
-OWN = 0.7  # share of a common error of the weights that each set of them may have for itself
+# constants that need the forward model
+PHYSICS = ("c", "tan_phi", "k", "n", "K", "weights", "carriage_scale")
+ONE_LOAD = 0.1  # relative spread below which the loads are one
 KEPT = 4  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
 
 
+LAW_PREFIX = {
+    "torque": "torque", "axle_torque": "torque", "drawbar_pull": "pull", "sinkage": "depth",
+}  # fmt: skip
+LAW_CHANNEL = {"torque": "torque", "pull": "drawbar_pull", "depth": "sinkage"}
+LAW_TERMS = {"constant": "1", "slip": "i", "slip_squared": "i²", "sinkage": "z/r", "speed": "ν"}
+LAW_NOTE = "ν = ln((rω + 1 mm/s)/(21 mm/s))"
+
+
 class WheelRig:
-    """See rig.Rig."""
+    """See interface.Rig."""
 
     units: Mapping[str, str] = UNITS
     smooth = (
-        ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"), ("slip", "sinkage"),
-        ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),
+        ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"),
+        ("slip", "sinkage"), ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),
     )  # fmt: skip
 
     def __init__(self, signals: Sequence[Signals], settings: Settings) -> None:
@@ -80,36 +66,31 @@ class WheelRig:
             _motion(s, w.values, settings, s.start - began)
             for s, w in zip(signals, self._weights, strict=True)
         ]
-        self._plates = plates_of([np.asarray(m.load) for m in self._motions])
-        self._plate = np.concatenate(self._plates.label)  # (N,)
+        self._sets = weight_sets([np.asarray(m.load) for m in self._motions])
+        self._set = np.concatenate(self._sets.label)  # (N,)
         self.baseline = configured(settings.effects)
-        self.constants = (
-            *_soil(settings, self.caveats),
-            *self._calibrations(),
-            *_configured(settings),
-        )
+        stated = all(w.known for w in self._weights)
+        self.constants = wheel_constants(settings, self.channels, self._sets, stated, self.caveats)
+
         out = {*LEFT_OUT, *(b.name for b in self.baseline)}
-        if not all(w.known for w in self._weights):
-            out.add(
-                "load_axis_friction"
-            )  # the measured load that drives the balance holds it already
+        if not stated:  # the measured load that drives the balance holds its friction already
+            out.add("load_axis_friction")
         self.effects = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in out}
+
         self._campaign = Campaign(self._motions, settings, self.channels)
         self._kept: dict[tuple[object, ...], Array] = {}
         lengths = np.concatenate(
             [np.full(s.time.size, np.median(np.diff(s.time))) for s in signals]
         )
         self._step: Array = lengths  # [s] grid interval of each value (N,)
-        self._inner = np.ones(
-            lengths.size, bool
-        )  # (N,) with a neighbour of the same run on either side
+        # (N,) with a neighbour of the same run on either side
+        self._inner = np.ones(lengths.size, bool)
         for part in self._campaign.parts:
             self._inner[[part.start, part.stop - 1]] = False
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
 
     # ---- prediction ------------------------------------------------------------------------------
-    # --------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
@@ -120,16 +101,14 @@ class WheelRig:
 
     def _true(self, value: Mapping[str, float], effects: tuple[Effect, ...]) -> Array:
         """True readings (channels, N) before scale, offset and delay; the last few are kept."""
-        own = (
-            *(value[name] for name in self._plates.names),
-            0.0,
-        )  # the last for values without plates of their own
+        # the last for values without a set of weights of their own
+        own = (*(value[name] for name in self._sets.names), 0.0)
         physics = (*(value[name] for name in PHYSICS), *own, *effects)
         if physics not in self._kept:
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
-            weights = 1.0 + value["weights"] + np.array(own)[self._plate]
+            weights = 1.0 + value["weights"] + np.array(own)[self._set]
             self._kept[physics] = self._campaign.readings(
                 soil, weights, 1.0 + value["carriage_scale"], effects
             )
@@ -164,18 +143,9 @@ class WheelRig:
         does to all.
         """
         return {
-            name: ("weights", [label == number for label in self._plates.label])
-            for number, name in enumerate(self._plates.names)
+            name: ("weights", [label == number for label in self._sets.label])
+            for number, name in enumerate(self._sets.names)
         }
-
-    def _own_weight(self, load: float, common: float) -> float:
-        """Relative standard deviation of one set of weights for itself: a plate's, or the load
-        cell's at that load.
-        """
-        wrench = self.settings.wrench
-        if wrench is None or all(w.known for w in self._weights):
-            return OWN * common
-        return float(np.hypot(OWN * common, wrench.load.offset.sigma / load))
 
     @cached_property
     def unsure(self) -> Sequence[Mapping[str, Array]]:
@@ -192,45 +162,48 @@ class WheelRig:
             for was, after, s in zip(before, self.predict(u, ()), share, strict=True)
         ]
 
-    def foresee(self, key: str, u: Array, effects: Sequence[Effect]) -> dict[str, Array]:
+    def blur(self, stack: Stack, predicted: Array) -> Array:
+        """By slopes over three intervals, and by an axle that lags."""
+        return blur_of(stack, predicted)
+
+    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
         """Channels under a proposed experiment (see proposals.py), for constants and effects as
         fitted.
         """
         value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
         soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
         acting = (*self._baseline(value), *effects)
-        motion = proposed(key, self._motions, self.settings.wheel.radius)
+        motion = proposed(experiment, self._motions, self.settings.wheel.radius)
         sensed = simulate_arrays(
             self.settings.wheel, soil, motion, acting, torque_constant=self._constant, order=ORDER
         ).sensed
-        return {
+
+        read = {
             c: sensed_as(sensed, c, self.settings) + value[f"{c}_offset"] for c in self.channels
         }
+        return Foreseen(read, {c: driving(experiment) | (c == "torque") for c in self.channels})
 
-    # ---- what is known ---------------------------------------------------------------------------
-    # --------------------
+    # ---- what is said ----------------------------------------------------------------------------
 
-    def _calibrations(self) -> list[Known]:
-        known = []
-        for channel in self.channels:
-            scale, offset = _calibration(self.settings, channel)
-            unit = UNITS[channel]
-            known += [
-                Known(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
-                Known(f"{channel}_offset", 0.0, max(offset, 1e-9), unit),
-                Known(f"{channel}_delay", 0.0, TIMING, "s"),
-                Known(f"{channel}_blur", 0.0, BLUR),
-            ]
-        nominal = self.settings.load.nominal
-        common = max(nominal.sigma / max(nominal.value, 1e-9), LEAST_WEIGHTS)
-        known.append(Known("weights", 0.0, common))
-        for name, load in zip(self._plates.names, self._plates.loads, strict=True):
-            known.append(Known(name, 0.0, self._own_weight(load, common)))
-        carriage = self.settings.channels["carriage_encoder"].calibration.scale
-        known.append(
-            Known("carriage_scale", 0.0, max(carriage.sigma / abs(carriage.value), SCALE_FLOOR))
-        )
-        return known
+    @property
+    def law(self) -> LawForm:
+        domain = {"slip": 1.0, "sinkage": self.settings.wheel.radius, "speed": 1.0}
+        return LawForm(EmpiricalLaw, LAW_PREFIX, LAW_CHANNEL, LAW_TERMS, LAW_NOTE, domain)
+
+    @property
+    def shortcomings(self) -> list[str]:
+        found = []
+        loads = np.concatenate([run.covariates["load"] for run in self.runs])
+        if np.ptp(loads) < ONE_LOAD * max(float(np.max(loads)), 1e-9):
+            found.append(
+                "One load only: c and tan φ are nearly inseparable, and so are effects that differ"
+                " by load alone."
+            )
+        if "drawbar_pull" not in self.channels:
+            found.append("No force sensor: what acts on the drawbar pull alone cannot show.")
+        return found
+
+    # ---- what was recorded -----------------------------------------------------------------------
 
     def _run(self, signals: Signals, number: int) -> Run:
         motion = self._motions[number]
@@ -311,7 +284,7 @@ def _channels(
         there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
         if (
             there
-            and _calibration(settings, channel)[1] < UNKNOWN
+            and calibration_sigmas(settings, channel)[1] < UNKNOWN
             and (channel != "load" or all(weights_known))
         ):
             found.append(channel)
@@ -327,85 +300,6 @@ def _measured(signals: Signals, channel: str, constant: float) -> Array:
     if channel == "torque":
         return constant * signals.analogue.get("current", nothing)
     return signals.analogue.get(channel, nothing)
-
-
-def _calibration(settings: Settings, channel: str) -> tuple[float, float]:
-    """Relative sigma of the scale, sigma of the offset in the channel's unit."""
-    if channel == "torque":
-        shunt, constant = (
-            settings.channels["motor_shunt"].calibration,
-            settings.drive.torque_constant,
-        )
-        return float(
-            np.hypot(_relative(shunt.scale), _relative(constant))
-        ), constant.value * shunt.offset.sigma
-    if channel == "sinkage":
-        return _sigmas(settings.channels["sinkage_pot"].calibration)
-    assert settings.wrench is not None
-    return _sigmas(
-        settings.wrench.torque if channel == "axle_torque" else getattr(settings.wrench, channel)
-    )
-
-
-def _sigmas(calibration: Calibration) -> tuple[float, float]:
-    return _relative(calibration.scale), calibration.offset.sigma
-
-
-def _relative(known: Uncertain) -> float:
-    return known.sigma / abs(known.value) if known.value else 0.0
-
-
-def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
-    prior = settings.soil
-    modulus = prior.pressure_sinkage.modulus(settings.wheel.width)
-    stated = {
-        "c": (prior.cohesion.value, prior.cohesion.sigma, "Pa"),
-        "tan_phi": (prior.tan_phi.value, prior.tan_phi.sigma, "-"),
-        "k": (prior.shear_modulus.value, prior.shear_modulus.sigma, "m"),
-        "n": (prior.exponent.value, prior.exponent.sigma, "-"),
-        "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
-    }
-    raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
-    if raised:
-        least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
-        caveats.append(
-            f"The configuration states {', '.join(raised)} as almost exact; they float within {least} instead."
-        )
-    low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
-    return tuple(
-        Known(
-            name,
-            value,
-            max(sigma, FLOORS[name] * value, 1e-12),
-            unit,
-            True,
-            name in ("k", "K"),
-            low.get(name, 0.0),
-        )
-        for name, (value, sigma, unit) in stated.items()
-    )
-
-
-def _configured(settings: Settings) -> tuple[Known, ...]:
-    """Parameters of configured effects float within their own uncertainty, kept inside their
-    bounds.
-    """
-    known = []
-    for effect in settings.effects:
-        for p in EFFECTS[effect.name].parameters():
-            stated = effect.parameters.get(p.name)
-            if stated is not None and stated.sigma > 0.0:
-                known.append(
-                    Known(
-                        f"{effect.name}.{p.name}",
-                        stated.value,
-                        stated.sigma,
-                        p.unit,
-                        low=p.low,
-                        high=p.high,
-                    )
-                )
-    return tuple(known)
 
 
 def _motion(signals: Signals, weights: Array, settings: Settings, began: float) -> Motion:

@@ -32,7 +32,8 @@ from scipy.special import logsumexp
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import SCALES, Signature
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.noise import colour as noise
+from gritd.tools.diagnose.noise.colour import Colour, whiten_unit
+from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Index
 
 SIZES = np.array(
@@ -80,8 +81,8 @@ class OpenNoise:
         self._own = [np.arange(low, high) for low, high in pairwise(ends.tolist())]
         self._share = [s.prior for s in signatures]
         self._y = columns.shape[1] - 1
-        self._colours = noise.colours()
-        self._prior = noise.log_prior(self._colours, stack.gaps)
+        self._colours = colours()
+        self._prior = log_prior(self._colours, stack.gaps)
         self._squares = [
             _squares(columns[own], stack.gaps_of(own), problem.noise.loose[own], self._colours)
             for own in (stack.of(channel) for channel in stack.rig.channels)
@@ -122,7 +123,7 @@ class OpenNoise:
     def _suiting(self, squares: Squares, index: Index) -> Suiting:
         gram = squares.gram[:, index[:, None], index]
         acting = np.flatnonzero(np.diagonal(gram[0]) > 0.0)
-        alone, variance = noise.restricted(
+        alone, variance = restricted(
             gram[:, acting[:, None], acting], squares.log_det, squares.count
         )
         near = np.flatnonzero(alone + self._prior > (alone + self._prior).max() - NEAR)
@@ -130,10 +131,10 @@ class OpenNoise:
         return Suiting(gram[near], rest, variance[near], squares.count)
 
 
-def _squares(columns: Array, gaps: Array, loose: Array, colours: Sequence[noise.Colour]) -> Squares:
+def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour]) -> Squares:
     columns, grams, dets = columns / loose[:, None], [], []
-    for some in np.array_split(np.arange(len(colours)), -(-len(colours) * columns.size // AT_ONCE)):
-        whitened, log_det = noise.whiten_unit(columns, gaps, [colours[i] for i in some])
+    for some in np.array_split(np.arange(len(tried)), -(-len(tried) * columns.size // AT_ONCE)):
+        whitened, log_det = whiten_unit(columns, gaps, [tried[i] for i in some])
         grams.append(whitened.transpose(0, 2, 1) @ whitened)
         dets.append(log_det)
     return Squares(np.concatenate(grams), np.concatenate(dets), len(columns))

@@ -13,27 +13,26 @@ less: a line stands out of what is near it, whatever the colour.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import digamma, logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit import functions as generic
-from gritd.tools.diagnose.fit.evidence import SCALES, Base, Signature
+from gritd.tools.diagnose.fit.evidence import SCALES, Signature
+from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
+from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.screen.ripples import order_of
 
-WAVE, STEP = "wave", "step"
 PLACES = 48  # of a step along an axis
 FEW = 8  # values on either side of a step
-WIDTH = (
-    0.015  # of a step, relative to the whole stretch: a wheel is on both sides of it for a while
-)
+# of a step, relative to the whole stretch: a wheel is on both sides of it for a while
+WIDTH = 0.015
 PEAKS = 4  # shapes of a family that are fitted
 TINY = 1e-12
 FINER = 4.0  # frequencies tried in each that the whole campaign resolves
@@ -42,33 +41,26 @@ FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the 
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """Values whose shapes have coefficients of their own: whitened shapes (n, f, c), their scores
-    (f · c, draws).
+class Family:
+    """A channel's waves or steps along an axis.
+
+    at:     frequencies [1/s, 1/m] or places [s, m] (f,).
+    blocks: values whose shapes have coefficients of their own; their columns are (n, f · c), c for
+            each of `at`.
+    near:   of waves, (f, f) 1 for neighbours in the spectrum.
     """
 
-    rows: slice
-    shapes: Array
-    nulls: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Family:
-    """A channel's waves or steps along an axis; at: frequencies [1/s, 1/m] or places [s, m] (f,)."""
-
-    channel: str
-    axis: str
-    kind: str
+    shape: Shape
     at: Array
     blocks: tuple[Block, ...]
-    near: Array | None = None  # (f, f) 1 for neighbours in the spectrum, of waves
+    near: Array | None = None
 
     @property
-    def name(self) -> str:
-        return f"{self.channel}~{self.axis} {self.kind}"
+    def axis(self) -> str:
+        return self.shape.along[0]
 
     @property
-    def shared(self) -> tuple[bool, ...]:
+    def phases(self) -> tuple[bool, ...]:
         """Whether all blocks have one coefficient: of waves in time never, of waves along the bed
         it is not known.
         """
@@ -76,53 +68,21 @@ class Family:
             return (True,)
         return (False,) if self.axis == "time" else (False, True)
 
-    def evidence(self, left: Left, near: Array | None = None) -> Array:
-        """Log Bayes factor (forms, f, 1 + draws) of every shape; with neighbours, by what it stands
-        out of them.
+    def evidence(self, beside: Projection, near: Array | None = None) -> Array:
+        """Log Bayes factor (phases, f, 1 + draws) of every shape beside a model; with neighbours,
+        by what it stands out of them.
         """
-        return np.stack([self.form(left, shared, near) for shared in self.shared])
+        return np.stack([self.in_phase(beside, shared, near) for shared in self.phases])
 
-    def form(self, left: Left, shared: bool, near: Array | None = None) -> Array:
+    def in_phase(self, beside: Projection, shared: bool, near: Array | None = None) -> Array:
         """The same (f, 1 + draws), with one coefficient for all blocks or one for each."""
-        return _weighed([left.of(block) for block in self.blocks], self.at.size, shared, near)
+        projected = [beside.project_block(block) for block in self.blocks]
+        return _weighed(projected, self.at.size, shared, near)
 
-    def average(self, left: Left) -> Array:
+    def average(self, beside: Projection) -> Array:
         """Log Bayes factor (1 + draws,) of the family."""
-        every = self.evidence(left, self.near)
+        every = self.evidence(beside, self.near)
         return np.asarray(logsumexp(every, axis=(0, 1)) - np.log(every.shape[0] * every.shape[1]))
-
-
-class Left:
-    """What of a shape is left beside a fitted model, in the recordings and in every surrogate."""
-
-    def __init__(self, base: Base, noise: Array | None = None, strain: Array | None = None) -> None:
-        """Surrogates: noise (N, draws) whitened, strain (q, draws); without them the recordings
-        alone count.
-        """
-        noise = np.zeros((base.residual.size, 0)) if noise is None else noise
-        strain = np.zeros((base.u.size, 0)) if strain is None else strain
-        self._base = base
-        score = base.jacobian.T @ np.column_stack((base.residual, noise)) - np.column_stack(
-            (base.u, strain)
-        )
-        self._pulled = np.linalg.solve(base.root, score)
-
-    def of(self, block: Block) -> tuple[Array, Array, Array]:
-        """Squares of the shapes (m,), coordinates in the model's directions (q, m), scores (m, 1 +
-        draws).
-        """
-        flat = block.shapes.reshape(len(block.shapes), -1)
-        jacobian = self._base.jacobian[block.rows]
-        acting = np.any(jacobian != 0.0, axis=0)
-        inside = np.zeros((jacobian.shape[1], flat.shape[1]))
-        inside[acting] = jacobian[:, acting].T @ flat
-        inside = solve_triangular(self._base.root, inside, lower=True, check_finite=False)
-        nulls = block.nulls[:, : self._pulled.shape[1] - 1]
-        score = (
-            np.column_stack((flat.T @ self._base.residual[block.rows], nulls))
-            - inside.T @ self._pulled
-        )
-        return np.sum(flat**2, axis=0), inside, score
 
 
 def _weighed(
@@ -158,42 +118,45 @@ def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
     return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, TINY)) - expected), 0.0)))
 
 
-# ---- what is searched
-# ----------------------------------------------------------------------------------------------
+# ---- what is searched --------------------------------------------------------------------------
 
 
-def families(stack: Stack, noise: Noise, nulls: Array) -> list[Family]:
-    """Of every channel; nulls (N, draws) whitened surrogates."""
+def families(stack: Stack, noise: Noise, surrogates: Surrogates) -> tuple[Family, ...]:
+    """Of every channel."""
     found = []
     for channel in stack.rig.channels:
         for axis in lines.AXES:
-            found.append(
-                waves(stack, noise, nulls, channel, axis, lines.frequencies(stack, channel, axis))
-            )
-            found.append(steps(stack, noise, nulls, channel, axis, places(stack, channel, axis)))
-    return [family for family in found if family.blocks and family.at.size]
+            every = lines.frequencies(stack, channel, axis)
+            found.append(waves(stack, noise, surrogates.residuals, channel, axis, every))
+            at = places(stack, channel, axis)
+            found.append(steps(stack, noise, surrogates.residuals, channel, axis, at))
+    return tuple(family for family in found if family.blocks and family.at.size)
 
 
 def waves(
     stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, frequencies: Array
 ) -> Family:
-    size, x = np.sqrt(2.0) * generic.size_of(stack, channel), stack.covariate(axis)
+    """Waves of some frequencies (f,) [1/s, 1/m]; nulls (N, draws) whitened surrogates."""
+    size, x = np.sqrt(2.0) * size_of(stack, channel), stack.covariate(axis)
     blocks = []
     for index in lines.stretches(stack, channel) if frequencies.size else ():
         rows = _rows(stack.of(channel) & (stack.run == stack.run[index[0]]))
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
         blocks.append(_block(noise, nulls, rows, raw))
+
     near = lines.neighbours(x, lines.stretches(stack, channel), frequencies) if blocks else None
-    return Family(channel, axis, WAVE, frequencies, tuple(blocks), near)
+    return Family(Shape(channel, (axis,), "wave"), frequencies, tuple(blocks), near)
 
 
 def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at: Array) -> Family:
+    """Steps at some places (f,) [s, m]; nulls (N, draws) whitened surrogates."""
+    shape = Shape(channel, (axis,), "step")
     if not at.size:
-        return Family(channel, axis, STEP, at, ())
+        return Family(shape, at, ())
     rows = _rows(stack.of(channel))
-    raw = generic.size_of(stack, channel) * _risen(stack, rows, axis, at)[:, :, None]
-    return Family(channel, axis, STEP, at, (_block(noise, nulls, rows, raw),))
+    raw = size_of(stack, channel) * _risen(stack, rows, axis, at)[:, :, None]
+    return Family(shape, at, (_block(noise, nulls, rows, raw),))
 
 
 def places(stack: Stack, channel: str, axis: str) -> Array:
@@ -225,113 +188,110 @@ def _rows(own: Bools) -> slice:
 
 def _block(noise: Noise, nulls: Array, rows: slice, raw: Array) -> Block:
     white = np.asarray(noise.whitener[rows, rows] @ raw.reshape(len(raw), -1))
-    return Block(rows, white.reshape(raw.shape), white.T @ nulls[rows])
+    return Block(rows, white, white.T @ nulls[rows])
 
 
-# ---- those that stand out
-# ------------------------------------------------------------------------------------------
+# ---- those that stand out ----------------------------------------------------------------------
 
 
 def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> list[Signature]:
     """The likeliest shapes of every family beside a model, each with its log share among all that
     were tried.
     """
-    left = Left(without_harmonics(problem, fitted))
-    return [found for family in search for found in _peaks(family, problem, left)]
+    beside = without_harmonics(problem, fitted)
+    return [found for family in search for found in _peaks(family, problem, beside)]
 
 
-def _peaks(family: Family, problem: Problem, left: Left) -> Iterator[Signature]:
-    every = family.evidence(left)[..., 0]
+def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Signature]:
+    every = family.evidence(beside)[..., 0]
     share = -float(np.log(every.size))
     best = every.max(axis=0)
     edge = np.full(1, -np.inf)
     before, after = np.concatenate((edge, best[:-1])), np.concatenate((best[1:], edge))
     top = np.flatnonzero((best >= before) & (best > after) & (best + share > 0.0))
+
     for place in top[np.argsort(-best[top])][:PEAKS]:
-        shared = family.shared[int(np.argmax(every[:, place]))]
-        at = (
-            _refined(family, problem, left, int(place), shared)
-            if family.kind == WAVE
-            else float(family.at[place])
-        )
-        columns = shape_columns(problem.stack, family.channel, family.axis, family.kind, at, shared)
-        yield Signature(
-            family.name,
-            columns,
-            (0,) * columns.shape[1],
-            {"at": at, "shared": float(shared)},
-            share,
-        )
+        shared = family.phases[int(np.argmax(every[:, place]))]
+        wave = family.shape.kind == "wave"
+        at = float(family.at[place])
+        at = _refined(family, problem, beside, int(place), shared) if wave else at
+        yield _signature(problem.stack, replace(family.shape, at=at, shared=shared), share)
 
 
-def _refined(family: Family, problem: Problem, left: Left, place: int, shared: bool) -> float:
+def _refined(
+    family: Family, problem: Problem, beside: Projection, place: int, shared: bool
+) -> float:
     """The best frequency between two of the scan."""
     near = family.at[place] + FINE * (family.at[1] - family.at[0] if family.at.size > 1 else 0.0)
     none = np.zeros((problem.stack.size, 0))
-    finer = waves(problem.stack, problem.noise, none, family.channel, family.axis, near)
-    return float(near[int(np.argmax(finer.form(left, shared)[:, 0]))])
+    finer = waves(problem.stack, problem.noise, none, family.shape.channel, family.axis, near)
+    return float(near[int(np.argmax(finer.in_phase(beside, shared)[:, 0]))])
 
 
 def in_step(
     search: Sequence[Family], problem: Problem, fitted: Fitted, found: Signature
 ) -> Signature:
     """A wave in time with one phase for all runs, where that is likelier than one for each; else as
-    it was.
+    it was found.
     """
-    family = next(f for f in search if f.name == found.name)
-    if family.kind != WAVE or family.axis != "time" or found.shape["shared"]:
+    shape = found.shape
+    family = next(f for f in search if f.shape == shape.family)
+    if shape.kind != "wave" or family.axis != "time" or shape.shared or shape.at is None:
         return found
-    stack, left = problem.stack, Left(without_harmonics(problem, fitted))
-    x = stack.covariate("time")[stack.of(family.channel)]
+    stack, beside = problem.stack, without_harmonics(problem, fitted)
+
+    x = stack.covariate("time")[stack.of(shape.channel)]
     reach = float(family.at[1] - family.at[0]) if family.at.size > 1 else 0.0
     count = int(min(2.0 * reach * FINER * np.ptp(x), lines.MOST)) + 1
-    tried = found.shape["at"] + reach * np.linspace(-1.0, 1.0, count)
-    finer = waves(stack, problem.noise, np.zeros((stack.size, 0)), family.channel, "time", tried)
-    value = finer.form(left, True)[:, 0] - np.log(count)
+    tried = shape.at + reach * np.linspace(-1.0, 1.0, count)
+
+    none = np.zeros((stack.size, 0))
+    finer = waves(stack, problem.noise, none, shape.channel, "time", tried)
+    value = finer.in_phase(beside, True)[:, 0] - np.log(count)
     best = int(np.argmax(value))
-    if value[best] < finer.form(left, False)[:, 0].max():
+    if value[best] < finer.in_phase(beside, False)[:, 0].max():
         return found
-    columns = shape_columns(stack, family.channel, "time", WAVE, float(tried[best]), True)
-    return Signature(
-        found.name, columns, (0, 0), {"at": float(tried[best]), "shared": 1.0}, found.prior
-    )
+    return _signature(stack, replace(shape, at=float(tried[best]), shared=True), found.prior)
 
 
-def shape_columns(
-    stack: Stack, channel: str, axis: str, kind: str, at: float, shared: bool
-) -> Array:
+def _signature(stack: Stack, shape: Shape, prior: float) -> Signature:
+    columns = shape_columns(stack, shape)
+    return Signature(shape, columns, (0,) * columns.shape[1], {}, prior)
+
+
+def shape_columns(stack: Stack, shape: Shape) -> Array:
     """One wave or step (N, m), of the expected size of a misfit; of a wave two columns, or two a
     stretch.
     """
-    size = generic.size_of(stack, channel)
-    if kind == STEP:
-        rows, out = _rows(stack.of(channel)), np.zeros((stack.size, 1))
-        out[rows] = size * _risen(stack, rows, axis, np.array([at]))
+    assert shape.at is not None
+    (axis,) = shape.along
+    size = size_of(stack, shape.channel)
+    if shape.kind == "step":
+        rows, out = _rows(stack.of(shape.channel)), np.zeros((stack.size, 1))
+        out[rows] = size * _risen(stack, rows, axis, np.array([shape.at]))
         return out
-    parts: list[Index] = lines.stretches(stack, channel)
-    parts = [np.concatenate(parts)] if shared else parts
+
+    parts: list[Index] = lines.stretches(stack, shape.channel)
+    parts = [np.concatenate(parts)] if shape.shared else parts
     out = np.zeros((stack.size, 2 * len(parts)))
     for number, index in enumerate(parts):
-        pair = lines.waves(stack.covariate(axis)[index], np.array([at]))[:, 0]
+        pair = lines.waves(stack.covariate(axis)[index], np.array([shape.at]))[:, 0]
         out[index, 2 * number : 2 * number + 2] = np.sqrt(2.0) * size * pair
     return out
 
 
-def without_harmonics(problem: Problem, fitted: Fitted) -> Base:
+def without_harmonics(
+    problem: Problem, fitted: Fitted, surrogates: Surrogates | None = None
+) -> Projection:
     """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too.
 
     At a steady speed they are waves in time and along the bed, and another published form of the
     ripple has them.
     """
-    base, columns = fitted.base(), list(_harmonics(problem.stack, fitted))
+    projection, columns = fitted.projection(surrogates), list(_harmonics(problem.stack, fitted))
     if not columns:
-        return base
-    more = whiten(problem.noise, np.column_stack(columns))
-    return Base(
-        np.column_stack((base.jacobian, more)),
-        base.residual,
-        np.append(base.u, np.zeros(more.shape[1])),
-    )
+        return projection
+    return projection.with_columns(whiten(problem.noise, np.column_stack(columns)))
 
 
 def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
@@ -343,6 +303,5 @@ def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
                 own = stack.of(channel) & (stack.covariate("speed") > 0.0)
                 for number in range(1, HARMONICS + 1):
                     for wave in (np.cos, np.sin):
-                        yield np.where(
-                            own, LARGE * generic.size_of(stack, channel) * wave(number * phase), 0.0
-                        )
+                        large = LARGE * size_of(stack, channel)
+                        yield np.where(own, large * wave(number * phase), 0.0)

@@ -19,11 +19,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Base, Signature, log_evidence
-from gritd.tools.diagnose.noise.colour import Noise, surrogates, whiten
+from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
+from gritd.tools.diagnose.fit.projection import Projection
+from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.noise.colour import Noise, whiten
 
 LEVEL = 0.01  # false alarms aimed at, half of what is allowed
-NULLS = 300
 LEAST = 2.0  # no surprise below this is an alarm, however quiet the nulls
 KINDS = 10  # of misfit that count as independent, of all that are tried
 SURE = float(np.log(KINDS / LEVEL))  # [nats] a likelihood ratio that is chance as rarely
@@ -42,20 +43,34 @@ class Whitened:
 
 @dataclass(frozen=True)
 class Screen:
-    """Log Bayes factors by name, the best shape of each, and the largest surprise of each null."""
+    """Of every candidate beside one model its log Bayes factor, and the largest surprise of each
+    null.
 
-    evidence: dict[str, float]
-    usual: dict[
-        str, tuple[float, float]
-    ]  # of each name: where the last tenth of its nulls begins, how far they reach
-    best: dict[str, Whitened]
-    shapes: dict[str, list[dict[str, float]]]  # of each name, the most likely first
-    nulls: Array  # (draws,) the largest surprise of all names
-    chance: dict[str, float] = field(
-        default_factory=dict
-    )  # of as much evidence under a name by noise alone
-    # [nats] the evidence that is left with the noise's colour open (open_noise.py)
+    usual:  where the last tenth of the candidate's own nulls begins, and how far they reach.
+    best:   its likeliest signature.
+    fixed:  of an effect, the values of its other parameters that were tried, the likeliest first.
+    nulls:  (draws,) the largest surprise of all candidates.
+    chance: of as much evidence by noise alone.
+    open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
+    """
+
+    evidence: dict[Candidate, float]
+    usual: dict[Candidate, tuple[float, float]]
+    best: dict[Candidate, Whitened]
+    fixed: dict[Candidate, list[dict[str, float]]]
+    nulls: Array
+    chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
+
+    @property
+    def listed(self) -> dict[str, float]:
+        """The evidence of the effects alone."""
+        return {n: e for n, e in self.evidence.items() if isinstance(n, str)}
+
+    @property
+    def nameless(self) -> dict[Shape, float]:
+        """The evidence of misfits without a name alone."""
+        return {n: e for n, e in self.evidence.items() if isinstance(n, Shape)}
 
     @property
     def threshold(self) -> float:
@@ -65,18 +80,18 @@ class Screen:
         counted = np.sort(self.nulls)[-max(int(LEVEL * (1 + len(self.nulls))), 1)]
         return max(float(tail_quantile(self.nulls, LEVEL)), float(counted), LEAST)
 
-    def surprise(self, name: str, evidence: float | None = None) -> float:
-        """How far evidence (that of the recordings if not given) lies beyond what noise shows under
-        this name.
+    def surprise(self, of: Candidate, evidence: float | None = None) -> float:
+        """How far evidence (that of the recordings if not given) lies beyond what noise shows for
+        this candidate.
         """
-        start, reach = self.usual[name]
-        return ((self.evidence[name] if evidence is None else evidence) - start) / reach
+        start, reach = self.usual[of]
+        return ((self.evidence[of] if evidence is None else evidence) - start) / reach
 
     @property
-    def largest(self) -> tuple[str, float]:
-        """The most surprising name, and its surprise."""
-        name = max(self.evidence, key=self.surprise)
-        return name, self.surprise(name)
+    def largest(self) -> tuple[Candidate, float]:
+        """The most surprising candidate, and its surprise."""
+        first = max(self.evidence, key=self.surprise)
+        return first, self.surprise(first)
 
     @property
     def p(self) -> float:
@@ -88,8 +103,8 @@ class Screen:
         return max(counted, min(KINDS * float(np.exp(-max(self.open, 0.0))), 1.0))
 
     @property
-    def stands_out(self) -> list[str]:
-        """Names beyond the threshold, the most surprising first."""
+    def stands_out(self) -> list[Candidate]:
+        """Candidates beyond the threshold, the most surprising first."""
         return sorted(
             (n for n in self.evidence if self.surprise(n) > self.threshold),
             key=lambda n: -self.surprise(n),
@@ -135,53 +150,52 @@ def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:
     ]
 
 
-def noise_draws(noise: Noise, size: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Whitened surrogates (N, NULLS) and strains of the constants (size, NULLS)."""
-    return whiten(noise, surrogates(noise, NULLS, rng)), rng.standard_normal((size, NULLS))
-
-
 def screen(
-    base: Base,
+    projection: Projection,
     signatures: Sequence[Whitened],
-    draws: tuple[Array, Array],
-    searched: Mapping[str, Array] | None = None,
+    searched: Mapping[Shape, Array] | None = None,
 ) -> Screen:
-    """Evidence of each name (averaged over its shapes) and its largest in every null.
+    """Evidence of each candidate (averaged over its signatures) and its largest in every surrogate.
 
-    searched: names whose shapes were tried elsewhere (scans.py), with the averages (1 + draws,).
+    searched: shapes that were tried elsewhere (scans.py), with their averages (1 + draws,).
     """
     if not signatures:
         return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
-    columns = np.column_stack([s.columns for s in signatures])
-    a, b = base.projected(columns)
-    null_b = base.scores(columns, *draws)
+    projected = projection.project_all(np.column_stack([s.columns for s in signatures]))
     ends = np.cumsum([s.columns.shape[1] for s in signatures])
-    found: dict[str, list[tuple[Array, Whitened]]] = {}
+
+    found: dict[Candidate, list[tuple[Array, Whitened]]] = {}
     for s, end in zip(signatures, ends, strict=True):
         own = slice(end - s.columns.shape[1], end)
-        value = log_evidence(a[own, own], np.column_stack((b[own], null_b[own])), s.signature.sign)
-        found.setdefault(s.signature.name, []).append((value, s))
+        value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
+        found.setdefault(s.signature.of, []).append((value, s))
     return _ranked(found, searched or {})
 
 
 def _ranked(
-    found: dict[str, list[tuple[Array, Whitened]]], searched: Mapping[str, Array]
+    found: dict[Candidate, list[tuple[Array, Whitened]]], searched: Mapping[Shape, Array]
 ) -> Screen:
-    """From the log Bayes factors of every shape (1 + draws,), the recordings' first."""
-    best, order, means = {}, {}, dict(searched)
-    for name, shapes in found.items():
-        shapes.sort(key=lambda item: -item[0][0])
-        order[name] = [s.signature.shape for _, s in shapes]
-        best[name] = shapes[0][1]
-        prior = np.array([s.signature.prior for _, s in shapes])[:, None]
-        means[name] = logsumexp(np.stack([v for v, _ in shapes]) + prior, axis=0)
-    usual = {name: _usual(mean[1:]) for name, mean in means.items()}
-    largest = np.max(
-        [(mean[1:] - usual[name][0]) / usual[name][1] for name, mean in means.items()], axis=0
-    )
-    chance = {name: tail_chance(mean[1:], float(mean[0])) for name, mean in means.items()}
+    """From the log Bayes factors of every signature (1 + draws,), the recordings' first."""
+    best: dict[Candidate, Whitened] = {}
+    fixed: dict[Candidate, list[dict[str, float]]] = {}
+    means: dict[Candidate, Array] = {shape: mean for shape, mean in searched.items()}
+    for candidate, tried in found.items():
+        tried.sort(key=lambda item: -item[0][0])
+        fixed[candidate] = [s.signature.fixed for _, s in tried]
+        best[candidate] = tried[0][1]
+        prior = np.array([s.signature.prior for _, s in tried])[:, None]
+        means[candidate] = logsumexp(np.stack([v for v, _ in tried]) + prior, axis=0)
+
+    usual = {of: _usual(mean[1:]) for of, mean in means.items()}
+    surprises = [(mean[1:] - usual[of][0]) / usual[of][1] for of, mean in means.items()]
+    chance = {of: tail_chance(mean[1:], float(mean[0])) for of, mean in means.items()}
     return Screen(
-        {n: float(mean[0]) for n, mean in means.items()}, usual, best, order, largest, chance
+        {of: float(mean[0]) for of, mean in means.items()},
+        usual,
+        best,
+        fixed,
+        np.max(surprises, axis=0),
+        chance,
     )
 
 

@@ -29,14 +29,18 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.explain.explanation import explain
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.explain.wording import label
 from gritd.tools.diagnose.fit import heldout
-from gritd.tools.diagnose.fit.prepare import Prepared, prepare
+from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.problem import free_of
-from gritd.tools.diagnose.method import said
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.search.search import Model, Search, run
-from gritd.tools.diagnose.verdict.decide import Decision, decide
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.diagnose.verdict.decide import decide
+from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import LACKS, Plan, draw, record, scaled
 from gritd.tools.proof.ours.other_forms import COUSINS
 from gritd.tools.proof.ours.score_table import table
@@ -124,11 +128,10 @@ def _trial(case: Case) -> dict[str, Any]:
         return {"skipped": True}
     plan, acting = drawn
     rig = WheelRig(record(plan, acting), plan.settings)
-    prepared = prepare(rig, np.random.default_rng(0))
-    search = Search(prepared.problem, prepared.generics, prepared.draws)
-    run(search, Model(prepared.base, (), 0.0))
+    noise = np.random.default_rng(0)
+    search = search_models(prepare_screening(fit_base(rig, noise), noise))
     decision = decide(search)
-    found = said(rig, search, decision, {}, 0)
+    found = explain(search, decision, {"seed": 0})
     return (
         _scored(case, plan, acting, found)
         | _oracle(case, types, acting, search, found)
@@ -138,11 +141,9 @@ def _trial(case: Case) -> dict[str, Any]:
 
 def work(search: Search, decision: Decision) -> dict[str, Any]:
     """What the search weighed: to learn the calibration from, and to find the reason of a miss."""
-    first = search.screens[()]
+    evidence = ((label(of), round(e, 1)) for of, e in search.first.evidence.items())
     return {
-        "screen": dict(
-            sorted(((n, round(e, 1)) for n, e in first.evidence.items()), key=lambda i: -i[1])[:8]
-        ),
+        "screen": dict(sorted(evidence, key=lambda i: -i[1])[:8]),
         "weighed": [
             [list(w.model.names), [round(float(e), 2) for e in w.evidence]]
             for w in decision.weighed
@@ -161,20 +162,20 @@ def _drawn(
         plan = draw(settings, rng, case.lack)
         if not types:
             return plan, []
-        prepared = prepare(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
+        base = fit_base(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
         span = case.strength or (STRANGE if types[0] in STRANGERS else STRONG)
-        acting = [_strong(prepared, t, span, rng) for t in types]
+        acting = [_strong(base, t, span, rng) for t in types]
         if all(a is not None for a in acting):
             return plan, [a for a in acting if a is not None]
     return None
 
 
 def _strong(
-    prepared: Prepared, effect: type[Effect], span: tuple[float, float], rng: np.random.Generator
+    base: BaseFit, effect: type[Effect], span: tuple[float, float], rng: np.random.Generator
 ) -> Effect | None:
     """The effect at three to five times its detection limit in this campaign."""
     trial = scaled(effect, 0.5, rng)
-    limit = _limit(prepared, trial)
+    limit = _limit(base, trial)
     if limit is None:
         return None
     size = limit * float(np.exp(rng.uniform(*np.log(span))))
@@ -188,14 +189,14 @@ def _strong(
     return replace(trial, **values)
 
 
-def _limit(prepared: Prepared, at: Effect) -> float | None:
+def _limit(base: BaseFit, at: Effect) -> float | None:
     """Size, in expected strengths, at which the projected signature has a squared length of LIMIT."""
-    stack, base = prepared.problem.stack, prepared.base
-    change = stack.predict(base.u, (at,)) - base.predicted
+    stack, fitted = base.problem.stack, base.fitted
+    change = stack.predict(fitted.u, (at,)) - fitted.predicted
     if not np.isfinite(change).all() or not np.abs(change).any():
         return None
-    column = prepared.problem.noise.whitener @ change[:, None]
-    squared = float(base.base().projected(column)[0][0, 0])
+    column = base.problem.noise.whitener @ change[:, None]
+    squared = float(fitted.projection().project(column)[0][0, 0])
     return 0.5 * float(np.sqrt(LIMIT / squared)) if squared > 1e-9 else None
 
 
@@ -250,10 +251,10 @@ def _oracle(
     x = np.array(
         [(v - f.parameter.centre) / f.parameter.sigma for v, f in zip(at, free, strict=True)]
     )
-    fitted = search.problem.descend(tuple(types), free, search.models[0].fitted.u, x)
+    fitted = search.problem.descend(tuple(types), free, search.base.fitted.u, x)
     stack = search.problem.stack
     best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
-    gained = search.models[0].fitted.log_evidence
+    gained = search.base.fitted.log_evidence
     return {
         "oracle": float(np.mean([found.fit.after[c] / best[c] for c in best])),
         "before": float(np.mean([found.fit.before[c] / best[c] for c in best])),

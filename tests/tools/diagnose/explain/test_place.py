@@ -18,12 +18,13 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain import changes
-from gritd.tools.diagnose.explain.locate import bare, locate
+from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.result import Location
-from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.search.search import Model, Search
+from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
 from gritd.tools.proof.ours.cases import draw, record
 from tests.tools.diagnose.campaigns import plan
 
@@ -36,24 +37,20 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def searched(rig: WheelRig) -> tuple[Search, Model]:
-    prepared = prepare(rig, np.random.default_rng(0))
-    return Search(prepared.problem, prepared.generics, prepared.draws), Model(
-        prepared.base, (), 0.0
-    )
+def prepared(rig: WheelRig) -> Screening:
+    rng = np.random.default_rng(0)
+    return prepare_screening(fit_base(rig, rng), rng)
 
 
-def explained(search: Search, base: Model, effect: Effect) -> Model:
+def explained(screening: Screening, effect: Effect) -> Model:
     """The fit with an effect, from where it is."""
     free = free_of((type(effect),))
     at = [
         (getattr(effect, f.parameter.name) - f.parameter.centre) / f.parameter.sigma for f in free
     ]
-    return Model(
-        search.problem.descend((type(effect),), free, base.fitted.u, np.array(at)),
-        (effect.name,),
-        0.0,
-    )
+    start = screening.base.fitted.u
+    fitted = screening.problem.descend((type(effect),), free, start, np.array(at))
+    return Model(fitted, (effect.name,))
 
 
 @cache
@@ -70,9 +67,9 @@ def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Loc
         )
         drawn = replace(drawn, motions=tuple(again))
     effect = make(name, parameters)
-    search, base = searched(WheelRig(record(drawn, (effect,)), drawn.settings))
-    alone = bare(search, explained(search, base, effect))
-    return locate(search, alone, alone.fitted.predicted)
+    screening = prepared(WheelRig(record(drawn, (effect,)), drawn.settings))
+    held = unmoved(screening, explained(screening, effect))
+    return locate(screening, held, held.fitted.predicted)
 
 
 def test_a_patch_is_given_from_where_to_where() -> None:
@@ -123,7 +120,8 @@ def test_noise_alone_has_no_change_points() -> None:
     alarms = 0
     for seed in range(40):
         drawn = draw(settings, np.random.default_rng(seed))
-        alarms += bool(changes.find(*searched(WheelRig(record(drawn, ()), drawn.settings))))
+        screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
+        alarms += bool(changes.find_changes(screening, screening.base))
     assert alarms <= 2
 
 

@@ -8,14 +8,11 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from gritd.tools.diagnose.explain.result import plain
-from gritd.tools.diagnose.fit.evidence import SCALES, Base, log_bayes
-from gritd.tools.diagnose.noise.colour import (
-    Colour,
-    coloured,
-    restricted,
-    saturated_mean,
-    whiten_unit,
-)
+from gritd.tools.diagnose.fit.evidence import SCALES, log_bayes
+from gritd.tools.diagnose.fit.projection import Projection
+from gritd.tools.diagnose.noise.colour import Colour, coloured, whiten_unit
+from gritd.tools.diagnose.noise.estimate import restricted
+from gritd.tools.diagnose.noise.saturated import saturated_mean
 from gritd.tools.diagnose.screen.screen import tail_quantile
 
 GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
@@ -101,11 +98,11 @@ def test_strain_against_the_prior_is_evidence() -> None:
     direction /= np.linalg.norm(direction)
     jacobian = 100.0 * direction[:, None]  # the constant moves the data by 100 σ per prior σ
     residual = rng.standard_normal(400) * 0.01
-    strained = Base(jacobian, residual, np.array([5.0]))  # pulled five prior σ off
-    relaxed = Base(jacobian, residual, np.array([0.0]))
+    strained = Projection(jacobian, residual, np.array([5.0]))  # pulled five prior σ off
+    relaxed = Projection(jacobian, residual, np.array([0.0]))
     column = 300.0 * direction[:, None]
-    assert log_bayes(*strained.projected(column), (0,)) > 5.0
-    assert log_bayes(*relaxed.projected(column), (0,)) < 0.0
+    assert log_bayes(*strained.project(column), (0,)) > 5.0
+    assert log_bayes(*relaxed.project(column), (0,)) < 0.0
 
 
 def test_tail_quantile_of_an_exponential() -> None:

@@ -13,7 +13,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.fit.problem import Problem, free_of
-from gritd.tools.diagnose.noise.colour import Colour, Noise, blur
+from gritd.tools.diagnose.noise.colour import Colour, Noise
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import Series
@@ -62,7 +62,9 @@ def rig(series: dict[str, Series]) -> DriveRig:
 def fitted(made: DriveRig) -> dict[str, float]:
     stack = Stack(made)
     effects = [EFFECTS[name] for name in EFFECTS_OF_FRICTION]
-    noise = Noise(stack, (Colour(0.1, 0.5, 0.0),), ((),), np.zeros(stack.size))
+    noise = Noise(
+        stack, (Colour(0.1, 0.5, 0.0),), ((),), np.zeros(stack.size), np.zeros((stack.size, 0))
+    )
     problem = Problem(stack, noise, np.zeros((stack.size, 0)))
     found = problem.descend(
         effects, free_of(effects), np.zeros(len(made.constants)), np.array([1.0, 0.1])
@@ -104,7 +106,7 @@ def test_reversals_count_but_a_drive_at_rest_does_not() -> None:
 
 def test_what_both_sides_are_filtered_by_blurs_neither() -> None:
     stack = Stack(rig(log()))
-    assert not blur(stack, stack.measured).any()
+    assert not stack.rig.blur(stack, stack.measured).any()
 
 
 def test_a_log_that_is_too_short_is_refused_in_one_line() -> None:

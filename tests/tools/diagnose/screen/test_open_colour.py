@@ -11,11 +11,12 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import make
-from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence
 from gritd.tools.diagnose.screen.screen import SURE
-from gritd.tools.diagnose.search.search import Model, Search, rescreen
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.proof.ours.cases import Plan, record
 from tests.tools.diagnose.campaigns import plan
 
@@ -41,22 +42,19 @@ def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     assert _log_evidence(every.T @ every, precision) == pytest.approx(wanted)
 
 
-def searched(drawn: Plan, *acting: str) -> tuple[Search, Model]:
-    """The search after its first screen, and the base model."""
+def begun(drawn: Plan, *acting: str) -> Search:
+    """The search after its first screen."""
     effects = [make(name, {"loss": 0.25}) for name in acting]
-    prepared = prepare(WheelRig(record(drawn, effects), drawn.settings), np.random.default_rng(0))
-    search = Search(prepared.problem, prepared.generics, prepared.draws)
-    base = Model(prepared.base, (), 0.0)
-    rescreen(search, base)
-    return search, base
+    rng = np.random.default_rng(0)
+    base = fit_base(WheelRig(record(drawn, effects), drawn.settings), rng)
+    return begin(prepare_screening(base, rng))
 
 
 def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
     """Two thirds of the variance keep 3 s of memory; with the colour assumed, half a dozen names
     stand out.
     """
-    search, _ = searched(plan(slow=0.3, slow_time=3.0, noise=2.0, seed=7))
-    found = search.screens[()]
+    found = begun(plan(slow=0.3, slow_time=3.0, noise=2.0, seed=7)).first
     assert found.largest[1] > found.threshold
     assert found.open < SURE
     assert not found.alarmed
@@ -66,9 +64,9 @@ def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
 def test_a_friction_stands_out_of_noise_of_any_colour() -> None:
     """Of slow noise too, and its evidence is hardly less than with the colour assumed."""
     for slow in (0.0, 0.3):
-        search, base = searched(plan(slow=slow, slow_time=1.0), "coulomb_friction")
-        found = search.screens[()]
+        search = begun(plan(slow=slow, slow_time=1.0), "coulomb_friction")
+        found = search.first
         assert found.alarmed
         friction = found.best["coulomb_friction"].signature
-        gain = OpenNoise(search.problem, base.fitted, [friction]).gain(0)
+        gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
         assert gain > max(0.5 * found.evidence["coulomb_friction"], SURE)

@@ -16,13 +16,16 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain import law
 from gritd.tools.diagnose.explain.locate import locate
-from gritd.tools.diagnose.fit.prepare import prepare
+from gritd.tools.diagnose.fit.shape import Shape
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Colour, coloured
+from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.scans import candidates
-from gritd.tools.diagnose.screen.screen import Screen, tail_chance
-from gritd.tools.diagnose.search.search import Model, Search, rescreen
+from gritd.tools.diagnose.screen.screen import tail_chance
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import NextDoor, RailJoint
 from tests.tools.diagnose.campaigns import plan
@@ -52,7 +55,9 @@ def standing(made: Any, values: Array) -> Array:
     """Columns beyond the long waves of the bed, which are always there."""
     none, nowhere = np.zeros((made.size, 0)), np.full(made.size, -1)
     always = lines._long(made, "pull").shape[1]
-    return lines.standing(made, values, np.ones((made.size, 1)), none, nowhere)[:, always:]
+    return lines.standing(made, values, Explainable(np.ones((made.size, 1)), none), nowhere)[
+        :, always:
+    ]
 
 
 def test_noise_of_any_colour_holds_no_line() -> None:
@@ -87,36 +92,34 @@ def test_the_chance_of_a_value_goes_on_beyond_the_count() -> None:
 
 
 @cache
-def screened(effect: type[Effect] | None, size: float) -> tuple[Search, Model, Screen]:
+def begun(effect: type[Effect] | None, size: float) -> Search:
+    """The search after its first screen."""
     drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
     rig = WheelRig(record(drawn, (effect(size=size),) if effect else ()), drawn.settings)
-    prepared = prepare(rig, np.random.default_rng(0))
-    search, model = (
-        Search(prepared.problem, prepared.generics, prepared.draws),
-        Model(prepared.base, (), 0.0),
-    )
-    search.models.append(model)
-    return search, model, rescreen(search, model)
+    rng = np.random.default_rng(0)
+    return begin(prepare_screening(fit_base(rig, rng), rng))
 
 
 def test_a_machine_next_door_is_heard_with_its_period() -> None:
-    search, model, found = screened(NextDoor, 0.3)
-    assert found.alarmed and found.largest[0] == "drawbar_pull~time wave"
-    place = locate(search, model)[0]
+    search = begun(NextDoor, 0.3)
+    assert search.first.alarmed
+    assert search.first.largest[0] == Shape("drawbar_pull", ("time",), "wave")
+    place = locate(search.screening, search.base)[0]
     assert (place.channel, place.covariate) == ("drawbar_pull", "time")
     assert "oscillates with a period of 1.70 s, ± 0.29 N" in place.where
 
 
 def test_a_joint_of_the_rails_is_found_where_it_is() -> None:
     """And the law holds it, so that held-out runs are predicted and the soil need not bend to it."""
-    search, model, found = screened(RailJoint, 2.0)
-    assert (
-        found.alarmed
-        and max(found.evidence, key=found.evidence.__getitem__) == "drawbar_pull~position step"
+    search = begun(RailJoint, 2.0)
+    evidence = search.first.evidence
+    assert search.first.alarmed
+    assert max(evidence, key=lambda of: evidence[of]) == Shape(
+        "drawbar_pull", ("position",), "step"
     )
-    places = locate(search, model)
+    places = locate(search.screening, search.base)
     assert places[0].changes == pytest.approx((0.2,), abs=0.01)
-    said = law.find(search, model, places)
+    said = law.find_law(search, search.base, places)
     assert (
         said is not None
         and "drawbar_pull −2" in said.law.expression
@@ -137,7 +140,8 @@ def test_what_was_tried_is_paid_for() -> None:
     """Of noise alone no wave or step has evidence that would bear its share among all that were
     tried.
     """
-    search, model, found = screened(None, 0.0)
-    assert not found.alarmed
-    assert not candidates(search.scans, search.problem, model.fitted)
-    assert all(found.evidence[family.name] < 2.0 for family in search.scans)
+    search = begun(None, 0.0)
+    families = search.screening.families
+    assert not search.first.alarmed
+    assert not candidates(families, search.problem, search.base.fitted)
+    assert all(search.first.evidence[family.shape] < 2.0 for family in families)

@@ -13,12 +13,11 @@ from scipy.stats import norm
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.evidence import SCALES
-from gritd.tools.diagnose.fit.prepare import prepare
 from gritd.tools.diagnose.fit.problem import WIDE, Fitted, free_of
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.verdict import decide
-from gritd.tools.diagnose.verdict import forms as discrepancy
+from gritd.tools.diagnose.verdict import decide, forms
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
 from gritd.tools.proof.ours.calibrate import learn, log_truth, tabled
 from gritd.tools.proof.ours.cases import record
@@ -47,14 +46,13 @@ def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:
 
 def _evidence(acting: Sequence[Effect], name: str) -> Any:
     """Evidence of a listed effect above the base model, for each degree to which forms may differ."""
-    prepared = prepare(
-        WheelRig(record(plan(seconds=12.0), acting), settings()), np.random.default_rng(0)
-    )
+    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    base = fit_base(rig, np.random.default_rng(0))
     effect = EFFECTS[name]
     free = free_of((effect,))
     x = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
-    fitted = prepared.problem.descend((effect,), free, prepared.base.u, x)
-    return discrepancy.evidence(prepared.problem, fitted, prepared.base)
+    fitted = base.problem.descend((effect,), free, base.fitted.u, x)
+    return forms.evidence(base.problem, fitted, base.fitted)
 
 
 def test_another_published_form_keeps_its_name() -> None:
@@ -75,9 +73,7 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
         evidence = rng.normal(20.0, 6.0, 3)
         share = np.exp((evidence - evidence.max()) / 3.0)
         truth = rng.choice(["a", "b", "c"], p=share / share.sum())
-        weighed = [
-            [[n], [e] * discrepancy.FORMS] for n, e in zip("abc", evidence.tolist(), strict=True)
-        ]
+        weighed = [[[n], [e] * forms.FORMS] for n, e in zip("abc", evidence.tolist(), strict=True)]
         cases.append(
             {"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": -1e6}
         )
@@ -101,8 +97,8 @@ def test_an_explanation_that_leaves_much_is_none(
         SimpleNamespace(names=n, fitted=SimpleNamespace(objective=o))
         for n, o in (((), 1000.0), (("a",), 0.0))
     )
-    search: Any = SimpleNamespace(models=[base, best])
-    weighed: Any = [decide.Weighed(best, np.full(discrepancy.FORMS, 480.0))]
+    search: Any = SimpleNamespace(base=base)
+    weighed: Any = [decide.Weighed(best, np.full(forms.FORMS, 480.0))]
     found = decide.judged(search, weighed, 200.0, learnt())
     assert found.verdict == verdict
     assert found.probability["a"] + found.unlisted == pytest.approx(1.0 - learnt().lapse)

@@ -1,8 +1,8 @@
-"""A place of the misfit as a sentence that a testbed engineer reads, with numbers in the units of
-the report.
+"""The words of a diagnosis: a misfit and its place as a testbed engineer reads them, with numbers in
+the units of the report.
 
 The residuals are those that the report draws: recorded less predicted with the value's own run held
-    out.
+out.
 """
 
 from __future__ import annotations
@@ -12,29 +12,34 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.explain import changes
-from gritd.tools.diagnose.noise import lines
-from gritd.tools.diagnose.rig.interface import Bools, Stack
-from gritd.tools.report.words import (
+from gritd.tools.cli.wording import (
     covariate_shown,
     fixed,
     listed,
-    name_of,
     number,
     percent,
     shown,
     spaced,
+    spelled,
 )
+from gritd.tools.diagnose.explain import changes
+from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.noise import lines
+from gritd.tools.diagnose.rig.interface import Bools, Stack
 
 AT = {  # a value of a covariate, in words
-    "slip": "{} slip", "speed": "{} speed", "velocity": "{}", "load": "{} load", "sinkage": "{} sinkage",
-    "position": "{} along the bed", "time": "{} from the start", "heat": "∫I² dt of {}", "acceleration": "{}",
-}  # fmt: skip
-LOW, MIDDLE, HIGH = (
-    (0.0, 0.15),
-    (0.4, 0.6),
-    (0.85, 1.0),
-)  # quantiles of a covariate between which means are taken
+    "slip": "{} slip",
+    "speed": "{} speed",
+    "velocity": "{}",
+    "load": "{} load",
+    "sinkage": "{} sinkage",
+    "position": "{} along the bed",
+    "time": "{} from the start",
+    "heat": "∫I² dt of {}",
+    "acceleration": "{}",
+}
+# quantiles of a covariate between which means are taken
+LOW, MIDDLE, HIGH = (0.0, 0.15), (0.4, 0.6), (0.85, 1.0)
 STANDS_OUT = 0.25  # of the difference between the ends: a middle that far outside them is said
 ALIKE = 0.15  # of a mean: two that are closer are called the same
 NAMED = 6  # runs that are all named; of more, the MOST that are farthest off
@@ -44,76 +49,81 @@ WINDOW = 2  # change points between which something is another
 TIMES = {1: "once", 2: "twice"}
 
 
+def label(candidate: Candidate) -> str:
+    """An effect's name; of a misfit without a name, its channel and what it lives along."""
+    if isinstance(candidate, str):
+        return candidate
+    along = f"{candidate.channel}~{'·'.join(candidate.along)}"
+    return along if candidate.kind == "smooth" else f"{along} {candidate.kind}"
+
+
 def sentence(
-    stack: Stack, residual: Array, channel: str, family: str, places: Sequence[float], share: float
+    stack: Stack, residual: Array, shape: Shape, places: Sequence[float], share: float
 ) -> str:
-    """What a channel (residual (N,) of the stack) does along a family of covariates; places: its
-    change points.
+    """What a channel (residual (N,) of the stack) does along a smooth shape; places: its change
+    points.
     """
+    channel, (covariate, *others) = shape.channel, shape.along
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     own = own if own.any() else stack.of(channel)
     say = _sizes(stack, channel)
-    covariate = family.split("·")[0]
+
     if covariate == "run":
-        said = _runs(stack, residual, own, places, say)
+        words = _runs(stack, residual, own, places, say)
     elif covariate == "constant":
-        said = _everywhere(residual, own, stack.of(channel) & ~own, say)
+        words = _everywhere(residual, own, stack.of(channel) & ~own, say)
     elif covariate == "wheel_angle":
-        said = _turn(stack, residual, own, channel)
+        words = _turn(stack, residual, own, channel)
     elif covariate == "direction":
-        said = _directions(stack, residual, own, say)
+        words = _directions(stack, residual, own, say)
     elif places:
-        said = _between(stack, residual, own, covariate, places, say)
-    elif "·" in family:
-        said = _corner(stack, residual, own, family.split("·"), say)
+        words = _between(stack, residual, own, covariate, places, say)
+    elif others:
+        words = _corner(stack, residual, own, shape.along, say)
     else:
-        said = _along(stack, residual, own, covariate, say)
-    return _started(f"{name_of(channel)}, {said}; {percent(share)} of its misfit")
+        words = _along(stack, residual, own, covariate, say)
+    return _started(f"{spelled(channel)}, {words}; {percent(share)} of its misfit")
 
 
 def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: float) -> str:
     """A ripple of so many times a turn and its amplitude in the channel's unit."""
     size = _amplitude(stack, channel, amplitude)
     return _started(
-        f"{name_of(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit"
+        f"{spelled(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit"
     )
 
 
-def wave(
-    stack: Stack, residual: Array, channel: str, axis: str, frequency: float, share: float
-) -> str:
-    """A wave in time [1/s] or along the bed [1/m], its amplitude the root of the mean square over
-    the stretches.
+def wave(stack: Stack, residual: Array, shape: Shape, share: float) -> str:
+    """A wave in time or along the bed, its amplitude the root of the mean square over the
+    stretches.
     """
+    channel, (axis,), frequency = shape.channel, shape.along, shape.at
+    assert frequency is not None
+
     x, squares, count = stack.covariate(axis), 0.0, 0
     for index in lines.stretches(stack, channel):
         pair = lines.waves(x[index], np.array([frequency]))[:, 0]
-        fitted = np.linalg.lstsq(
-            np.column_stack((pair, np.ones(index.size))), residual[index], rcond=None
-        )[0]
-        squares, count = (
-            squares + index.size * float(fitted[0] ** 2 + fitted[1] ** 2),
-            count + index.size,
-        )
+        columns = np.column_stack((pair, np.ones(index.size)))
+        fitted = np.linalg.lstsq(columns, residual[index], rcond=None)[0]
+        squares += index.size * float(fitted[0] ** 2 + fitted[1] ** 2)
+        count += index.size
+
     size = _amplitude(stack, channel, float(np.sqrt(squares / max(count, 1))))
     length = _wavelength(stack, axis, 1.0 / frequency)
-    said = (
-        f"oscillates with a period of {length}"
-        if axis == "time"
-        else f"waves of {length} along the bed"
-    )
-    return _started(f"{name_of(channel)}, {said}, {size}; {percent(share)} of its misfit")
+    period, waves = f"oscillates with a period of {length}", f"waves of {length} along the bed"
+    words = period if axis == "time" else waves
+    return _started(f"{spelled(channel)}, {words}, {size}; {percent(share)} of its misfit")
 
 
-def term(stack: Stack, channel: str, axis: str, wave: bool, place: float, size: float) -> str:
-    """A wave of a frequency [1/s, 1/m] or a step at a place, as a term of a law; size in the
-    channel's unit.
-    """
-    if wave:
-        return (
-            f"{_amplitude(stack, channel, abs(size))} every {_wavelength(stack, axis, 1.0 / place)}"
-        )
-    return f"{_signed(size, stack.rig.units[channel])} beyond {at(stack, axis, place)}"
+def term(stack: Stack, shape: Shape, size: float) -> str:
+    """A wave or a step as a term of a law; size in the channel's unit."""
+    (axis,), at = shape.along, shape.at
+    assert at is not None
+    if shape.kind == "wave":
+        amplitude = _amplitude(stack, shape.channel, abs(size))
+        return f"{amplitude} every {_wavelength(stack, axis, 1.0 / at)}"
+    signed = _signed(size, stack.rig.units[shape.channel])
+    return f"{signed} beyond {value_of(stack, axis, at)}"
 
 
 def _wavelength(stack: Stack, axis: str, length: float) -> str:
@@ -125,15 +135,14 @@ def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> s
     """A calibration constant that the fit pulls off what is known of it."""
     size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else _signed(value, unit)
     moved = f"the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
-    return _started(f"{name_of(channel)}, {moved}")
+    return _started(f"{spelled(channel)}, {moved}")
 
 
 def _started(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-# ---- pieces --------------------------------------------------------------------------------------
-# ------------------
+# ---- pieces ------------------------------------------------------------------------------------
 
 Say = Callable[[float], str]
 
@@ -158,8 +167,8 @@ def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
     return f"while the wheel turns {say(mean)}, at rest {known}"
 
 
-def _brief(said: str) -> str:
-    return said.replace(" than the model", "")
+def _brief(words: str) -> str:
+    return words.replace(" than the model", "")
 
 
 def _signed(value: float, unit: str) -> str:
@@ -167,7 +176,7 @@ def _signed(value: float, unit: str) -> str:
     return ("+" if value >= 0.0 else "") + spaced(value * factor, seen, 2)
 
 
-def at(stack: Stack, covariate: str, value: float) -> str:
+def value_of(stack: Stack, covariate: str, value: float) -> str:
     """A value of a covariate in words, such as `30 % slip`."""
     return AT.get(covariate, "{}").format(_value(stack, covariate, value))
 
@@ -191,7 +200,7 @@ def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) 
         ends = [ends[0], ends[2]]
     (first, mean), *rest = ends
     others = [f"{_brief(say(m))} at {_value(stack, covariate, v)}" for v, m in rest]
-    return ", ".join([f"{say(mean)} at {at(stack, covariate, first)}", *others])
+    return ", ".join([f"{say(mean)} at {value_of(stack, covariate, first)}", *others])
 
 
 def _quantiles(
@@ -257,8 +266,8 @@ def _span(stack: Stack, covariate: str, low: float, high: float) -> str:
     if np.isfinite(low) and np.isfinite(high):
         _, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
         first = number(low * factor, _digits(covariate, low * factor))
-        return f"from {first} to {at(stack, covariate, high)}"
-    edge = at(stack, covariate, low if np.isfinite(low) else high)
+        return f"from {first} to {value_of(stack, covariate, high)}"
+    edge = value_of(stack, covariate, low if np.isfinite(low) else high)
     return f"{'beyond' if np.isfinite(low) else 'up to'} {edge}"
 
 
@@ -327,7 +336,7 @@ def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say
         return _along(stack, residual, own, names[0], say)
     mean, inside = max(corners, key=lambda c: abs(c[0]))
     place = " and ".join(
-        at(stack, n, float(v[inside].mean())) for n, v in zip(names, (x, y), strict=True)
+        value_of(stack, n, float(v[inside].mean())) for n, v in zip(names, (x, y), strict=True)
     )
     return f"at {place} {say(mean)}, elsewhere {_brief(say(float(residual[own & ~inside].mean())))}"
 

@@ -1,0 +1,88 @@
+"""Numbers and names as a person reads them: SI inside, millimetres and degrees on the page."""
+
+from __future__ import annotations
+
+import math
+
+NOTHING = "–"
+PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
+SHOWN = {  # unit inside -> unit shown, factor
+    "m": ("mm", 1e3),
+    "rad": ("°", math.degrees(1.0)),
+    "Pa/m^n": ("kPa/mⁿ", 1e-3),
+    "-": ("", 1.0),
+    "1/A^2": ("1/A²", 1.0),
+    "N/m^3": ("kN/m³", 1e-3),
+    "kg·m^2": ("kg·m²", 1.0),
+    "m/N": ("mm/kN", 1e6),
+}
+COVARIATES = {  # inside -> unit shown, factor; the others by their unit
+    "slip": ("%", 100.0),
+    "speed": ("mm/s", 1e3),
+    "position": ("m", 1.0),
+}
+SCIENTIFIC = (1e-4, 1e6)
+
+
+def spelled(key: str) -> str:
+    """A channel, effect or covariate in words."""
+    return " ".join(PROPER.get(word, word) for word in key.split("_"))
+
+
+def shown(unit: str) -> tuple[str, float]:
+    """The unit to show for one inside, and the factor to it."""
+    return SHOWN.get(unit, (unit, 1.0))
+
+
+def covariate_shown(covariate: str, unit: str) -> tuple[str, float]:
+    """A drive's speed and position are angles, and are shown as such."""
+    return shown(unit) if unit.startswith("rad") else COVARIATES.get(covariate) or shown(unit)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A few significant digits, never an exponent where a plain number can be read."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    if not SCIENTIFIC[0] <= abs(value) < SCIENTIFIC[1]:
+        return _scientific(value, digits)
+    return fixed(value, max(digits - 1 - magnitude(value), 0))
+
+
+def fixed(value: float, places: int) -> str:
+    """With a true minus sign."""
+    return f"{value:.{places}f}".replace("-", "−")
+
+
+def magnitude(value: float) -> int:
+    """The power of ten of the first digit."""
+    return math.floor(math.log10(abs(value)))
+
+
+def _scientific(value: float, digits: int) -> str:
+    mantissa, exponent = f"{value:.{max(digits - 1, 0)}e}".split("e")
+    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa.replace('-', '−')}·10{raised}"
+
+
+def percent(share: float | None) -> str:
+    """A share; what is nearly none or nearly all is said so."""
+    if share is None or not math.isfinite(share):
+        return NOTHING
+    if 0.0 < share < 0.01:
+        return "< 1 %"
+    if 0.99 < share < 1.0:
+        return "> 99 %"
+    return f"{fixed(100.0 * share, 0)} %"
+
+
+def spaced(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number and its unit, both as shown."""
+    said = number(value, digits)
+    return said if said == NOTHING else f"{said} {unit}".rstrip()
+
+
+def listed(names: list[str]) -> str:
+    """a; a and b; a, b and c."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

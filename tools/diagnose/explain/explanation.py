@@ -1,0 +1,225 @@
+"""From a verdict to everything that `gritd diagnose` says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import EXPERIMENTS
+from gritd.tools.diagnose.explain import traces
+from gritd.tools.diagnose.explain.experiment import next_experiment
+from gritd.tools.diagnose.explain.law import find_law
+from gritd.tools.diagnose.explain.locate import locate, unmoved
+from gritd.tools.diagnose.explain.result import (
+    Diagnosis,
+    Fit,
+    Hypothesis,
+    Location,
+    Quantity,
+    SoilFit,
+    Test,
+)
+from gritd.tools.diagnose.explain.wording import label
+from gritd.tools.diagnose.fit.heldout import Held, condition_folds, held_out, rmse, run_folds
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.rig.interface import Bools, Rig
+from gritd.tools.diagnose.screen.screen import LEVEL, Screen
+from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.verdict.decision import Decision
+
+SHOWN = 12  # hypotheses
+
+
+def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diagnosis:
+    """The result object of a search that was decided. redo: what doing it again needs."""
+    problem, rig, base = search.problem, search.problem.stack.rig, search.base
+    folds = run_folds(problem.stack)
+    accepted = decision.best if decision.verdict == "explained" else base
+    before, after = held_out(base.fitted, folds), held_out(accepted.fitted, folds)
+
+    location = _located(search, accepted, before)
+    law = find_law(search, base, location) if decision.verdict == "unlisted" else None
+    if law is not None:
+        after = law.held
+    hypotheses = _hypotheses(search, decision, folds)
+    return Diagnosis(
+        verdict=decision.verdict,
+        summary=_summary(decision, location, search.first.p),
+        test=_test(search.first),
+        location=location,
+        hypotheses=hypotheses,
+        soil=_soil(rig, base.fitted, law.fitted if law else accepted.fitted),
+        fit=_fit(problem, before, after),
+        law=law.law if law else None,
+        next_experiment=next_experiment(search, decision),
+        caveats=tuple(_caveats(rig)),
+        remaining=_remaining(decision),
+        nuisance=_constants(rig, accepted.fitted, soil=False),
+        noise=_noise(problem),
+        baseline=tuple(e.name for e in rig.baseline),
+        traces=traces.traces(problem, before, after),
+        scatters=traces.scatters(problem, location, before, after),
+        redo=redo,
+    )
+
+
+def _test(found: Screen) -> Test:
+    first, surprise = found.largest
+    return Test(label(first), surprise, found.threshold, found.p, LEVEL, len(found.nulls))
+
+
+def _located(search: Search, accepted: Model, before: Held) -> tuple[Location, ...]:
+    """Where the misfit was made: told of the base model held at what was found beside the accepted
+    effects.
+    """
+    if not search.first.alarmed:
+        return ()
+    if accepted is search.base:
+        return locate(search.screening, accepted, before.predicted)
+    held = unmoved(search.screening, accepted)
+    return locate(search.screening, held, held.fitted.predicted)
+
+
+def _hypotheses(
+    search: Search, decision: Decision, folds: Sequence[Bools]
+) -> tuple[Hypothesis, ...]:
+    every = (folds, condition_folds(search.problem.stack))
+    before = [held_out(search.base.fitted, f) for f in every]
+    ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
+    out = []
+    for name, probability in ranked[:SHOWN]:
+        models = [m for m in search.models if name in m.names]
+        accepted = decision.verdict == "explained" and name in decision.best.names
+        best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
+        alike = _alike(decision, name)
+        out.append(
+            Hypothesis(
+                effect=name,
+                probability=probability,
+                heldout_gain_nats=_gain(before, best, every) if best else 0.0,
+                parameters=parameters(search.problem.stack.rig, best.fitted, name) if best else {},
+                indistinguishable_from=alike,
+                accepted=accepted,
+                sentence=EFFECTS[name].sentence(),
+                score_nats=search.first.evidence.get(name, 0.0),
+                separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
+            )
+        )
+    return tuple(out)
+
+
+def _key(one: str, other: str) -> str | None:
+    """The experiment that tells two effects apart."""
+    return EFFECTS[one].confusable_with.get(other) or EFFECTS[other].confusable_with.get(one)
+
+
+def _alike(decision: Decision, name: str) -> tuple[str, ...]:
+    """The rest of the group that an effect belongs to."""
+    for leader, rivals in decision.groups.items():
+        if name == leader or name in rivals:
+            return tuple(n for n in (leader, *rivals) if n != name)
+    return ()
+
+
+def _gain(before: list[Held], model: Model, every: Sequence[Sequence[Bools]]) -> float:
+    """The smaller of the gains on held-out runs and on held-out conditions [nats]."""
+    gains = [
+        float((held_out(model.fitted, folds).log_density - held.log_density).sum())
+        for held, folds in zip(before, every, strict=True)
+        if folds
+    ]
+    return min(gains, default=0.0)
+
+
+def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
+    """Fitted values of an effect, in what its units mean for the rig."""
+    sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
+    return {
+        p.name: Quantity(
+            f.value(float(x)) * rig.stated(p.unit), float(s) * p.sigma * rig.stated(p.unit), p.unit
+        )
+        for f, x, s in zip(fitted.free, fitted.x, sigma, strict=False)
+        if f.name == name and (p := f.parameter)
+    }
+
+
+# ---- constants, fit and noise ------------------------------------------------------------------
+
+
+def _constants(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
+    sigma = np.sqrt(np.diag(fitted.covariance()))
+    return {
+        k.name: Quantity(k.of(float(u)), k.spread(float(u), float(s)), k.unit)
+        for k, u, s in zip(rig.constants, fitted.u, sigma, strict=False)
+        if k.soil == soil
+    }
+
+
+def _soil(rig: Rig, before: Fitted, after: Fitted) -> SoilFit | None:
+    soil = [k for k in rig.constants if k.soil]
+    if not soil:
+        return None
+    strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
+    prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
+    return SoilFit(prior, _constants(rig, before, True), _constants(rig, after, True), strain)
+
+
+def _fit(problem: Problem, before: Held, after: Held) -> Fit:
+    stack, rig = problem.stack, problem.stack.rig
+    floor = {c: k.sigma for c, k in zip(rig.channels, problem.noise.colours, strict=True)}
+    unit = {c: rig.units[c] for c in rig.channels}
+    return Fit(unit, rmse(stack, before.predicted), rmse(stack, after.predicted), floor)
+
+
+def _noise(problem: Problem) -> dict[str, dict[str, float]]:
+    colours = zip(problem.stack.rig.channels, problem.noise.colours, strict=True)
+    return {
+        c: {"sigma": k.sigma, "slow_time": k.time, "slow_share": k.slow, "fast_share": k.fast}
+        for c, k in colours
+    }
+
+
+# ---- in words ----------------------------------------------------------------------------------
+
+
+def _caveats(rig: Rig) -> list[str]:
+    sentences = list(rig.caveats)
+    if len(rig.runs) == 1:
+        sentences.append(
+            "One run only: nothing tells a misfit from what was peculiar to that run;"
+            " thirds of it were held out."
+        )
+    return [*sentences, *rig.shortcomings]
+
+
+def _remaining(decision: Decision) -> str:
+    if not decision.left_significant:
+        return "Nothing above the noise remains."
+    left = f"{decision.left:.0f} nats more"
+    return f"Functions without a name would gain {left}: something remains."
+
+
+def _summary(decision: Decision, location: Sequence[Location], p: float) -> str:
+    if decision.verdict == "consistent":
+        return f"Model and recordings agree (p = {p:.2g})."
+    if decision.verdict == "insufficient":
+        return (
+            f"No mismatch shows (p = {p:.2g}), but these recordings could not show most effects"
+            " at their usual size."
+        )
+
+    where = f" {location[0].where}." if location else ""
+    differ = f"Model and recordings differ (p = {p:.2g})"
+    if decision.verdict == "unlisted":
+        return f"{differ} in a way no listed effect explains.{where}"
+
+    names = " and ".join(decision.best.names)
+    verb = "explains" if len(decision.best.names) == 1 else "explain"
+    alike = {r for n in decision.best.names for r in decision.groups.get(n, ())}
+    others = ", ".join(sorted(alike))
+    doubt = f" It cannot be told apart from {others} with these recordings." if alike else ""
+    return f"{differ}; {names} {verb} {decision.share:.0%} of it.{doubt}{where}"

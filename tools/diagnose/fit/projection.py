@@ -1,0 +1,169 @@
+"""What the constants and the accepted effects of a fitted model cannot absorb.
+
+Around its fit a model is linear in its unknowns: constants, effect parameters, tolerance. In units
+of their prior they have unit normal priors, so stacking [whitened J; I] under [whitened residual;
+−u] turns the fit with priors into plain least squares, in which the strain of an unknown against its
+prior is a residual like any other. For columns S of something more, the normal equations with the
+model's unknowns eliminated are
+
+    A = SᵀMS,   b = SᵀMr,   M the projection off the model's directions,
+
+of the recordings and of every surrogate of their noise alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Bools
+
+WIDE = 3.0  # prior standard deviation of what is projected out as well, in expected sizes
+
+
+@dataclass(frozen=True)
+class Surrogates:
+    """What noise alone would record: whitened residuals (N, draws), strains of the unknowns (q,
+    draws) in prior σ.
+    """
+
+    residuals: Array
+    strains: Array
+
+    def sized(self, unknowns: int) -> Surrogates:
+        """The same for a model of so many unknowns."""
+        known, draws = self.strains.shape
+        if unknowns <= known:
+            return Surrogates(self.residuals, self.strains[:unknowns])
+        more = np.random.default_rng(unknowns).standard_normal((unknowns - known, draws))
+        return Surrogates(self.residuals, np.vstack((self.strains, more)))
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Whitened columns (n, m) on consecutive values `rows`, and their products with the surrogates
+    (m, draws).
+    """
+
+    rows: slice
+    columns: Array
+    surrogates: Array
+
+
+@dataclass(frozen=True)
+class Projected:
+    """A (m, m) and b (m, 1 + draws) of m columns: b of the recordings first, then of the surrogates."""
+
+    a: Array
+    b: Array
+
+    def without(self, directions: Array) -> Projected:
+        """With combinations of the columns, (m, k), projected out too."""
+        turned = self.a @ directions
+        gram = directions.T @ turned + np.eye(directions.shape[1]) / WIDE**2
+        taken = np.linalg.solve(gram, turned.T)
+        return Projected(self.a - turned @ taken, self.b - taken.T @ (directions.T @ self.b))
+
+    def without_columns(self, own: slice) -> Projected:
+        """With a block of the columns projected out too."""
+        return self.without(np.eye(len(self.a))[:, own])
+
+    def combined(self, directions: Array) -> Projected:
+        """Of combinations of the columns, (m, k)."""
+        return Projected(directions.T @ self.a @ directions, directions.T @ self.b)
+
+
+class Projection:
+    """A model in the neighbourhood of its fit: projects its directions out of columns, of the
+    residual and of surrogates.
+    """
+
+    def __init__(
+        self, jacobian: Array, residual: Array, strain: Array, surrogates: Surrogates | None = None
+    ) -> None:
+        """jacobian (N, q) and residual (N,) whitened; strain (q,) the fitted unknowns in prior σ.
+
+        Without surrogates the recordings alone count.
+        """
+        self.jacobian, self.residual, self.strain = jacobian, residual, strain
+        self.surrogates, self._nulls = surrogates, _sized(surrogates, jacobian)
+        self._root = np.linalg.cholesky(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
+        self._pulled = np.linalg.solve(self._root, jacobian.T @ residual - strain)
+
+        self._every = np.column_stack((residual, self._nulls.residuals))
+        strains = np.column_stack((strain, self._nulls.strains))
+        self._every_pulled = np.linalg.solve(self._root, jacobian.T @ self._every - strains)
+
+    def with_columns(self, columns: Array) -> Projection:
+        """With more whitened columns (N, m) in the model, each one standard deviation."""
+        return Projection(
+            np.column_stack((self.jacobian, columns)),
+            self.residual,
+            np.append(self.strain, np.zeros(columns.shape[1])),
+            self.surrogates,
+        )
+
+    @property
+    def covariance(self) -> Array:
+        """Of the unknowns (q, q)."""
+        inverse = np.linalg.inv(self._root)
+        return inverse.T @ inverse
+
+    @property
+    def misfit(self) -> float:
+        """Whitened squares plus prior strain at the linear optimum."""
+        strain = self.strain @ self.strain
+        return float(self.residual @ self.residual + strain - self._pulled @ self._pulled)
+
+    def project(self, columns: Array) -> tuple[Array, Array]:
+        """A (m, m) and b (m,) of whitened columns (N, m) for the recordings."""
+        inside = self._inside(columns)
+        return (
+            columns.T @ columns - inside.T @ inside,
+            columns.T @ self.residual - inside.T @ self._pulled,
+        )
+
+    def project_all(self, columns: Array) -> Projected:
+        """The same for the surrogates too."""
+        a, b = self.project(columns)
+        noise, strains = self._nulls.residuals, self._nulls.strains
+
+        pulled = np.linalg.solve(self._root, self.jacobian.T @ noise - strains)
+        nulls = columns.T @ noise - self._inside(columns).T @ pulled
+        return Projected(a, np.column_stack((b, nulls)))
+
+    def project_rows(self, columns: Array, rows: Bools) -> Projected:
+        """The same for whitened columns (n, m) that are 0 outside n marked values, rows (N,)."""
+        inside = np.linalg.solve(self._root, self.jacobian[rows].T @ columns)
+        return Projected(
+            columns.T @ columns - inside.T @ inside,
+            columns.T @ self._every[rows] - inside.T @ self._every_pulled,
+        )
+
+    def project_block(self, block: Block) -> tuple[Array, Array, Array]:
+        """Of a block of columns taken one by one: squares (m,), coordinates in the model's
+        directions (q, m), b (m, 1 + draws).
+        """
+        jacobian = self.jacobian[block.rows]
+        acting = np.any(jacobian != 0.0, axis=0)
+        inside = np.zeros((jacobian.shape[1], block.columns.shape[1]))
+        inside[acting] = jacobian[:, acting].T @ block.columns
+        inside = solve_triangular(self._root, inside, lower=True, check_finite=False)
+
+        nulls = block.surrogates[:, : self._every_pulled.shape[1] - 1]
+        own = np.column_stack((block.columns.T @ self.residual[block.rows], nulls))
+        return np.sum(block.columns**2, axis=0), inside, own - inside.T @ self._every_pulled
+
+    def _inside(self, columns: Array) -> Array:
+        """Coordinates of columns (N, m) in the model's directions (q, m)."""
+        return np.linalg.solve(self._root, self.jacobian.T @ columns)
+
+
+def _sized(surrogates: Surrogates | None, jacobian: Array) -> Surrogates:
+    values, unknowns = jacobian.shape
+    if surrogates is None:
+        return Surrogates(np.zeros((values, 0)), np.zeros((unknowns, 0)))
+    return surrogates.sized(unknowns)

@@ -1,0 +1,31 @@
+"""A misfit without a name: in which channel, along what, and of which kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Kind = Literal["smooth", "wave", "step"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A misfit of one channel along one covariate, or along the product of two.
+
+    at:     frequency [1/s, 1/m] of a wave, place [s, m] of a step; None for all of them together.
+    shared: of a wave, whether all stretches of the recordings have one phase.
+    """
+
+    channel: str
+    along: tuple[str, ...]
+    kind: Kind = "smooth"
+    at: float | None = None
+    shared: bool = False
+
+    @property
+    def family(self) -> Shape:
+        """All waves or steps of the channel along the covariate, this one among them."""
+        return replace(self, at=None, shared=False)
+
+
+Candidate = str | Shape  # what may explain a misfit: an effect, by its name, or a shape

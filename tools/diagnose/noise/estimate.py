@@ -1,0 +1,188 @@
+"""Size and colour of each channel's noise, from the recordings themselves.
+
+Fitted by restricted maximum likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554) with a
+*saturated* mean: soil, calibration, the effects' signatures and smooth functions of the covariates.
+What any of these could explain therefore does not count as noise, and what they take away by chance
+is counted as lost freedom. The residual of the base model alone is never used: it holds the misfit,
+and prewhitening with the misfit's own colour makes wrong effects win. The configured noise is not
+used at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.noise import replicates
+from gritd.tools.diagnose.noise.colour import Colour, Noise, step_of, whiten_unit
+from gritd.tools.diagnose.noise.lines import standing
+from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+
+SLOW_TIMES = (0.5, 1.0, 2.0, 4.0, 10.0)  # [s] correlation times of the slow part tried
+SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)  # its shares of the variance tried
+FAST = (0.0, 0.4, 0.9)  # shares of the rest that the fast part takes
+SURROGATE_COLOURS = 20  # drawn from the posterior of the colour
+RIDGE = 1e-9
+# values noisier than this share of their channel's, for blur, say nothing of the noise
+STEADY = 1.3
+CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
+# prior: density of a colour falls as its slow power to this, since instruments drift less than they
+# hiss
+RARE = 0.5
+SPIKE = 6.0  # [σ] from the median of its neighbours: such a value counts as much less certain
+NEIGHBOURS = 5
+
+
+def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) how far a single value stands off its neighbours, where that is beyond SPIKE; else 0."""
+    residual = stack.measured - predicted
+    off = np.abs(residual - median_filter(residual, NEIGHBOURS, mode="nearest"))
+    sigma = np.array([c.sigma for c in colours])[stack.channel]
+    return np.where(off > SPIKE * sigma, off, 0.0)
+
+
+def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) what adds to the noise of single values: blur, spikes, and what is left open of the
+    motion.
+    """
+    return np.hypot(
+        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, predicted, colours)), stack.unsure
+    )
+
+
+def first_guess(stack: Stack, predicted: Array) -> Noise:
+    """White noise from the differences between neighbours, which a slow misfit hardly touches."""
+    residual, colours = stack.measured - predicted, []
+    for channel in stack.rig.channels:
+        inside = stack.of(channel) & np.isfinite(stack.gaps)
+        step = np.diff(residual, prepend=0.0)[inside]
+        sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
+        colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
+    draws = tuple((c,) for c in colours)
+    nothing = np.zeros((stack.size, 0))
+    return Noise(stack, tuple(colours), draws, uncertain(stack, predicted, colours), nothing)
+
+
+def estimate(
+    stack: Stack,
+    predicted: Array,
+    explainable: Explainable,
+    before: Noise,
+    rng: np.random.Generator,
+) -> Noise:
+    """Size and colour of each channel from a rough prediction (N,), and what each run does for
+    itself.
+
+    before: a first guess of the noise.
+    """
+    residual, cells = stack.measured - predicted, replicates.cells(stack)
+    lines_found = standing(stack, residual, explainable, cells)
+    saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, lines_found)))
+
+    found = [
+        _fit_channel(stack, channel, residual, saturated, cells, before, rng)
+        for channel in stack.rig.channels
+    ]
+    colours = tuple(f[0] for f in found)
+    return Noise(
+        stack,
+        colours,
+        tuple(f[1:] for f in found),
+        uncertain(stack, predicted, colours),
+        replicates.own_columns(stack, residual, colours, lines_found),
+    )
+
+
+def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
+    """Values of a channel that are hardly noisier than it is; at least half of them."""
+    own = stack.of(channel)
+    if not own.any():
+        return own
+    steady: Bools = own & (before.loose <= max(STEADY, float(np.median(before.loose[own]))))
+    return steady
+
+
+def _fit_channel(
+    stack: Stack,
+    channel: str,
+    residual: Array,
+    saturated: Explainable,
+    cells: Index,
+    before: Noise,
+    rng: np.random.Generator,
+) -> tuple[Colour, ...]:
+    """The colour to whiten with, then draws from the posterior."""
+    own = _steady(stack, channel, before)
+    mean = saturated_mean(residual[own], saturated.leading[own], saturated.whole[own], cells[own])
+    columns = np.column_stack((mean, residual[own]))
+
+    tried = colours()
+    whitened, log_det = whiten_unit(columns, stack.gaps_of(own), tried)
+    likelihood, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, len(columns))
+    posterior = likelihood + log_prior(tried, stack.gaps)
+    weight = np.exp(posterior - posterior.max())
+
+    least = _least(stack, channel)
+    sized = [
+        replace(c, sigma=max(float(np.sqrt(v)), least))
+        for c, v in zip(tried, variance, strict=True)
+    ]
+    chosen = rng.choice(len(sized), SURROGATE_COLOURS, p=weight / weight.sum())
+    return _careful(sized, weight / weight.sum(), step_of(stack.gaps)), *(sized[i] for i in chosen)
+
+
+def colours() -> list[Colour]:
+    """All that are tried, of unit size."""
+    slow = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
+    return slow + [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
+
+
+def log_prior(tried: Sequence[Colour], gaps: Array) -> Array:
+    """Of each colour, up to a constant."""
+    return np.asarray(-RARE * np.log([_slow_power(c, step_of(gaps)) for c in tried]))
+
+
+def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
+    """The colour whose slow power is at quantile CAREFUL of the posterior: few data cannot tell
+    slow noise.
+    """
+    power = np.array([c.sigma**2 * _slow_power(c, step) for c in colours])
+    order = np.argsort(power)
+    at = int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))
+    return colours[int(order[min(at, len(colours) - 1)])]
+
+
+def _slow_power(colour: Colour, step: float) -> float:
+    """Spectral density towards zero frequency, relative to that of white noise of the same
+    variance.
+    """
+    return 1.0 - colour.slow + 2.0 * colour.slow * colour.time / step
+
+
+def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
+    """Restricted log-likelihood of each colour with the size maximised out, and the variance.
+
+    gram: (g, m + 1, m + 1) products of the whitened columns of the mean, and of the values last; of
+        so many values.
+    """
+    inner, size = gram[:, :-1, :-1], gram.shape[1] - 1
+    inner = inner + RIDGE * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
+        size, 1
+    ) * np.eye(size)
+    root = np.linalg.cholesky(inner)
+    taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
+    free = max(count - size, 3)
+    variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), 1e-300) / free
+    spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    return -0.5 * (free * np.log(variance) + log_det + spread), variance
+
+
+def _least(stack: Stack, channel: str) -> float:
+    """A noise no channel is below: 1e-5 of its size. Noise-free simulations still need a scale."""
+    values = stack.measured[stack.of(channel)]
+    return 1e-5 * float(np.sqrt(np.mean(values**2))) + 1e-12 if values.size else 1.0

@@ -1,0 +1,36 @@
+"""By how much averages and slopes of a moving wheel blur what is compared."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Stack
+
+# of the bend between neighbours: speeds are slopes over three intervals, corners are cut
+BEND = 0.5
+SHALLOW = 1e-3  # [m] a sinkage below which its changes mean little
+# [s] by which an axle sinks later than in the balance: its damping carries or adds load meanwhile
+LAG = 0.015
+
+
+def blur_of(stack: Stack, predicted: Array) -> Array:
+    """Error (N,) where a prediction (N,) changes, in the channels' units.
+
+    Averaging takes a share of the second difference, a value's or its neighbours'; and a lagging
+    axle shifts all forces by the share by which the sinkage changes within the lag.
+    """
+    gaps = np.where(np.isfinite(stack.gaps), stack.gaps, np.inf)
+    bend = np.abs(np.diff(predicted, n=2, prepend=predicted[:1], append=predicted[-1:]))
+    edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))
+
+    late = np.abs(np.diff(predicted, prepend=predicted[:1])) / gaps
+    depth = np.log(np.maximum(stack.covariate("sinkage"), SHALLOW))
+    late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / gaps
+
+    return np.asarray(np.hypot(BEND * _nearby(np.where(edge, 0.0, bend)), LAG * _nearby(late)))
+
+
+def _nearby(values: Array) -> Array:
+    """The largest of each value and its neighbours."""
+    return np.maximum(values, np.maximum(np.roll(values, 1), np.roll(values, -1)))

@@ -1,0 +1,154 @@
+"""What is known of a wheel's testbed and soil: the constants of the base model with their priors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.estimator.effects import EFFECTS
+from gritd.tools.diagnose.rig.interface import Known
+from gritd.tools.diagnose.rig.weight_sets import WeightSets
+
+TIMING = 5e-3  # [s] by which a channel's stamps may be off
+# second differences by which speeds, slopes over three intervals, cut corners that a channel does
+# not
+BLUR = 0.3
+FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}  # least relative sigma
+SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
+LEAST_WEIGHTS = 2e-3  # nor any weights
+OWN = 0.7  # share of a common error of the weights that each set of them may have for itself
+UNITS = {
+    "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m",
+    "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s",
+    "acceleration": "rad/s²", "heat": "A²·s", "run": "-", "direction": "-", "constant": "-",
+}  # fmt: skip
+
+
+def wheel_constants(
+    settings: Settings,
+    channels: Sequence[str],
+    sets: WeightSets,
+    weights_stated: bool,
+    caveats: list[str],
+) -> tuple[Known, ...]:
+    """Soil, calibration of every channel, weights, configured effects.
+
+    weights_stated: whether all runs state their weights; else the load cell tells them.
+    caveats: takes a sentence where a stated uncertainty is raised to a floor.
+    """
+    return (
+        *_soil(settings, caveats),
+        *_calibrations(settings, channels, sets, weights_stated),
+        *_configured(settings),
+    )
+
+
+def _calibrations(
+    settings: Settings, channels: Sequence[str], sets: WeightSets, weights_stated: bool
+) -> list[Known]:
+    known = []
+    for channel in channels:
+        scale, offset = calibration_sigmas(settings, channel)
+        known += [
+            Known(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
+            Known(f"{channel}_offset", 0.0, max(offset, 1e-9), UNITS[channel]),
+            Known(f"{channel}_delay", 0.0, TIMING, "s"),
+            Known(f"{channel}_blur", 0.0, BLUR),
+        ]
+
+    nominal = settings.load.nominal
+    common = max(nominal.sigma / max(nominal.value, 1e-9), LEAST_WEIGHTS)
+    known.append(Known("weights", 0.0, common))
+    for name, load in zip(sets.names, sets.loads, strict=True):
+        known.append(Known(name, 0.0, _own_weight(settings, load, common, weights_stated)))
+
+    carriage = settings.channels["carriage_encoder"].calibration.scale
+    scale = max(carriage.sigma / abs(carriage.value), SCALE_FLOOR)
+    return [*known, Known("carriage_scale", 0.0, scale)]
+
+
+def _own_weight(settings: Settings, load: float, common: float, weights_stated: bool) -> float:
+    """Relative standard deviation of one set of weights for itself: its own, or the load cell's at
+    that load.
+    """
+    if settings.wrench is None or weights_stated:
+        return OWN * common
+    return float(np.hypot(OWN * common, settings.wrench.load.offset.sigma / load))
+
+
+def calibration_sigmas(settings: Settings, channel: str) -> tuple[float, float]:
+    """Relative sigma of the scale, sigma of the offset in the channel's unit."""
+    if channel == "torque":
+        shunt = settings.channels["motor_shunt"].calibration
+        constant = settings.drive.torque_constant
+        scale = float(np.hypot(_relative(shunt.scale), _relative(constant)))
+        return scale, constant.value * shunt.offset.sigma
+    if channel == "sinkage":
+        return _sigmas(settings.channels["sinkage_pot"].calibration)
+    assert settings.wrench is not None
+    axis = "torque" if channel == "axle_torque" else channel
+    return _sigmas(getattr(settings.wrench, axis))
+
+
+def _sigmas(calibration: Calibration) -> tuple[float, float]:
+    return _relative(calibration.scale), calibration.offset.sigma
+
+
+def _relative(known: Uncertain) -> float:
+    return known.sigma / abs(known.value) if known.value else 0.0
+
+
+def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
+    prior = settings.soil
+    modulus = prior.pressure_sinkage.modulus(settings.wheel.width)
+    stated = {
+        "c": (prior.cohesion.value, prior.cohesion.sigma, "Pa"),
+        "tan_phi": (prior.tan_phi.value, prior.tan_phi.sigma, "-"),
+        "k": (prior.shear_modulus.value, prior.shear_modulus.sigma, "m"),
+        "n": (prior.exponent.value, prior.exponent.sigma, "-"),
+        "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
+    }
+    raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
+    if raised:
+        least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
+        caveats.append(
+            f"The configuration states {', '.join(raised)} as almost exact;"
+            f" they float within {least} instead."
+        )
+    low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
+    return tuple(
+        Known(
+            name,
+            value,
+            max(sigma, FLOORS[name] * value, 1e-12),
+            unit,
+            True,
+            name in ("k", "K"),
+            low.get(name, 0.0),
+        )
+        for name, (value, sigma, unit) in stated.items()
+    )
+
+
+def _configured(settings: Settings) -> tuple[Known, ...]:
+    """Parameters of configured effects float within their own uncertainty, kept inside their
+    bounds.
+    """
+    known = []
+    for effect in settings.effects:
+        for p in EFFECTS[effect.name].parameters():
+            stated = effect.parameters.get(p.name)
+            if stated is not None and stated.sigma > 0.0:
+                known.append(
+                    Known(
+                        f"{effect.name}.{p.name}",
+                        stated.value,
+                        stated.sigma,
+                        p.unit,
+                        low=p.low,
+                        high=p.high,
+                    )
+                )
+    return tuple(known)

@@ -1,0 +1,141 @@
+"""What is looked for beside a fitted model: listed effects, smooth functions, waves and steps."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.fit.base import BaseFit
+from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.functions import smooth_signatures
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.fit.projection import Surrogates
+from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.fit.signatures import shape_grid, signature
+from gritd.tools.diagnose.noise.colour import surrogates, whiten
+from gritd.tools.diagnose.screen.open_colour import OpenNoise
+from gritd.tools.diagnose.screen.ripples import LOUDEST, loudest, order_of
+from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
+from gritd.tools.diagnose.screen.screen import SURE, Screen, screen, tail_chance, whitened
+
+NULLS = 300  # surrogates
+WEIGHED = 6  # candidates that stand out whose evidence is weighed with the noise's colour open
+AGAIN = 4  # signatures of an effect that a later screen tries
+
+
+@dataclass(frozen=True)
+class Screening:
+    """All that may be amiss beside the effects, and what noise alone would show of it."""
+
+    problem: Problem
+    base: Model
+    functions: tuple[Signature, ...]  # smooth functions without a name
+    families: tuple[Family, ...]  # waves and steps without a name
+    surrogates: Surrogates
+
+    def shapes(self, model: Model) -> list[Signature]:
+        """Smooth functions, and the likeliest waves and steps beside a model."""
+        return [*self.functions, *candidates(self.families, self.problem, model.fitted)]
+
+
+def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
+    """Everything that screens of any model share."""
+    noise, unknowns = base.problem.noise, base.fitted.jacobian.shape[1]
+    residuals = whiten(noise, surrogates(noise, NULLS, rng))
+    drawn = Surrogates(residuals, rng.standard_normal((unknowns, NULLS)))
+
+    stack = base.problem.stack
+    return Screening(
+        base.problem,
+        base.model,
+        smooth_signatures(stack),
+        families(stack, noise, drawn),
+        drawn,
+    )
+
+
+def screen_beside(screening: Screening, model: Model, first: Screen | None = None) -> Screen:
+    """Evidence for one more effect, and for a misfit without a name, on top of a model.
+
+    first: the screen beside the base model, whose likeliest signatures alone are tried again.
+    """
+    problem, drawn = screening.problem, screening.surrogates
+    signatures = [*_signatures(problem, model, first), *screening.functions]
+    beside = without_harmonics(problem, model.fitted, drawn)
+    searched = {family.shape: family.average(beside) for family in screening.families}
+    found = screen(model.fitted.projection(drawn), whitened(problem.noise, signatures), searched)
+
+    # whether there is a mismatch at all; beside an effect, explanations compete on even terms
+    return found if model.names else replace(found, open=_open(screening, model, found))
+
+
+def chance_of(
+    screening: Screening, model: Model, searched: Collection[Shape]
+) -> dict[Shape, float]:
+    """Chance by noise alone of the evidence that families of waves or steps have beside a model."""
+    beside = without_harmonics(screening.problem, model.fitted, screening.surrogates)
+    averages = {f.shape: f.average(beside) for f in screening.families if f.shape in searched}
+    return {shape: tail_chance(mean[1:], float(mean[0])) for shape, mean in averages.items()}
+
+
+def _signatures(problem: Problem, model: Model, first: Screen | None) -> Iterator[Signature]:
+    """Signatures about the model's fit: all that there are at the first screen, later those that
+    were likeliest there.
+    """
+    stack, fitted = problem.stack, model.fitted
+    for name, effect in stack.rig.effects.items():
+        if name in model.names:
+            continue
+        if first is None:
+            tried = list(shape_grid(stack.rig, effect))
+        else:
+            tried = first.fixed.get(name, [])[:AGAIN]
+        prior = -np.log(max(len(tried), 1))
+        for fixed in _worth(problem, model, effect, tried):
+            made = signature(stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
+            if made is not None:
+                yield replace(made, prior=prior)
+
+
+def _worth(
+    problem: Problem, model: Model, effect: type[Effect], tried: list[dict[str, float]]
+) -> list[dict[str, float]]:
+    """What to simulate: of ripples only those that the residual holds, the others' evidence being
+    nil.
+    """
+    order = order_of(effect)
+    if order is None or len(tried) <= LOUDEST:
+        return tried
+    orders = sorted({fixed[order] for fixed in tried})
+    loud = loudest(problem.stack, problem.noise, model.fitted.residual, orders)
+    return [fixed for fixed in tried if fixed[order] in loud]
+
+
+def _open(screening: Screening, model: Model, found: Screen) -> float:
+    """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
+    the search.
+    """
+    standing = found.stands_out[:WEIGHED]
+    searched = [family for family in screening.families if family.shape in standing]
+    peaks: dict[Candidate, Signature] = {
+        s.shape.family: s for s in reversed(candidates(searched, screening.problem, model.fitted))
+    }
+
+    chosen = [
+        found.best[of].signature if of in found.best else peaks[of]
+        for of in standing
+        if of in found.best or of in peaks
+    ]
+    if not chosen:
+        return np.inf
+
+    weighed, most = OpenNoise(screening.problem, model.fitted, chosen), -np.inf
+    for number in range(len(chosen)):
+        most = max(most, weighed.gain(number))
+        if most > SURE:
+            break
+    return most

@@ -94,13 +94,13 @@ def test_a_batch_that_is_stopped_leaves_nothing_running(tmp_path: Path) -> None:
     """SIGTERM while a diagnosis runs that would never end."""
     pid = tmp_path / "pid"
     endless = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
-    code = "import sys; from gritd.tools.proof import command; "
+    code = "import sys; from gritd.tools.proof.blind import command; "
     code += f"command.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
     arguments = [*SMALL, "--output", str(tmp_path / "batch")]
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], cwd=ROOT, stdout=subprocess.DEVNULL
     ) as process:
-        wait_for(lambda: pid.exists() and pid.read_text())
+        wait_for(lambda: process.poll() is not None or (pid.exists() and pid.read_text()))
         process.terminate()
         assert process.wait(600.0) == 128 + signal.SIGTERM
     wait_for(lambda: not Path(f"/proc/{pid.read_text()}").exists())

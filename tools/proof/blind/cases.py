@@ -11,7 +11,9 @@ import numpy as np
 
 from gritd.tools.proof.blind import campaign, detect, knowledge
 from gritd.tools.proof.blind.detect import Detector, Trial
-from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
+from gritd.tools.proof.blind.groups import NEEDED
+from gritd.tools.proof.blind.plant.concealed import LISTED
+from gritd.tools.proof.blind.plant.concealed import drawn as effect_drawn
 from gritd.tools.proof.blind.plant.effect import Effect
 from gritd.tools.proof.blind.plant.respond import World
 from gritd.tools.proof.blind.strata import LEVELS, Assignment
@@ -72,7 +74,13 @@ class Case:
             "inseparable": self.inseparable,
             "oracle_variance": self.oracle_variance,
             "concealed": [
-                {"name": e.name, **asdict(e), "coinciding": e.coinciding()} for e in self.effects
+                {
+                    "name": e.name,
+                    "form": type(e).__name__,
+                    **asdict(e),
+                    "coinciding": e.coinciding(),
+                }
+                for e in self.effects
             ],
             "soil_family": self.family,
             "soil": {name: float(value) for name, value in asdict(ground).items()},
@@ -108,7 +116,7 @@ def _attempt(
     family, trial = _trial(habits, rng)
     detector = Detector(trial)
     facts = detector.facts()
-    made = [(LISTED | UNLISTED)[name].drawn(rng, facts) for name in assignment.effects]
+    made = [effect_drawn(name, rng, facts) for name in assignment.effects]
     fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
     effects = tuple(effect for effect, _ in fitted)
     return Case(
@@ -128,6 +136,8 @@ def _attempt(
 
 def _fixed(assignment: Assignment) -> campaign.Habits:
     fixed: dict[str, Any] = dict(assignment.without)
+    for name in assignment.effects:
+        fixed = NEEDED.get(name, {}) | fixed
     return campaign.Habits(**fixed)
 
 
@@ -171,8 +181,8 @@ def _judged(case: Case, rng: np.random.Generator) -> Case:
 def _rivals(case: Case, detector: Detector, rng: np.random.Generator) -> dict[str, float]:
     change = detector.change(case.effects)
     left = {
-        name: detector.beside(change, detector.rivals(rival, rng))
-        for name, rival in LISTED.items()
+        name: detector.beside(change, detector.rivals(name, rng))
+        for name in LISTED
         if name != case.effects[0].name
     }
     return {name: d for name, d in left.items() if d < detect.NEAR}

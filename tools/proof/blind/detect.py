@@ -12,7 +12,7 @@ detectability D: the effect costs a model that knows everything else D²/2 nats.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,11 @@ from scipy.linalg import cho_solve, solve_triangular, toeplitz
 
 from gritd.tools.proof.blind import campaign
 from gritd.tools.proof.blind.knowledge import Knowledge
+from gritd.tools.proof.blind.plant.concealed import drawn
 from gritd.tools.proof.blind.plant.contact import Ground
 from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.respond import World, respond
+from gritd.tools.proof.blind.plant.respond import World, responses
 from gritd.tools.proof.blind.plant.scene import Felt, Motion
 from gritd.tools.proof.blind.plant.sensors import Chain, Converter
 from gritd.tools.proof.blind.plant.servo import summed
@@ -59,8 +60,8 @@ class Detector:
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
         self._motions = [_motion(run, trial) for run in trial.runs]
-        bare = replace(trial.world, effects=())
-        self._bare = [respond(bare, motion, damped=False) for motion in self._motions]
+        bare = trial.world.with_effects()
+        self._bare = responses([(bare, motion) for motion in self._motions], damped=False)
         self._roots = [_roots(trial, felt) for felt in self._bare]
         self._nuisance = [*self._soil(), *self._weights(), *self._calibration()]
         self._columns = np.stack([self._whitened(column) for column in self._nuisance], axis=1)
@@ -105,14 +106,14 @@ class Detector:
         gain = cross @ np.linalg.solve(own + weak * np.eye(own.shape[0]), cross)
         return float(np.sqrt(max(self._left(change) - float(gain), 0.0)))
 
-    def rivals(self, effect: type[Effect], rng: np.random.Generator) -> Array:
-        """Changes (m, k) by an effect in as many shapes as it is granted, at a tenth of its largest
-        strength.
+    def rivals(self, name: str, rng: np.random.Generator) -> Array:
+        """Changes (m, k) by an effect in as many forms and shapes as it is granted, at a tenth of
+        its largest strength.
         """
-        facts, count = self.facts(), SHAPES if len(fields(effect)) > 1 else 1
-        drawn = [effect.drawn(rng, facts) for _ in range(count)]
+        facts = self.facts()
+        made = [drawn(name, rng, facts) for _ in range(SHAPES)]
         return np.stack(
-            [self.change([replace(e, strength=0.1 * e.strength)]) for e in drawn], axis=1
+            [self.change([replace(e, strength=0.1 * e.strength)]) for e in made], axis=1
         )
 
     def refit_variance(self, effects: Sequence[Effect]) -> dict[str, float]:
@@ -165,23 +166,27 @@ class Detector:
         return float(change @ change - shadow @ cho_solve((self._factor, True), shadow))
 
     def _changes(self, effects: Sequence[Effect]) -> Signals:
-        world = replace(self._trial.world, effects=tuple(effects))
+        """Read with the effects, less predicted without from the motion and load that were read."""
+        world = self._trial.world.with_effects(*effects)
+        near = [bare.scene for bare in self._bare]
+        felt = responses([(world, motion) for motion in self._motions], False, near)
         return [
-            self._misfit(respond(world, motion, False, bare.scene.theta_1), bare)
-            for motion, bare in zip(self._motions, self._bare, strict=True)
+            {name: read[name] - expected[name] for name in read}
+            for read, expected in zip(map(self._read, felt), self._expected(felt), strict=True)
         ]
 
-    def _misfit(self, felt: Felt, bare: Felt) -> dict[str, Array]:
-        """Read with the effect, less predicted without it from the motion and load that were read."""
-        motion, trial = felt.scene.motion, self._trial
-        told = _told(felt, motion, trial)
-        same = told is motion
-        world = replace(trial.world, effects=())
-        predicted = bare if same else respond(world, told, False, bare.scene.theta_1)
-        read, expected = channels(felt, trial.wrench), channels(predicted, trial.wrench)
-        if trial.wrench:
-            expected["load"] = bare.load  # the weights, not the load that was read
-        return {name: read[name] - expected[name] for name in read}
+    def _read(self, felt: Felt) -> dict[str, Array]:
+        return channels(felt, self._trial.wrench)
+
+    def _expected(self, felt: Sequence[Felt]) -> Signals:
+        """What is predicted without the effects, by run."""
+        world, near = self._trial.world.with_effects(), [bare.scene for bare in self._bare]
+        told = [_told(one, self._trial) for one in felt]
+        found = [self._read(one) for one in responses([(world, m) for m in told], False, near)]
+        if self._trial.wrench:
+            weights = [bare.load for bare in self._bare]  # not the load that was read
+            found = [signals | {"load": load} for signals, load in zip(found, weights, strict=True)]
+        return found
 
     def _whitened(self, signals: Signals) -> Array:
         return np.concatenate(
@@ -217,17 +222,16 @@ class Detector:
         """Change by another soil, heavier weights or a faster carriage, either by a share."""
         trial = self._trial
         world = replace(trial.world, ground=ground or trial.world.ground, effects=())
-        found = []
-        for motion, bare in zip(self._motions, self._bare, strict=True):
-            told = replace(
-                motion, weight=motion.weight * (1.0 + heavier), speed=motion.speed * (1.0 + faster)
-            )
-            felt = respond(world, told, False, bare.scene.theta_1)
-            found.append(channels(felt, trial.wrench))
-        return _less(found, [channels(bare, trial.wrench) for bare in self._bare])
+        told = [
+            replace(m, weight=m.weight * (1.0 + heavier), speed=m.speed * (1.0 + faster))
+            for m in self._motions
+        ]
+        near = [bare.scene for bare in self._bare]
+        felt = responses([(world, motion) for motion in told], False, near)
+        return _less([self._read(one) for one in felt], [self._read(bare) for bare in self._bare])
 
     def _calibration(self) -> list[Signals]:
-        """One sigma of offset and of gain of each channel, the torque constant's in the current's."""
+        """One sigma of offset and gain of each channel, the torque constant's in the current's."""
         known, columns = self._trial.known, []
         for name in channels(self._bare[0], self._trial.wrench):
             said = known.instruments[INSTRUMENT[name]]
@@ -299,8 +303,9 @@ def channels(felt: Felt, wrench: bool) -> dict[str, Array]:
     )
 
 
-def _told(felt: Felt, motion: Motion, trial: Trial) -> Motion:
+def _told(felt: Felt, trial: Trial) -> Motion:
     """The motion and load that an engineer sees: the encoders' and the force sensor's."""
+    motion = felt.scene.motion
     changed: dict[str, Any] = {}
     if felt.carriage is not motion.travel:
         unseen = np.gradient(felt.carriage - motion.travel, motion.step)

@@ -14,6 +14,8 @@ GROUPS: tuple[frozenset[str], ...] = (
     frozenset(("viscous_friction", "stribeck_friction")),  # torque over speed
     frozenset(("sinkage_gain", "frame_compliance", "sinkage_datum")),  # sinkage over load
     frozenset(("pulley_slip", "wheel_radius_error")),  # slip off in proportion to travel
+    frozenset(("contact_relaxation", "running_in")),  # a steady state that comes with the way
+    frozenset(("torque_constant_error", "load_dependent_friction")),  # torque in proportion to load
 )
 
 # Pairs for the stratum of confounded effects, and what the campaign must not contain for them to be
@@ -30,6 +32,14 @@ CONFOUNDED: tuple[tuple[str, str, dict[str, bool | int]], ...] = (
     ("sinkage_gain", "frame_compliance", {"loads": 1}),
     ("pulley_slip", "wheel_radius_error", {"wrench": False}),
 )
+
+
+# What a campaign must hold, or must not, for an effect to show as it is meant to.
+NEEDED: dict[str, dict[str, bool | int]] = {
+    "multipass": {"second_pass": True},
+    "backlash": {"reversal": True},
+    "contact_relaxation": {"reversal": False},  # forces that turn round would show little else
+}
 
 
 def alike(name: str) -> frozenset[str]:

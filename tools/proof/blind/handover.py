@@ -75,7 +75,7 @@ def driven(case: Case, number: int) -> Felt:
 
 
 def _weight_error(case: Case, weight: float) -> float:
-    """Relative error of the weights, within their sigma: half the carriage's, half the plates' own."""
+    """Relative error of the weights, within their sigma: half the carriage's, half the plates'."""
     sources = ((case.seed, 2), (case.seed, 3, round(weight * 1e3)))
     drawn = [
         float(np.clip(np.random.default_rng(source).standard_normal(), -2.5, 2.5))

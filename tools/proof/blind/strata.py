@@ -65,8 +65,17 @@ def _of(stratum: str, count: int, rng: np.random.Generator) -> list[Assignment]:
             _confounded(number, rng) for number in _shuffled(range(len(CONFOUNDED)), count, rng)
         ]
     names = {"single": tuple(LISTED), "absorbed": ABSORBED, "unlisted": tuple(UNLISTED)}[stratum]
-    pairs = [(name, level) for level in LEVELS for name in names]
-    return [Assignment(stratum, (name,), level) for name, level in _shuffled(pairs, count, rng)]
+    return [Assignment(stratum, (name,), level) for name, level in _at_levels(names, count, rng)]
+
+
+def _at_levels(names: Iterable[str], count: int, rng: np.random.Generator) -> list[tuple[str, str]]:
+    """Names in turn, each at its levels in turn, where it begins by chance."""
+    begun = {name: int(rng.integers(len(LEVELS))) for name in names}
+    found = []
+    for name in _shuffled(begun, count, rng):
+        found.append((name, list(LEVELS)[begun[name] % len(LEVELS)]))
+        begun[name] += 1
+    return found
 
 
 def _shuffled(given: Iterable[Item], count: int, rng: np.random.Generator) -> list[Item]:

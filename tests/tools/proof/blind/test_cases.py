@@ -13,8 +13,8 @@ from gritd.tools.proof.blind import cases, detect, handover, strata
 from gritd.tools.proof.blind.detect import Detector
 from gritd.tools.proof.blind.groups import CONFOUNDED, GROUPS, alike
 from gritd.tools.proof.blind.plant.concealed import ABSORBED, LISTED, UNLISTED
-from gritd.tools.proof.blind.plant.concealed.drive import CoulombFriction
-from gritd.tools.proof.blind.plant.concealed.sensing import CurrentOffset
+from gritd.tools.proof.blind.plant.concealed.friction import BristleFriction
+from gritd.tools.proof.blind.plant.concealed.zeros import BentOffset
 from gritd.tools.proof.blind.strata import Assignment
 
 
@@ -65,16 +65,16 @@ def test_strength_follows_detectability() -> None:
 def test_what_is_off_is_invisible(null: cases.Case) -> None:
     detector = Detector(null.trial)
     facts = detector.facts()
-    for name, effect in (LISTED | UNLISTED).items():
-        off = replace(effect.drawn(np.random.default_rng(1), facts), strength=0.0)
-        assert detector.detectability([off]) < 0.05, name
+    for form in [form for forms in (LISTED | UNLISTED).values() for form in forms]:
+        off = replace(form.drawn(np.random.default_rng(1), facts), strength=0.0)
+        assert detector.detectability([off]) < 0.05, form.__name__
 
 
 def test_an_offset_within_its_calibration_is_invisible(null: cases.Case) -> None:
     """What the stated calibration error explains is not evidence."""
     detector, sigma = Detector(null.trial), null.trial.known.instruments["motor_shunt"].offset.sigma
-    assert detector.detectability([CurrentOffset(sigma)]) < 1.0
-    assert detector.detectability([CurrentOffset(300 * sigma)]) > 20.0
+    assert detector.detectability([BentOffset(sigma)]) < 1.0
+    assert detector.detectability([BentOffset(300 * sigma)]) > 20.0
 
 
 def test_standstill_tells_friction_from_offset() -> None:
@@ -90,10 +90,11 @@ def test_standstill_tells_friction_from_offset() -> None:
         trial = cases.drawn(1, 3, Assignment("none", without=habits)).trial
         detector = Detector(trial)
         effect, found = detect.strengthened(
-            detector, CoulombFriction(2.0 * detector.facts().torque), 60.0
+            detector, BristleFriction(2.0 * detector.facts().torque), 60.0
         )
         left[standstill] = (
-            detector.beside(detector.change([effect]), detector.rivals(CurrentOffset, rng)) / found
+            detector.beside(detector.change([effect]), detector.rivals("current_offset", rng))
+            / found
         )
     assert left[False] < 0.1 < left[True]
 

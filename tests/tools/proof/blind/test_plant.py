@@ -2,7 +2,9 @@
 the estimator.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -14,14 +16,26 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import Motion as ToldMotion
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.tools.proof.blind.plant.concealed import LISTED, UNLISTED
-from gritd.tools.proof.blind.plant.concealed.drive import lugre
+from gritd.tools.proof.blind.plant.concealed.friction import lugre, maxwell
 from gritd.tools.proof.blind.plant.contact import Rim, reaction
-from gritd.tools.proof.blind.plant.respond import drive, respond
+from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.quadrature import Array
+from gritd.tools.proof.blind.plant.respond import drive, respond, responses
 from gritd.tools.proof.blind.plant.servo import Servo, follow
 from tests.tools.proof.blind.scene import FACTS, GROUND, RIG, WORLD, run
 
-ALL = LISTED | UNLISTED
-READ = ("sinkage", "current", "pull", "load", "torque", "carriage")
+Friction = Callable[[Array, Array, float], Array]
+FORMS = [form for forms in (LISTED | UNLISTED).values() for form in forms]
+READ = ("sinkage", "current", "pull", "load", "torque", "carriage", "side")
+FELT = {
+    "sinkage": 2e-5,
+    "current": 5e-3,
+    "pull": 0.2,
+    "load": 0.2,
+    "torque": 0.01,
+    "carriage": 1e-4,
+    "side": 0.2,
+}  # what a sensor would notice
 
 
 @settings(max_examples=25)
@@ -83,36 +97,59 @@ def test_without_effects_it_is_the_papers_wheel() -> None:
         assert np.median(difference) < 1e-4 * scale, name
 
 
-@pytest.mark.parametrize("name", sorted(ALL))
-def test_an_effect_is_off_at_zero_and_felt_at_its_largest(name: str) -> None:
-    effect = ALL[name].drawn(np.random.default_rng(5), FACTS)
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.__name__)
+def test_an_effect_is_off_at_zero_and_felt_at_its_largest(form: type[Effect]) -> None:
+    effect = form.drawn(np.random.default_rng(5), FACTS)
     plain = drive(WORLD, run())
-    motion = plain.scene.motion
-    off = respond(replace(WORLD, effects=(replace(effect, strength=0.0),)), motion)
+    off = respond(WORLD.with_effects(replace(effect, strength=0.0)), plain.scene.motion)
     for channel in READ:
         np.testing.assert_allclose(
             getattr(off, channel), getattr(plain, channel), rtol=2e-6, atol=1e-6
         )
-    on = drive(replace(WORLD, effects=(effect,)), run())
-    change = {channel: np.std(getattr(on, channel) - getattr(plain, channel)) for channel in READ}
-    changed = {
-        channel: np.abs(getattr(on, channel) - getattr(plain, channel)).max() for channel in READ
-    }
-    assert all(np.isfinite(value) for value in change.values())
-    noise = {
-        "sinkage": 2e-5,
-        "current": 5e-3,
-        "pull": 0.2,
-        "load": 0.2,
-        "torque": 0.01,
-        "carriage": 1e-4,
-    }
-    assert any(changed[channel] > noise[channel] for channel in READ)
+    on = drive(WORLD.with_effects(effect), run())
+    changes = {name: np.abs(getattr(on, name) - getattr(plain, name)) for name in READ}
+    assert all(np.isfinite(change).all() for change in changes.values())
+    assert any(changes[name].max() > FELT[name] for name in READ)
 
 
-def test_friction_holds_against_motion_and_nothing_at_rest() -> None:
+@pytest.mark.parametrize("name", sorted(LISTED))
+def test_an_effect_has_forms_that_differ(name: str) -> None:
+    """Neither can be the other one at another strength."""
+    orders = run()
+    heavier = orders.weight * (1.0 + 0.4 * np.sin(0.8 * orders.time))
+    orders = replace(orders, weight=heavier, time=6.0 * orders.time)
+    plain, found = drive(WORLD, orders), []
+    for form in LISTED[name]:
+        felt = respond(
+            WORLD.with_effects(form.drawn(np.random.default_rng(5), FACTS)), plain.scene.motion
+        )
+        parts = [(getattr(felt, ch) - getattr(plain, ch)) / FELT[ch] for ch in READ]
+        found.append(np.concatenate(parts))
+    assert len(found) >= 2
+    for one, other in combinations(found, 2):
+        left = one - other * (one @ other) / (other @ other)
+        assert np.linalg.norm(left) > 0.005 * np.linalg.norm(one)
+
+
+def test_known_scenes_stand_where_an_effect_does_not_meet_the_soil() -> None:
+    """Taken from the scene without it, an effect of drive or sensor is what it is in full."""
+    plain = respond(WORLD, drive(WORLD, run()).scene.motion, damped=False)
+    motion = plain.scene.motion
+    for name in ("coulomb_friction", "force_crosstalk", "contact_relaxation", "slip_sinkage"):
+        for form in LISTED[name]:
+            world = WORLD.with_effects(form.drawn(np.random.default_rng(5), FACTS))
+            (quick,) = responses([(world, motion)], False, [plain.scene])
+            slow = respond(world, motion, damped=False)
+            for channel in READ:
+                np.testing.assert_allclose(
+                    getattr(quick, channel), getattr(slow, channel), rtol=1e-5, atol=1e-6
+                )
+
+
+@pytest.mark.parametrize("friction", [lugre, maxwell])
+def test_friction_holds_against_motion_and_nothing_at_rest(friction: Friction) -> None:
     omega = np.concatenate((np.zeros(50), np.full(100, 0.3), np.full(100, -0.3)))
-    torque = lugre(omega, np.full(omega.size, 0.8), 0.02)
+    torque = friction(omega, np.full(omega.size, 0.8), 0.02)
     assert np.all(torque[:50] == 0.0)
     np.testing.assert_allclose(torque[140:150], 0.8, rtol=1e-6)
     np.testing.assert_allclose(torque[-10:], -0.8, rtol=1e-6)

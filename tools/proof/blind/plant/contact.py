@@ -33,7 +33,11 @@ class Rim:
     peak: Array | float = 0.5  # θₘ/θ₁, Eq. (5)
     rebound: Array | float = 0.0  # share of the sinkage that springs back behind the wheel
     strength: Array | float = 1.0  # factor on the shear strength
-    overshoot: Array | float = 0.0  # hump of the shear curve over its residual
+    overshoot: Array | float = 0.0  # hump of the shear curve over its residual, after Oida
+    brittle: Array | float = 0.0  # the same, after Kacigin and Guskov
+    polish: Array | float = 0.0  # by how much friction on the rim is below that within the soil
+    sliding: Array | float = 0.0  # by how much the rim slides before the soil's strength is reached
+    skew: Array | float = 0.0  # tangent of the angle from the wheel's plane to its travel
 
 
 Sampled = TypeVar("Sampled", Ground, Rim)
@@ -49,6 +53,12 @@ def _thin(value: Array | float, every: int) -> Array | float:
     return value[::every] if isinstance(value, np.ndarray) and value.ndim else value
 
 
+def columned(what: Sampled) -> Sampled:
+    """Samples down, (n, 1) or (1, 1), so that nodes go across."""
+    held: dict[str, Any] = {f.name: column(getattr(what, f.name)) for f in fields(what)}
+    return replace(what, **held)
+
+
 class Reaction(NamedTuple):
     """What the soil does to the wheel, arrays (n,)."""
 
@@ -56,16 +66,18 @@ class Reaction(NamedTuple):
     load: Array  # W [N], Eq. (9)
     torque: Array  # T [N·m], Eq. (10)
     pressure: Array  # mean normal stress on the rim in contact [Pa]
+    side: Array  # sideways force of a skewed wheel [N]
 
 
 class Zone(NamedTuple):
-    """Nodes of one zone, arrays (n, m): θ₁ − θ, its shadow in the front zone for Eq. (4), weights
-    dθ.
-    """
+    """Nodes of one zone, arrays (n, m)."""
 
-    turned: Array
-    shadow: Array
-    width: Array
+    turned: Array  # θ₁ − θ [rad]
+    cosine: Array  # of θ
+    sine: Array
+    gap: Array  # sin θ₁ − sin θ, for Eq. (6)
+    drop: Array  # cos θ − cos θ₁ at the angle in the front zone where σ is the same, Eq. (4)
+    width: Array  # weights dθ
 
 
 def reaction(
@@ -73,12 +85,15 @@ def reaction(
 ) -> Reaction:
     """Forces at entry angle θ₁ (n,) and v/(rω) `ratio` (n,)."""
     theta_1 = np.maximum(theta_1, 1e-6)
-    front, rear = _zones(rim, theta_1)
-    parts = [_zone(ground, rim, radius, ratio, theta_1, zone) for zone in (front, rear)]
-    along, down, turning, pressing = (a + b for a, b in zip(*parts, strict=True))
+    zones = _zones(rim, theta_1)
+    ground, held = columned(ground), columned(rim)
+    parts = [_zone(ground, held, radius, ratio, zone) for zone in zones]
+    along, down, turning, pressing, across = (a + b for a, b in zip(*parts, strict=True))
     arc = theta_1 + exit_angle(rim, theta_1)
     area = radius * width
-    return Reaction(area * along, area * down, radius * area * turning, pressing / arc)
+    return Reaction(
+        area * along, area * down, radius * area * turning, pressing / arc, area * across
+    )
 
 
 def exit_angle(rim: Rim, theta_1: Array) -> Array:
@@ -92,56 +107,100 @@ def exit_angle(rim: Rim, theta_1: Array) -> Array:
 def _zones(rim: Rim, theta_1: Array) -> tuple[Zone, Zone]:
     theta_m = np.clip(rim.peak, 0.02, 0.98) * theta_1
     ahead, behind = (theta_1 - theta_m)[:, None], (theta_m + exit_angle(rim, theta_1))[:, None]
-    turned = ahead * RULE.from_start
-    front = Zone(turned, turned, ahead * RULE.weight)
-    rear = Zone(ahead + behind * RULE.from_start, ahead * RULE.to_end, behind * RULE.weight)
+    entry = theta_1[:, None]
+    forward = ahead * RULE.from_start
+    backward = ahead + behind * RULE.from_start
+    front = _nodes(entry, forward, None, ahead * RULE.weight)
+    rear = _nodes(entry, backward, ahead * RULE.to_end, behind * RULE.weight)
     return front, rear
 
 
+def _nodes(entry: Array, turned: Array, shadow: Array | None, width: Array) -> Zone:
+    """A zone from its nodes θ₁ − θ; `shadow`: the same for the drop, where it differs.
+
+    Differences of sines and cosines are products of half angles: no digits are lost at the entry.
+    """
+    sine, cosine, half = np.sin(entry), np.cos(entry), 0.5 * turned
+    up, along = np.sin(half), np.cos(half)
+    gap = 2.0 * up * (sine * up + cosine * along)
+    drop = 2.0 * up * (sine * along - cosine * up)
+    if shadow is not None:
+        dip = np.sin(0.5 * shadow)
+        mirrored = 2.0 * dip * (sine * np.cos(0.5 * shadow) - cosine * dip)
+    else:
+        mirrored = drop
+    return Zone(turned, cosine + drop, sine - gap, gap, mirrored, width)
+
+
 def _zone(
-    ground: Ground, rim: Rim, radius: float, ratio: Array, theta_1: Array, zone: Zone
-) -> tuple[Array, Array, Array, Array]:
-    """∫(τ cos − σ sin), ∫(σ cos + τ sin), ∫τ, ∫σ over one zone."""
-    entry = theta_1[:, None]
-    theta = entry - zone.turned
-    sigma = _normal(ground, radius, entry, zone.shadow)
-    jay = radius * (zone.turned - column(ratio) * _sine_gap(entry, zone.turned))  # Eq. (6)
-    tau = (column(ground.cohesion) + sigma * column(ground.tan_phi)) * column(rim.strength)
-    tau = tau * mobilised(jay / column(ground.shear_modulus), column(rim.overshoot))  # Eq. (7)
-    cosine, sine, weight = np.cos(theta), np.sin(theta), zone.width
+    ground: Ground, rim: Rim, radius: float, ratio: Array, zone: Zone
+) -> tuple[Array, Array, Array, Array, Array]:
+    """∫(τ cos − σ sin), ∫(σ cos + τ sin), ∫τ, ∫σ, ∫τ across, over one zone."""
+    sigma = _normal(ground, radius, zone.drop)
+    jay = radius * (zone.turned - column(ratio) * zone.gap)  # Eq. (6)
+    aside = radius * column(ratio) * zone.turned * rim.skew if np.any(rim.skew) else None
+    tau, across = sheared(ground, rim, sigma, jay, aside)
+    cosine, sine, weight = zone.cosine, zone.sine, zone.width
     return (
         ((tau * cosine - sigma * sine) * weight).sum(axis=1),
         ((sigma * cosine + tau * sine) * weight).sum(axis=1),
         (tau * weight).sum(axis=1),
         (sigma * weight).sum(axis=1),
+        (across * weight).sum(axis=1),
     )
 
 
-def _normal(ground: Ground, radius: float, entry: Array, shadow: Array) -> Array:
-    """σ = K rⁿ (cos θ − cos θ₁)ⁿ, Eqs. (3), (4), the cosines' difference as a product of sines."""
-    drop = 2.0 * np.sin(entry - 0.5 * shadow) * np.sin(0.5 * shadow)
-    stress: Array = column(ground.modulus) * np.exp(
-        column(ground.exponent) * np.log(radius * np.maximum(drop, 1e-30))
-    )
+def _normal(ground: Ground, radius: float, drop: Array) -> Array:
+    """σ = K rⁿ (cos θ − cos θ₁)ⁿ, Eqs. (3), (4)."""
+    depth = radius * np.maximum(drop, 1e-30)
+    stress: Array = ground.modulus * np.exp(ground.exponent * np.log(depth))
     return stress
 
 
-def _sine_gap(entry: Array, turned: Array) -> Array:
-    gap: Array = 2.0 * np.cos(entry - 0.5 * turned) * np.sin(0.5 * turned)
-    return gap
+def sheared(
+    ground: Ground, rim: Rim, sigma: Array, jay: Array, aside: Array | None = None
+) -> tuple[Array, Array]:
+    """Shear stress τ along and across the wheel's plane under normal stress σ, Eqs. (2), (7).
+
+    `jay`, `aside`: displacement along and across [m]. The stress has the direction of both
+    together (Ishigami et al. 2007, J. Field Robotics 24, 233-250). All broadcast.
+    """
+    cohesion, friction = _on_the_rim(ground, rim)
+    strength = (cohesion + sigma * friction) * rim.strength
+    if aside is None:
+        return strength * mobilised(jay / ground.shear_modulus, rim), np.zeros((1, 1))
+    far = np.hypot(jay, aside) + 1e-12
+    tau = strength * mobilised(far / ground.shear_modulus, rim)
+    return tau * jay / far, tau * aside / far
 
 
-def mobilised(x: Array, overshoot: Array | float) -> Array:
-    """Share of the residual strength mobilised at x = j/k: Eq. (2) and a hump P x e^(1 − x) that
-    dies out.
+def _on_the_rim(ground: Ground, rim: Rim) -> tuple[Array | float, Array | float]:
+    """Adhesion [Pa] and tan δ: c and tan φ on a rough rim; on a smooth one adhesion goes first.
 
-    The hump is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay to a
-    residual.
+    Source: Uesugi and Kishida (1986), Soils and Foundations 26(4), 139-149: friction on steel
+    falls with its roughness from tan φ to about half of it.
+    """
+    left = 1.0 - rim.polish
+    return ground.cohesion * left**3, ground.tan_phi * left
+
+
+def mobilised(x: Array, rim: Rim) -> Array:
+    """Share of the residual strength mobilised at x = j/k: Eq. (2), and humps that die out.
+
+    P x e^(1 − x) is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay
+    to a residual. 2 Q tanh y/cosh y, y = 2x, is that of Kacigin and Guskov (1968), J.
+    Terramechanics 5(3), of a crust that breaks early.
+    A rim that slides takes over no more than 1 − s of the strength.
     """
     far = np.abs(x)
     fading = np.exp(-far)
-    share: Array = np.sign(x) * (1.0 - fading + overshoot * np.e * far * fading)
-    return share
+    share = 1.0 - fading + rim.overshoot * np.e * far * fading
+    if np.any(rim.brittle):
+        share = share + 4.0 * rim.brittle * np.tanh(2.0 * far) * fading**2 / (1.0 + fading**4)
+    if np.any(rim.sliding):
+        share = np.minimum(share, np.where(rim.sliding > 0.0, 1.0 - rim.sliding, np.inf))
+    signed: Array = np.sign(x) * share
+    return signed
 
 
 def column(value: Array | float) -> Array:

@@ -16,7 +16,7 @@ from gritd.tools.proof.blind.plant.scene import Felt, Motion, Scene
 
 @dataclass(frozen=True)
 class Facts:
-    """What shapes are drawn by: how far, how long, how heavy, how fast the campaign is, typically."""
+    """What shapes are drawn by: how far, long, heavy and fast the campaign is, typically."""
 
     duration: float  # of a run [s]
     length: float  # of the bed used [m]
@@ -38,9 +38,15 @@ class Effect:
 
     strength: float
 
-    name: ClassVar[str] = ""
+    name: ClassVar[str] = ""  # the library's; several forms share it
     signed: ClassVar[bool] = False
     most: ClassVar[float] = 1.0
+
+    @classmethod
+    def meets_soil(cls) -> bool:
+        """Whether it changes how the soil carries the wheel."""
+        before = ("radius", "soil", "contact", "carried")
+        return any(getattr(cls, step) is not getattr(Effect, step) for step in before)
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:

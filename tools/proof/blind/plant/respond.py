@@ -1,24 +1,20 @@
-"""The chain: motion in, what the sensors would read without noise out. Time samples at once, one
-run at a time.
-"""
+"""The chain: motion in, what the sensors would read without noise out. Time samples at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gritd.tools.proof.blind.plant.axle import balance, settled
-from gritd.tools.proof.blind.plant.contact import Ground, reaction, thinned
+from gritd.tools.proof.blind.plant.bed import COARSE, Bed, EquationBed, every_of
+from gritd.tools.proof.blind.plant.contact import Ground
 from gritd.tools.proof.blind.plant.effect import Effect
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.scene import HANGING, Felt, Motion, Rig, Scene, scene_of
+from gritd.tools.proof.blind.plant.scene import Felt, Motion, Rig, Scene, scene_of
 from gritd.tools.proof.blind.plant.servo import follow, summed
 
-LIFTED = 1.0  # [N] below this weight the wheel hangs
 ROUNDS = 2  # of path-dependent effects, which need the sinkage that depends on them
-COARSE = 0.02  # [s] grid of the vertical balance and of the first sweeps
 SERVO_STEP = 2e-3  # [s]
 SWEEPS = 2  # of motion against soil; docs/proof.md states what a third changes
 
@@ -29,7 +25,17 @@ class World:
 
     rig: Rig
     ground: Ground
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Effect, ...] = ()  # concealed
+    bed: Bed = field(default_factory=EquationBed)
+    habits: tuple[Effect, ...] = ()  # of the world itself: there in every campaign of it
+
+    @property
+    def acting(self) -> tuple[Effect, ...]:
+        return (*self.habits, *self.effects)
+
+    def with_effects(self, *effects: Effect) -> World:
+        """The same rig, bed and soil with these effects concealed."""
+        return replace(self, effects=effects)
 
 
 @dataclass(frozen=True)
@@ -44,31 +50,57 @@ class Orders:
     start: float  # [m] on the bed
 
 
-def respond(world: World, motion: Motion, damped: bool = True, near: Array | None = None) -> Felt:
-    """What is felt and read when the rig moves like this. Undamped, the axle is in balance at every
-    sample.
+def respond(world: World, motion: Motion, damped: bool = True) -> Felt:
+    """What is felt and read when the rig moves like this."""
+    return responses([(world, motion)], damped)[0]
 
-    `near`: entry angles (n,) of a similar case, where the search for the balance starts.
+
+def responses(
+    asked: Sequence[tuple[World, Motion]],
+    damped: bool = True,
+    near: Sequence[Scene | None] | None = None,
+) -> list[Felt]:
+    """What is felt and read in each world and motion; all worlds on one bed. Undamped, the axle is
+    in balance at every sample.
+
+    `near`: the scene of the same motion without concealed effects, where it is known. It is where
+    the search for the balance starts, and it stands where the concealed effects do not meet the
+    soil.
     """
-    scene = _scene(world, motion)
-    if near is not None:
-        scene = replace(scene, theta_1=near)
-    for _ in range(ROUNDS if any(_path_dependent(e) for e in world.effects) else 1):
-        scene = _contact(world, scene, damped)
-    for effect in world.effects:
-        scene = effect.forces(scene)
-    return _sensed(world, scene)
+    known = near or [None] * len(asked)
+    scenes = [
+        _met(world, motion, scene) for (world, motion), scene in zip(asked, known, strict=True)
+    ]
+    fresh = [place for place, scene in enumerate(scenes) if not scene.pull.size]
+    worlds = [asked[place][0] for place in fresh]
+    carried = _carry(worlds, [scenes[place] for place in fresh], damped)
+    for place, scene in zip(fresh, carried, strict=True):
+        scenes[place] = _forced(asked[place][0].habits, scene)
+
+    done = [_forced(world.effects, scene) for (world, _), scene in zip(asked, scenes, strict=True)]
+    return [_sensed(world, scene) for (world, _), scene in zip(asked, done, strict=True)]
 
 
 def drive(world: World, orders: Orders) -> Felt:
-    """The controllers drive the rig; motion and soil are solved in turns, first on a coarse grid."""
-    coarse = _thinned(orders, _every(orders.time, COARSE))
-    torque, pull = np.zeros(coarse.time.size), np.zeros(coarse.time.size)
+    """The controllers drive the rig; motion and soil are solved in turns."""
+    return drives(world, [orders])[0]
+
+
+def drives(world: World, orders: Sequence[Orders]) -> list[Felt]:
+    """Several runs of one world, first on a coarse grid."""
+    coarse = [_thinned(one, every_of(one.time, COARSE)) for one in orders]
+    against = [(np.zeros(one.time.size), np.zeros(one.time.size)) for one in coarse]
     for _ in range(SWEEPS):
-        felt = respond(world, _motion(world.rig, coarse, torque, pull))
-        torque, pull = felt.motor_torque, felt.scene.pull
-    fine = (np.interp(orders.time, coarse.time, values) for values in (torque, pull))
-    return respond(world, _motion(world.rig, orders, *fine))
+        felt = responses(
+            [(world, _motion(world.rig, *each)) for each in zip(coarse, against, strict=True)]
+        )
+        against = [(one.motor_torque, one.scene.pull) for one in felt]
+
+    motions = []
+    for one, known, (torque, pull) in zip(orders, coarse, against, strict=True):
+        fine = (np.interp(one.time, known.time, torque), np.interp(one.time, known.time, pull))
+        motions.append(_motion(world.rig, one, fine))
+    return responses([(world, motion) for motion in motions])
 
 
 def _thinned(orders: Orders, every: int) -> Orders:
@@ -76,11 +108,9 @@ def _thinned(orders: Orders, every: int) -> Orders:
     return replace(orders, **kept)
 
 
-def _every(time: Array, step: float) -> int:
-    return max(1, round(step / float(time[1] - time[0])))
-
-
-def _motion(rig: Rig, orders: Orders, torque: Array, pull: Array) -> Motion:
+def _motion(rig: Rig, orders: Orders, against: tuple[Array, Array]) -> Motion:
+    """How the rig moves while a torque [N·m] and a pull [N] hold it back."""
+    torque, pull = against
     step = float(orders.time[1] - orders.time[0])
     substeps = max(1, round(step / SERVO_STEP))
     omega = follow(rig.wheel, orders.omega, torque, step, substeps)
@@ -91,72 +121,64 @@ def _motion(rig: Rig, orders: Orders, torque: Array, pull: Array) -> Motion:
     )
 
 
-def _path_dependent(effect: Effect) -> bool:
-    return type(effect).carried is not Effect.carried
+def _met(world: World, motion: Motion, near: Scene | None) -> Scene:
+    """The scene before the soil answers, or the one that is known where it must be the same."""
+    if near is None:
+        return _scene(world, motion)
+    alike = motion is near.motion and world.ground is near.ground
+    if alike and not any(effect.meets_soil() for effect in world.effects):
+        return near
+    return replace(_scene(world, motion), theta_1=near.theta_1)
 
 
 def _scene(world: World, motion: Motion) -> Scene:
     radius = np.full(motion.time.size, world.rig.radius)
-    for effect in world.effects:
+    for effect in world.acting:
         radius = effect.radius(radius, motion)
     scene = scene_of(world.rig, world.ground, motion, radius)
-    for effect in world.effects:
+    for effect in world.acting:
         scene = replace(scene, ground=effect.soil(scene.ground, scene))
-    for effect in world.effects:
+    for effect in world.acting:
         scene = replace(scene, rim=effect.contact(scene.rim, scene))
     return scene
 
 
-def _contact(world: World, scene: Scene, damped: bool) -> Scene:
-    """Entry angle, sinkage and the soil's forces in the bed's frame."""
+def _carry(worlds: Sequence[World], scenes: list[Scene], damped: bool) -> list[Scene]:
+    """The soil's answers, in rounds where weights depend on the path."""
+    if not worlds:
+        return []
+    rounds = ROUNDS if any(_path_dependent(e) for world in worlds for e in world.acting) else 1
+    for _ in range(rounds):
+        weights = [_weight(world, scene) for world, scene in zip(worlds, scenes, strict=True)]
+        scenes = worlds[0].bed.carry(scenes, weights, damped)
+    return scenes
+
+
+def _path_dependent(effect: Effect) -> bool:
+    return type(effect).carried is not Effect.carried
+
+
+def _weight(world: World, scene: Scene) -> Array:
     weight = scene.motion.weight
-    for effect in world.effects:
+    for effect in world.acting:
         weight = effect.carried(weight, scene)
-    down = weight > LIFTED
-    mean, width = (
-        float(scene.radius.mean()),
-        world.rig.width,
-    )  # stresses take the mean radius, kinematics the true one
-    depth = mean * (1.0 - np.cos(_balanced(scene, mean, np.maximum(weight, LIFTED))))
-    if damped:
-        depth = settled(depth, scene.moving, scene.motion.step, world.rig.lag)
-    theta_1 = np.where(down, np.arccos(np.clip(1.0 - depth / mean, 0.0, 1.0)), 1e-6)
-    felt = reaction(scene.ground, scene.rim, mean, width, scene.ratio, theta_1)
-    sign = scene.direction * scene.moving * down
-    return replace(
-        scene,
-        theta_1=theta_1,
-        sinkage=np.where(down, depth, HANGING),
-        pressure=felt.pressure * down,
-        carried=np.where(down, felt.load if damped else weight, 0.0),
-        torque=felt.torque * sign,
-        pull=felt.pull * sign,
-    )
+    return weight
 
 
-def _balanced(scene: Scene, radius: float, weight: Array) -> Array:
-    """θ₁ (n,) at which the soil carries the weight, solved on a grid not finer than the axle can
-    follow.
-    """
-    every = _every(scene.motion.time, COARSE)
-    time, width, ratio = scene.motion.time, scene.rig.width, scene.ratio[::every]
-    ground, rim = thinned(scene.ground, every), thinned(scene.rim, every)
-    known = scene.theta_1[::every] if scene.theta_1.size else np.zeros(ratio.size)
-    guess = np.where(known > 0.01, known, 0.4)
-    theta_1 = balance(
-        lambda t: reaction(ground, rim, radius, width, ratio, t).load, weight[::every], guess
-    )
-    return np.interp(time, time[::every], theta_1)
+def _forced(effects: Sequence[Effect], scene: Scene) -> Scene:
+    for effect in effects:
+        scene = effect.forces(scene)
+    return scene
 
 
 def _sensed(world: World, scene: Scene) -> Felt:
     loss = sum(
-        (np.asarray(effect.loss(scene)) for effect in world.effects),
+        (np.asarray(effect.loss(scene)) for effect in world.acting),
         start=np.zeros(scene.torque.size),
     )
     motor = scene.torque + loss + world.rig.wheel.inertia * scene.motion.alpha
     current = motor / world.rig.torque_constant
-    for effect in world.effects:
+    for effect in world.acting:
         current = effect.drawn_current(current, scene)
     felt = Felt(
         scene,
@@ -167,15 +189,11 @@ def _sensed(world: World, scene: Scene) -> Felt:
         scene.carried,
         scene.torque,
         scene.motion.travel,
+        scene.side,
     )
-    for effect in world.effects:
+    for effect in world.acting:
         felt = effect.sensed(felt)
     return felt
 
 
-def bare(world: World, effects: Sequence[Effect] = ()) -> World:
-    """The same rig and soil with these effects in place of its own."""
-    return replace(world, effects=tuple(effects))
-
-
-__all__ = ["Orders", "World", "bare", "drive", "respond"]
+__all__ = ["Orders", "World", "drive", "drives", "respond", "responses"]

@@ -71,6 +71,7 @@ class Scene:
     carried: Array = field(default_factory=lambda: np.zeros(0))  # W [N]
     torque: Array = field(default_factory=lambda: np.zeros(0))  # at the axle [N·m]
     pull: Array = field(default_factory=lambda: np.zeros(0))  # DP [N]
+    side: Array = field(default_factory=lambda: np.zeros(0))  # sideways force [N]
 
     @property
     def slip(self) -> Array:
@@ -109,6 +110,7 @@ class Felt:
     load: Array  # read [N]
     torque: Array  # the force/torque sensor's [N·m]
     carriage: Array  # carriage position as its encoder tells it [m]
+    side: Array  # read [N]
 
     def read(self, **changed: Any) -> Felt:
         return replace(self, **changed)

@@ -148,6 +148,7 @@ def _wrench(
         for axis, signal in zip(axes, (felt.pull, felt.load, felt.torque), strict=True)
     )
     fy, tx, tz = (axes[k].noise.drawn(rng, at.size, 1.0 / axes[k].rate) for k in (0, 2, 2))
+    fy = fy + np.interp(at, time, felt.side)
     six = np.stack((fx, fy, fz, tx, ty, tz), axis=1).tolist()
     moments = _stamped(axes[0], at, begins, rng)
     return [Reading(s, "wrench", tuple(row), r) for (s, r), row in zip(moments, six, strict=True)]

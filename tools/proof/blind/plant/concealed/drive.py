@@ -1,4 +1,4 @@
-"""Effects of motor and gear. Friction is dynamic: bristles that bend and slip (LuGre)."""
+"""Effects of motor and gear beyond friction: teeth, play, heat, and what an ampere is worth."""
 
 from __future__ import annotations
 
@@ -11,103 +11,12 @@ from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
-BRISTLE = 2e-3  # [rad] the wheel turns before the bristles slip
-
-
-def lugre(omega: Array, level: Array, step: float) -> Array:
-    """Friction torque (n,) at level g(ω) (n,): ż = ω − |ω| z/z₀, T = g z/z₀, exact over each step.
-
-    Source: Canudas de Wit, Olsson, Åström, Lischinsky (1995), IEEE Trans. Automatic Control 40,
-    419-425, without its micro-damping.
-    """
-    bent, shares = 0.0, []
-    for speed in omega.tolist():
-        fading = float(np.exp(-abs(speed) * step / BRISTLE))
-        bent = fading * bent + (1.0 - fading) * (1.0 if speed > 0.0 else -1.0)
-        shares.append(bent)
-    return np.asarray(level * np.array(shares))
+STANDING = 1e-4  # [rad/s] below which the direction is not taken to have changed
 
 
 @dataclass(frozen=True)
-class CoulombFriction(Effect):
-    """LuGre at a constant level T_C."""
-
-    name, most = "coulomb_friction", 1.0
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(0.6 * facts.torque)
-
-    def loss(self, scene: Scene) -> Array:
-        omega = scene.motion.omega
-        return lugre(omega, np.full(omega.size, self.strength), scene.motion.step)
-
-    def coinciding(self) -> dict[str, float]:
-        return {"loss": self.strength}
-
-
-@dataclass(frozen=True)
-class ViscousFriction(Effect):
-    """B ω (1 + |ω|/ω₁)^(−0.2): grease that thins a little. Source: Carreau-type shear thinning."""
-
-    thinning: float = 1.0  # ω₁ [rad/s]
-
-    name, most = "viscous_friction", 2.0
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(0.6 * facts.torque / facts.omega, float(rng.uniform(1.0, 3.0)) * facts.omega)
-
-    def loss(self, scene: Scene) -> Array:
-        omega = scene.motion.omega
-        return np.asarray(self.strength * omega * (1.0 + np.abs(omega) / self.thinning) ** -0.2)
-
-
-@dataclass(frozen=True)
-class StribeckFriction(Effect):
-    """LuGre at the level T_S/(1 + (ω/ω_S)²) above the Coulomb one.
-
-    Source: Lorentzian form of the Stribeck curve, Hess and Soom (1990), J. Tribology 112, 147-152.
-    """
-
-    speed: float = 0.15  # ω_S [rad/s]
-
-    name, most = "stribeck_friction", 1.0
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(0.8 * facts.torque, float(rng.uniform(0.4, 1.0)) * facts.omega)
-
-    def loss(self, scene: Scene) -> Array:
-        omega = scene.motion.omega
-        return lugre(omega, self.strength / (1.0 + (omega / self.speed) ** 2), scene.motion.step)
-
-
-@dataclass(frozen=True)
-class AsymmetricFriction(Effect):
-    """The gear loses A more than its calibrated mean forward, 0.9 A less backward, nothing at rest."""
-
-    name, signed, most = "asymmetric_friction", True, 1.0
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(0.4 * facts.torque * cls.sign(rng))
-
-    def loss(self, scene: Scene) -> Array:
-        omega = scene.motion.omega
-        return (
-            np.abs(lugre(omega, np.where(omega > 0.0, 1.0, 0.9), scene.motion.step)) * self.strength
-        )
-
-    def coinciding(self) -> dict[str, float]:
-        return {"difference": self.strength}
-
-
-@dataclass(frozen=True)
-class GearRipple(Effect):
-    """A tooth-mesh ripple with its second harmonic. Source: transmission error of a spur gear is no
-    pure sine.
-    """
+class GearTeeth(Effect):
+    """A ripple at the order of a tooth mesh; its forms give the wave."""
 
     order: int = 24
     phase: float = 0.0
@@ -117,21 +26,87 @@ class GearRipple(Effect):
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        phase = float(rng.uniform(0.0, 2.0 * np.pi))
-        return cls(
-            0.3 * facts.torque, int(rng.integers(6, 50)), phase, float(rng.uniform(0.0, 0.4))
-        )
+        phase, second = float(rng.uniform(0.0, 2.0 * np.pi)), float(rng.uniform(0.0, 0.4))
+        return cls(0.3 * facts.torque, int(rng.integers(6, 75)), phase, second)
+
+    def wave(self, angle: Array) -> Array:
+        raise NotImplementedError
 
     def loss(self, scene: Scene) -> Array:
         angle = self.order * scene.motion.turn + self.phase
-        moving = scene.moving
-        return np.asarray(
-            self.strength * (np.cos(angle) + self.second * np.cos(2.0 * angle + 1.0)) * moving
-        )
+        return np.asarray(self.strength * self.wave(angle) * scene.moving)
 
 
 @dataclass(frozen=True)
-class MotorHeating(Effect):
+class RoundTeeth(GearTeeth):
+    """Sine and second harmonic. Source: transmission error of a spur gear is no pure sine."""
+
+    def wave(self, angle: Array) -> Array:
+        return np.asarray(np.cos(angle) + self.second * np.cos(2.0 * angle + 1.0))
+
+
+@dataclass(frozen=True)
+class CatchingTeeth(GearTeeth):
+    """A saw of four harmonics: torque rises as a tooth takes over and falls when it lets go.
+
+    Source: Fourier series of a saw; stiffness of meshing teeth steps as pairs enter and leave,
+    Harris (1958), Proc. Inst. Mech. Eng. 172, 87-112.
+    """
+
+    def wave(self, angle: Array) -> Array:
+        parts = (np.sin(k * angle) / k for k in range(1, 5))
+        return np.asarray(0.8 * sum(parts, start=np.zeros(angle.size)))
+
+
+@dataclass(frozen=True)
+class Play(Effect):
+    """The gear has play b at the axle: after a reversal the motor turns b before it drives; its
+    forms say how it takes up the load.
+    """
+
+    name, most = "backlash", 0.25
+
+    def taken_up(self, turned: Array) -> Array:
+        """Share of the load that the motor feels, b times `turned` after a reversal."""
+        raise NotImplementedError
+
+    def loss(self, scene: Scene) -> Array:
+        if not self.strength:
+            return np.zeros(scene.torque.size)
+        turned = _since_reversal(scene.motion.omega, scene.motion.turn) / self.strength
+        return np.asarray(-scene.torque * (1.0 - self.taken_up(turned)))
+
+
+def _since_reversal(omega: Array, turn: Array) -> Array:
+    """Angle turned since the last reversal (n,) [rad]; far where there was none."""
+    turning = np.where(np.abs(omega) > STANDING, np.sign(omega), 0.0)
+    last, before, began, angles = 0.0, float(turn[0]), -np.inf, []
+    for way, angle in zip(turning.tolist(), turn.tolist(), strict=True):
+        if way and last and way != last:
+            began = before
+        last, before = way or last, angle
+        angles.append(abs(angle - began))
+    return np.array(angles)
+
+
+@dataclass(frozen=True)
+class HardPlay(Play):
+    """Nothing, then all. Source: dead zone, Nordin and Gutman (2002), Automatica 38, 1633-1649."""
+
+    def taken_up(self, turned: Array) -> Array:
+        return np.asarray((turned >= 1.0).astype(float))
+
+
+@dataclass(frozen=True)
+class SoftPlay(Play):
+    """Teeth meet one after the other: the load comes in with the square of the angle over 1.5 b."""
+
+    def taken_up(self, turned: Array) -> Array:
+        return np.asarray(np.clip(turned / 1.5, 0.0, 1.0) ** 2)
+
+
+@dataclass(frozen=True)
+class HousedWinding(Effect):
     """Winding and housing, each with its temperature; the magnets follow the housing, the flux
     falls with them.
 
@@ -164,26 +139,86 @@ class MotorHeating(Effect):
 
 
 @dataclass(frozen=True)
-class TorqueConstantError(Effect):
-    """The torque per ampere is K_t (1 + e) while the motor drives; e < 0 is a gear that loses a
-    share.
+class LadderedHeat(Effect):
+    """Heat creeps into a thick body: K_t falls by β Σ uⱼ/3, τⱼ u̇ⱼ = I² − uⱼ, τⱼ a fourth, one and
+    four of τ.
+
+    Source: Foster ladder for diffusion into a solid, whose temperature grows with the root of time,
+    Carslaw and Jaeger (1959), Conduction of Heat in Solids, section 2.9.
     """
+
+    duration: float = 60.0  # τ [s]
+
+    name, most = "motor_heating", 0.1
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(0.25 / max(facts.current, 0.1) ** 2, float(rng.uniform(20.0, 80.0)))
+
+    def drawn_current(self, current: Array, scene: Scene) -> Array:
+        times = self.duration * np.array((0.25, 1.0, 4.0))
+        gains = -np.expm1(-scene.motion.step / times)
+        warm, drawn = np.zeros(3), []
+        for wanted in current.tolist():
+            amperes = wanted / max(1.0 - self.strength * float(warm.mean()), 0.2)
+            warm = warm + gains * (amperes**2 - warm)
+            drawn.append(amperes)
+        return np.array(drawn)
+
+
+@dataclass(frozen=True)
+class LossyGear(Effect):
+    """The torque per ampere is K_t (1 + e T²/(T² + T₁²)): a gear that loses a share under load,
+    less of it idling. T₁ is a fifth of the usual torque.
+
+    Source: efficiency of gears over load rises from nothing and levels off.
+    """
+
+    idle: float = 0.3  # T₁ [N·m]
 
     name, signed, most = "torque_constant_error", True, 0.3
 
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), 0.2 * facts.torque)
+
     def drawn_current(self, current: Array, scene: Scene) -> Array:
-        return current / (1.0 + self.strength)
+        torque = current * scene.rig.torque_constant
+        loaded = torque**2 / (torque**2 + self.idle**2)
+        return np.asarray(current / (1.0 + self.strength * loaded))
+
+
+@dataclass(frozen=True)
+class WarmMagnets(Effect):
+    """The torque per ampere is K_t (1 + e) at the usual current, and a twentieth of e less per
+    usual current more: calibrated on another day.
+
+    Source: armature reaction, Hendershot and Miller (2010), section on saturation, to first order.
+    """
+
+    usual: float = 0.75  # [A]
+
+    name, signed, most = "torque_constant_error", True, 0.3
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.current)
+
+    def drawn_current(self, current: Array, scene: Scene) -> Array:
+        more = np.clip(np.abs(current) / self.usual - 1.0, -1.0, 5.0)
+        return np.asarray(current / (1.0 + self.strength * (1.0 - 0.05 * more)))
 
     def coinciding(self) -> dict[str, float]:
         return {"error": self.strength}
 
 
 EFFECTS: tuple[type[Effect], ...] = (
-    CoulombFriction,
-    ViscousFriction,
-    StribeckFriction,
-    AsymmetricFriction,
-    GearRipple,
-    MotorHeating,
-    TorqueConstantError,
+    RoundTeeth,
+    CatchingTeeth,
+    HardPlay,
+    SoftPlay,
+    HousedWinding,
+    LadderedHeat,
+    LossyGear,
+    WarmMagnets,
 )

@@ -13,23 +13,96 @@ from gritd.tools.proof.blind.plant.scene import Felt, Scene
 
 
 @dataclass(frozen=True)
-class BedSlope(Effect):
-    """W cos α on the soil, W sin α along the pull; statics. Uphill positive."""
+class SaggingSlope(Effect):
+    """The testbed is tilted by α, uphill positive, and bends: W cos α on the soil, W tan(α + s x/L)
+    from the pull, s a tenth of α. Statics.
+    """
+
+    length: float = 1.0  # L [m]
 
     name, signed, most = "bed_slope", True, 0.08
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.length)
 
     def carried(self, weight: Array, scene: Scene) -> Array:
         return weight * float(np.cos(self.strength))
 
     def forces(self, scene: Scene) -> Scene:
-        return replace(scene, pull=scene.pull - scene.carried * float(np.tan(self.strength)))
+        bend = 0.95 + 0.1 * scene.motion.travel / self.length
+        return replace(scene, pull=scene.pull - scene.carried * np.tan(self.strength * bend))
 
     def coinciding(self) -> dict[str, float]:
         return {"angle": self.strength}
 
 
 @dataclass(frozen=True)
-class FrameCompliance(Effect):
+class LeaningAxis(Effect):
+    """The bed is level and the vertical axis leans by α: soil takes W/cos α, and the pull's sensor,
+    which leans with it, reads DP cos α − W sin α.
+
+    Source: statics of a guided load.
+    """
+
+    name, signed, most = "bed_slope", True, 0.08
+
+    def carried(self, weight: Array, scene: Scene) -> Array:
+        return weight / float(np.cos(self.strength))
+
+    def sensed(self, felt: Felt) -> Felt:
+        cosine, sine = float(np.cos(self.strength)), float(np.sin(self.strength))
+        return felt.read(pull=felt.pull * cosine - felt.load * sine)
+
+    def coinciding(self) -> dict[str, float]:
+        return {"angle": self.strength}
+
+
+@dataclass(frozen=True)
+class InclinedBed(Effect):
+    """The bed rises by α against the rail: the potentiometer reads z − x tan α, and W sin α goes
+    from the pull. Geometry and statics.
+
+    The wheel was set on the soil where the first run began.
+    """
+
+    name, signed, most = "bed_inclination", True, 0.06
+
+    def grade(self, place: Array) -> Array:
+        return np.full(place.size, float(np.tan(self.strength)))
+
+    def rise(self, place: Array) -> Array:
+        return place * float(np.tan(self.strength))
+
+    def forces(self, scene: Scene) -> Scene:
+        climb = scene.carried * np.sin(np.arctan(self.grade(scene.motion.travel)))
+        return replace(scene, pull=scene.pull - climb)
+
+    def sensed(self, felt: Felt) -> Felt:
+        down = felt.scene.carried > 1.0
+        return felt.read(sinkage=felt.sinkage - self.rise(felt.scene.motion.travel) * down)
+
+
+@dataclass(frozen=True)
+class HollowBed(InclinedBed):
+    """The same for a bed raked hollow: its surface rises by α x (1 − h x/L)."""
+
+    length: float = 1.0  # L [m]
+    hollow: float = 0.2  # h
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.length, float(rng.uniform(0.1, 0.3)))
+
+    def grade(self, place: Array) -> Array:
+        return np.asarray(self.strength * (1.0 - 2.0 * self.hollow * place / self.length))
+
+    def rise(self, place: Array) -> Array:
+        return np.asarray(self.strength * place * (1.0 - self.hollow * place / self.length))
+
+
+@dataclass(frozen=True)
+class JointedFrame(Effect):
     """z_read = z + C W/(1 + W/W_h): joints close, so the frame stiffens under load. Source: contact
     stiffening.
     """
@@ -50,12 +123,26 @@ class FrameCompliance(Effect):
 
 
 @dataclass(frozen=True)
-class LoadAxisFriction(Effect):
-    """The axis holds back by a spring of stiffness F/δ that slips at ±F. The wheel was lowered: it
-    starts at +F.
+class RollingContacts(Effect):
+    """z_read = z + C W₀ (W/W₀)^(2/3): the rollers of the guide dent their rails. Source: Hertz."""
 
-    Source: elasto-plastic (Prandtl) element; Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
-    Automatic Control 50, 1883-1887, its single-element case.
+    weight: float = 60.0  # W₀ [N]
+
+    name, most = "frame_compliance", 6e-5
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, facts.weight)
+
+    def sensed(self, felt: Felt) -> Felt:
+        pressed = (np.maximum(felt.scene.carried, 0.0) / self.weight) ** (2.0 / 3.0)
+        return felt.read(sinkage=felt.sinkage + self.strength * self.weight * pressed)
+
+
+@dataclass(frozen=True)
+class StickingAxis(Effect):
+    """The axis holds back by F h, −1 ≤ h ≤ 1 along the path of z; its forms say how h follows. The
+    wheel was lowered: h starts at 1.
     """
 
     breakaway: float = 2e-4  # δ [m]
@@ -66,34 +153,107 @@ class LoadAxisFriction(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(min(cls.most, 0.15 * facts.weight), float(rng.uniform(1e-4, 4e-4)))
 
+    def follow(self, state: float, moved: float) -> float:
+        """h after a step of z, given over δ."""
+        raise NotImplementedError
+
+    def pressed(self, scene: Scene) -> Array | float:
+        """By how much the guides hold more than F."""
+        return 1.0
+
     def carried(self, weight: Array, scene: Scene) -> Array:
         if not scene.sinkage.size:
             return weight - self.strength * (weight > 0.0)
         held, state = [], 1.0
-        for step in np.diff(scene.sinkage, prepend=scene.sinkage[0]).tolist():
-            state = min(max(state + step / self.breakaway, -1.0), 1.0)
+        steps = np.diff(scene.sinkage, prepend=scene.sinkage[0]) / self.breakaway
+        for moved in steps.tolist():
+            state = self.follow(state, moved)
             held.append(state)
-        return np.asarray(np.maximum(weight - self.strength * np.array(held) * (weight > 0.0), 0.0))
+        back = self.strength * np.array(held) * self.pressed(scene)
+        return np.asarray(np.maximum(weight - back * (weight > 0.0), 0.0))
 
     def coinciding(self) -> dict[str, float]:
         return {"friction": self.strength}
 
 
 @dataclass(frozen=True)
-class SideWallRubbing(Effect):
-    """DP − s W against travel: the sideways force of a skewed wheel presses it on the wall.
+class SpringAxis(StickingAxis):
+    """A spring of stiffness F/δ that slips at ±F.
 
-    Source: Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6.
+    Source: elasto-plastic (Prandtl) element; Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
+    Automatic Control 50, 1883-1887, its single-element case.
+    """
+
+    def follow(self, state: float, moved: float) -> float:
+        return min(max(state + moved, -1.0), 1.0)
+
+
+@dataclass(frozen=True)
+class HystereticAxis(StickingAxis):
+    """dh = (1 − h²) dz/δ while z goes on, and dz/δ where it turns back; the pull presses the
+    guides: F (0.8 + |DP|/W).
+
+    Source: Bouc-Wen element of exponent 2, Wen (1976), J. Eng. Mech. Div. ASCE 102, 249-263.
+    """
+
+    def pressed(self, scene: Scene) -> Array | float:
+        return 0.8 + np.clip(np.abs(scene.pull) / np.maximum(scene.motion.weight, 1.0), 0.0, 1.0)
+
+    def follow(self, state: float, moved: float) -> float:
+        onward = 1.0 - state * state if state * moved > 0.0 else 1.0
+        return min(max(state + moved * onward, -1.0), 1.0)
+
+
+@dataclass(frozen=True)
+class LeaningWall(Effect):
+    """DP − s W against travel, growing with slip by half: the skewed wheel pushes to the side as it
+    shears.
+
+    Source: rubbing of Daca, Tremblay, Skonieczny (2023), Microgravity Sci. Technol. 35:6; sideways
+    force over slip as Ishigami et al. (2007), J. Field Robotics 24, 233-250.
     """
 
     name, most = "side_wall_rubbing", 0.12
 
     def forces(self, scene: Scene) -> Scene:
-        rub = self.strength * scene.carried * np.tanh(scene.motion.speed / 5e-4)
+        pressed = scene.carried * (0.85 + 0.5 * np.clip(scene.slip, 0.0, 1.0))
+        rub = self.strength * pressed * np.tanh(scene.motion.speed / 5e-4)
+        return replace(scene, pull=scene.pull - rub)
+
+
+@dataclass(frozen=True)
+class RoughWall(Effect):
+    """DP − s W (1 + e cos 2πx/l) against travel: a wall that is not quite straight, e = 0.3.
+
+    Source: the same rubbing, its normal force from the stiffness of the guide; chosen here.
+    """
+
+    wavelength: float = 0.1  # l [m]
+
+    name, most = "side_wall_rubbing", 0.12
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.1, 0.4)) * facts.length)
+
+    def forces(self, scene: Scene) -> Scene:
+        wavy = 1.0 + 0.3 * np.cos(2.0 * np.pi * scene.motion.travel / self.wavelength)
+        rub = self.strength * scene.carried * wavy * np.tanh(scene.motion.speed / 5e-4)
         return replace(scene, pull=scene.pull - rub)
 
     def coinciding(self) -> dict[str, float]:
         return {"share": self.strength}
 
 
-EFFECTS: tuple[type[Effect], ...] = (BedSlope, FrameCompliance, LoadAxisFriction, SideWallRubbing)
+EFFECTS: tuple[type[Effect], ...] = (
+    SaggingSlope,
+    LeaningAxis,
+    InclinedBed,
+    HollowBed,
+    JointedFrame,
+    RollingContacts,
+    SpringAxis,
+    HystereticAxis,
+    LeaningWall,
+    RoughWall,
+)

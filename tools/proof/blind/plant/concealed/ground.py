@@ -11,13 +11,15 @@ import numpy as np
 
 from gritd.tools.proof.blind.plant.contact import Ground
 from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
 SLOWEST = 1e-3  # [m/s] keeps a standing wheel's rates finite
+USUAL = 0.02  # [m/s] at which the soil was measured
 
 
 @dataclass(frozen=True)
-class DryingCohesion(Effect):
+class DiffusiveDrying(Effect):
     """c (1 + a √(t/t₀)), t₀ the length of one run: loss limited by the soil grows with the root of
     time.
 
@@ -39,9 +41,29 @@ class DryingCohesion(Effect):
 
 
 @dataclass(frozen=True)
-class Multipass(Effect):
-    """K Nᵃ, c N^(a/2), k N^(−a/3) on the N-th pass: density grows with the logarithm of the number
-    of passes.
+class SteadyDrying(Effect):
+    """c (1 + a t/t₀), not below a fiftieth of c, t₀ three runs long: loss limited by the air is
+    steady.
+
+    Source: constant-rate stage of evaporation, Hillel (1998), Environmental Soil Physics.
+    """
+
+    span: float = 90.0  # t₀ [s]
+
+    name, signed, most = "drying_cohesion", True, 0.5
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), 3.0 * facts.duration)
+
+    def soil(self, ground: Ground, scene: Scene) -> Ground:
+        factor = 1.0 + self.strength * scene.motion.time / self.span
+        return replace(ground, cohesion=ground.cohesion * np.maximum(factor, 0.02))
+
+
+@dataclass(frozen=True)
+class PowerOfPasses(Effect):
+    """K Nᵃ, c N^(a/2), k N^(−a/3) on the N-th pass.
 
     Source: power law of repeated passes, Abebe, Tanaka, Yamazaki (1989), J. Terramechanics 26,
         275-283.
@@ -60,7 +82,27 @@ class Multipass(Effect):
 
 
 @dataclass(frozen=True)
-class RateDependentSinkage(Effect):
+class LogarithmOfPasses(Effect):
+    """K (1 + a ln N), tan φ (1 + a/10 ln N), n (1 − a/20 ln N) on the N-th pass.
+
+    Source: density grows with the logarithm of the number of passes, Koolen and Kuipers (1983),
+    Agricultural Soil Mechanics.
+    """
+
+    name, most = "multipass", 1.2
+
+    def soil(self, ground: Ground, scene: Scene) -> Ground:
+        growth = self.strength * float(np.log(scene.motion.passes))
+        return replace(
+            ground,
+            modulus=ground.modulus * (1.0 + growth),
+            tan_phi=ground.tan_phi * (1.0 + 0.1 * growth),
+            exponent=ground.exponent * (1.0 - 0.05 * growth),
+        )
+
+
+@dataclass(frozen=True)
+class LogarithmicRate(Effect):
     """K [1 + m ln((v + v₁)/(v₀ + v₁))], v of the carriage.
 
     Source: logarithmic rate law of dry granular penetration, in place of Grahn's power law (1991).
@@ -69,12 +111,34 @@ class RateDependentSinkage(Effect):
     name, most = "rate_dependent_sinkage", 0.2
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
-        gain = np.log((np.abs(scene.motion.speed) + SLOWEST) / (0.02 + SLOWEST))
+        gain = np.log((np.abs(scene.motion.speed) + SLOWEST) / (USUAL + SLOWEST))
         return replace(ground, modulus=ground.modulus * np.maximum(1.0 + self.strength * gain, 0.1))
 
 
 @dataclass(frozen=True)
-class SlipSinkage(Effect):
+class RootRate(Effect):
+    """K [1 + m ((u/u₀)^(1/q) − 1)], u the rim's speed, q = 2 … 4.
+
+    Source: Cowper and Symonds (1957), Brown University Technical Report 28: overstress goes with a
+    root of the rate.
+    """
+
+    root: float = 3.0  # q
+
+    name, most = "rate_dependent_sinkage", 0.5
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(2.0, 4.0)))
+
+    def soil(self, ground: Ground, scene: Scene) -> Ground:
+        rate = (np.abs(scene.rim_speed) + SLOWEST) / (USUAL + SLOWEST)
+        gain = rate ** (1.0 / self.root) - 1.0
+        return replace(ground, modulus=ground.modulus * np.maximum(1.0 + self.strength * gain, 0.1))
+
+
+@dataclass(frozen=True)
+class LyaskoSlipSinkage(Effect):
     """Sinkage times 1 + s [(1 + i)/(1 − i/2) − 1].
 
     Source: Lyasko (2010), J. Terramechanics 47, 21-31, where s = 1.
@@ -89,8 +153,23 @@ class SlipSinkage(Effect):
 
 
 @dataclass(frozen=True)
-class SoilPatch(Effect):
-    """c (1 + a w), tan φ (1 + b w) on a stretch with straight flanks: a trapezoid w(x)."""
+class ReeceSlipSinkage(Effect):
+    """Sinkage of the axle z + h i/(1 − i), i up to 0.8: slip carries a layer h away from under it.
+
+    The forces stay: the rut is deeper, the contact is the same. Source: attributed to Reece (1965).
+    """
+
+    name, most = "slip_sinkage", 0.006
+
+    def forces(self, scene: Scene) -> Scene:
+        slip = np.clip(scene.slip, 0.0, 0.8)
+        dug = self.strength * slip / (1.0 - slip) * scene.moving * (scene.sinkage > 0.0)
+        return replace(scene, sinkage=scene.sinkage + dug)
+
+
+@dataclass(frozen=True)
+class Stretch(Effect):
+    """c (1 + a w), tan φ (1 + b w) on a stretch of the bed; its forms give w(x)."""
 
     friction: float = 0.3  # b over a
     middle: float = 0.3  # [m]
@@ -102,29 +181,48 @@ class SoilPatch(Effect):
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         middle, half = rng.uniform(0.3, 0.7) * facts.length, rng.uniform(0.12, 0.25) * facts.length
-        share = float(rng.uniform(0.0, 0.5))
-        return cls(
-            cls.most * cls.sign(rng),
-            share,
-            float(middle),
-            float(half),
-            float(rng.uniform(0.01, 0.04)),
-        )
+        share, flank = rng.uniform(0.0, 0.5), rng.uniform(0.01, 0.04)
+        return cls(cls.most * cls.sign(rng), float(share), float(middle), float(half), float(flank))
+
+    def inside(self, place: Array) -> Array:
+        """w at a place on the bed [m]."""
+        raise NotImplementedError
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
-        away = np.abs(scene.motion.travel - self.middle) - self.half
-        inside = self.strength * np.clip(0.5 - away / self.flank, 0.0, 1.0)
+        change = self.strength * self.inside(scene.motion.travel)
         return replace(
             ground,
-            cohesion=ground.cohesion * (1.0 + inside),
-            tan_phi=ground.tan_phi * (1.0 + self.friction * inside),
+            cohesion=ground.cohesion * (1.0 + change),
+            tan_phi=ground.tan_phi * (1.0 + self.friction * change),
         )
+
+
+@dataclass(frozen=True)
+class FlankedPatch(Stretch):
+    """w is a trapezoid: a stretch with straight flanks, as filled in by hand."""
+
+    def inside(self, place: Array) -> Array:
+        away = np.abs(place - self.middle) - self.half
+        return np.asarray(np.clip(0.5 - away / self.flank, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class RoundPatch(Stretch):
+    """w is a bell e^(−((x − x₀)/l)²): water that spread from one spot."""
+
+    def inside(self, place: Array) -> Array:
+        return np.asarray(np.exp(-(((place - self.middle) / self.half) ** 2)))
 
 
 EFFECTS: tuple[type[Effect], ...] = (
-    DryingCohesion,
-    Multipass,
-    RateDependentSinkage,
-    SlipSinkage,
-    SoilPatch,
+    DiffusiveDrying,
+    SteadyDrying,
+    PowerOfPasses,
+    LogarithmOfPasses,
+    LogarithmicRate,
+    RootRate,
+    LyaskoSlipSinkage,
+    ReeceSlipSinkage,
+    FlankedPatch,
+    RoundPatch,
 )

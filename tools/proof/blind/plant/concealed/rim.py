@@ -11,9 +11,11 @@ from gritd.tools.proof.blind.plant.contact import Rim
 from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.scene import Scene
 
+USUAL, SLOWEST = 0.02, 1e-3  # [m/s] speed at which the soil was measured; keeps rest finite
+
 
 @dataclass(frozen=True)
-class RateDependentShear(Effect):
+class ThermalRate(Effect):
     """Strength times 1 + (λ/ln 10) [asinh(u/u₀) − asinh(v₀/u₀)], u the rim's speed, v₀ = 20 mm/s,
     u₀ = 2 mm/s.
 
@@ -29,7 +31,22 @@ class RateDependentShear(Effect):
 
 
 @dataclass(frozen=True)
-class RearContact(Effect):
+class PowerRate(Effect):
+    """Strength times (u/v₀)^m, u the speed at which the rim slides on the soil.
+
+    Source: power law of vane tests, Biscontin and Pestana (2001), Geotech. Testing J. 24, 423-429.
+    """
+
+    name, most = "rate_dependent_shear", 0.08
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        sliding = np.abs(scene.rim_speed - scene.motion.speed) + SLOWEST
+        growth = (sliding / (0.3 * USUAL + SLOWEST)) ** self.strength
+        return replace(rim, strength=rim.strength * growth)
+
+
+@dataclass(frozen=True)
+class SharedRebound(Effect):
     """Soil springs back by a share κ of the sinkage: cos θ₂ = 1 − κ (1 − cos θ₁).
 
     Source: Ishigami, Miwa, Nagatani, Yoshida (2007), J. Field Robotics 24, 233-250, wheel sinkage
@@ -39,11 +56,34 @@ class RearContact(Effect):
     name, most = "rear_contact", 0.3
 
     def contact(self, rim: Rim, scene: Scene) -> Rim:
-        return replace(rim, rebound=self.strength)
+        return replace(rim, rebound=rim.rebound + self.strength)
 
 
 @dataclass(frozen=True)
-class ShearPeak(Effect):
+class LoosenedRebound(Effect):
+    """κ e^(−i/i₀) (W₀/W)^0.3: sheared soil springs back less, and so does deeply pressed soil.
+
+    Source: unloading of pressed soil is stiffer the deeper it was pressed, Wong (2008), Theory of
+    Ground Vehicles, 4th ed., section 2.4.2; the fall with slip was chosen here.
+    """
+
+    slip: float = 0.8  # i₀
+    weight: float = 60.0  # W₀ [N]
+
+    name, most = "rear_contact", 0.35
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.5, 1.5)), facts.weight)
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        pressed = (self.weight / np.maximum(scene.motion.weight, 0.1 * self.weight)) ** 0.3
+        loosened = np.exp(-np.clip(scene.slip, 0.0, 1.0) / self.slip)
+        return replace(rim, rebound=rim.rebound + self.strength * loosened * pressed)
+
+
+@dataclass(frozen=True)
+class RoundHump(Effect):
     """τ over its residual has a hump P (j/k) e^(1 − j/k). Source: form after Oida (1979); see
     `contact.mobilised`.
     """
@@ -51,11 +91,23 @@ class ShearPeak(Effect):
     name, most = "shear_peak", 0.8
 
     def contact(self, rim: Rim, scene: Scene) -> Rim:
-        return replace(rim, overshoot=self.strength)
+        return replace(rim, overshoot=rim.overshoot + self.strength)
 
 
 @dataclass(frozen=True)
-class StressPeakShift(Effect):
+class BrittleHump(Effect):
+    """τ over its residual has a hump 2 P tanh(2j/k)/cosh(2j/k). Source: form after Kacigin and
+    Guskov (1968); see `contact.mobilised`.
+    """
+
+    name, most = "shear_peak", 0.8
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        return replace(rim, brittle=rim.brittle + self.strength)
+
+
+@dataclass(frozen=True)
+class LevellingPeak(Effect):
     """θₘ/θ₁ = ½ + s [a + (1 − a) tanh(2 i)]: forward with slip, levelling off.
 
     Source: data of Wong and Reece (1967), J. Terramechanics 4(1), 81-98, which bend down at high
@@ -75,4 +127,97 @@ class StressPeakShift(Effect):
         return replace(rim, peak=rim.peak + moved)
 
 
-EFFECTS: tuple[type[Effect], ...] = (RateDependentShear, RearContact, ShearPeak, StressPeakShift)
+@dataclass(frozen=True)
+class PressedPeak(Effect):
+    """θₘ/θ₁ = ½ + s (a + (1 − a) √i)(W/W₀)^0.2: further under a heavier wheel.
+
+    Source: the peak of Onafeko and Reece (1967), J. Terramechanics 4(1), 59-80, moves with slip
+    and with load; the powers were chosen here.
+    """
+
+    share: float = 0.5  # a
+    weight: float = 60.0  # W₀ [N]
+
+    name, signed, most = "stress_peak_shift", True, 0.25
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), float(rng.uniform(0.0, 1.0)), facts.weight)
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        slip = np.sqrt(np.clip(scene.slip, 0.0, 1.0))
+        pressed = (np.maximum(scene.motion.weight, 1.0) / self.weight) ** 0.2
+        moved = self.strength * (self.share + (1.0 - self.share) * slip) * pressed
+        return replace(rim, peak=rim.peak + moved)
+
+
+@dataclass(frozen=True)
+class PolishedRim(Effect):
+    """Friction on the rim is tan δ = (1 − s) tan φ; adhesion falls faster. `contact.sheared`."""
+
+    name, most = "rim_friction", 0.4
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        return replace(rim, polish=self.strength)
+
+
+@dataclass(frozen=True)
+class SlidingRim(Effect):
+    """Shear builds up in the soil as ever, but the rim slides where it comes to 1 − s of the
+    strength. See `contact.mobilised`.
+    """
+
+    name, most = "rim_friction", 0.4
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        return replace(rim, sliding=self.strength)
+
+
+@dataclass(frozen=True)
+class SkewedWheel(Effect):
+    """The wheel's plane is turned from its travel by β: soil is sheared sideways, too.
+
+    j_y = r (1 − i)(θ₁ − θ) tan β. Source: Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    """
+
+    name, signed, most = "side_slip", True, 0.35
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        return replace(rim, skew=rim.skew + float(np.tan(self.strength)))
+
+
+@dataclass(frozen=True)
+class FrictionCircle(Effect):
+    """F_y = 0.7 W tanh 3β, and √(1 − tanh² 3β) of the wheel's grip is left along its plane.
+
+    Source: one circle of friction for both directions, Schwanghart (1968), J. Terramechanics 5(1),
+    9-29.
+    """
+
+    name, signed, most = "side_slip", True, 0.3
+
+    def forces(self, scene: Scene) -> Scene:
+        share = float(np.tanh(3.0 * self.strength))
+        lost = (1.0 - float(np.sqrt(1.0 - share**2))) * scene.torque
+        return replace(
+            scene,
+            side=scene.side + 0.7 * share * scene.carried * scene.moving,
+            torque=scene.torque - lost,
+            pull=scene.pull - lost / scene.rig.radius,
+        )
+
+
+EFFECTS: tuple[type[Effect], ...] = (
+    ThermalRate,
+    PowerRate,
+    SharedRebound,
+    LoosenedRebound,
+    RoundHump,
+    BrittleHump,
+    LevellingPeak,
+    PressedPeak,
+    PolishedRim,
+    SlidingRim,
+    SkewedWheel,
+    FrictionCircle,
+)

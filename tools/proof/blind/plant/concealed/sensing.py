@@ -1,4 +1,4 @@
-"""Effects of the sensors, beyond their noise."""
+"""Effects of the sensors, beyond noise and calibration: belts, leaks, lags."""
 
 from __future__ import annotations
 
@@ -8,30 +8,16 @@ from typing import Self
 import numpy as np
 
 from gritd.tools.proof.blind.plant.effect import Effect, Facts
+from gritd.tools.proof.blind.plant.memory import lagged, mean_before
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt
 from gritd.tools.proof.blind.plant.servo import summed
 
-
-@dataclass(frozen=True)
-class CurrentOffset(Effect):
-    """The amplifier reads I₀ more than there is."""
-
-    name, signed, most = "current_offset", True, 0.4
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(0.3 * facts.current * cls.sign(rng))
-
-    def sensed(self, felt: Felt) -> Felt:
-        return felt.read(current=felt.current + self.strength)
-
-    def coinciding(self) -> dict[str, float]:
-        return {"offset": self.strength}
+FORCE = ("pull", "load", "torque")  # channels of the force sensor
 
 
 @dataclass(frozen=True)
-class ForceCrosstalk(Effect):
+class TurnedSensor(Effect):
     """The sensor is mounted turned by a small angle, and torque bends it: DP cos ε + W sin ε + a T.
 
     Source: a sensor's frame turned about the axle, and one off-diagonal term of its matrix.
@@ -57,7 +43,27 @@ class ForceCrosstalk(Effect):
 
 
 @dataclass(frozen=True)
-class PulleySlip(Effect):
+class BendingSensor(Effect):
+    """DP + a W (1 + W/W₀)/2: the sensor bends under the load, and leaks more the more it is bent.
+
+    Source: second-order term of a bending beam's matrix.
+    """
+
+    weight: float = 60.0  # W₀ [N]
+
+    name, signed, most = "force_crosstalk", True, 0.1
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.weight)
+
+    def sensed(self, felt: Felt) -> Felt:
+        leak = 0.5 * self.strength * felt.load * (1.0 + felt.load / self.weight)
+        return felt.read(pull=felt.pull + leak)
+
+
+@dataclass(frozen=True)
+class CreepingBelt(Effect):
     """The belt creeps on the pulley by s + s' |F|, F what it transmits: the encoder sees less than
     the travel.
 
@@ -75,16 +81,41 @@ class PulleySlip(Effect):
         return cls(cls.most, float(rng.uniform(0.0, 0.3)), 0.3 * facts.weight)
 
     def sensed(self, felt: Felt) -> Felt:
-        force = np.abs(felt.scene.pull) / self.typical
-        creep = self.strength * (1.0 - self.loading + self.loading * force)
-        step = felt.scene.motion.step
-        missed = np.gradient(felt.carriage, step) * creep / (1.0 + creep)
-        return felt.read(carriage=felt.carriage - summed(missed, step))
+        force = np.abs(felt.pull) / self.typical
+        return _unseen(felt, self.strength * (1.0 - self.loading + self.loading * force))
 
 
 @dataclass(frozen=True)
-class SensorLatency(Effect):
-    """One channel is late, half by transport and half by a low-pass filter."""
+class WornPulley(Effect):
+    """The belt creeps by s (1 + w cos(x/r_p)): one side of the pulley grips less.
+
+    Source: kinematics of a pulley of radius r_p with a worn spot.
+    """
+
+    worn: float = 0.5  # w
+    pulley: float = 0.02  # r_p [m]
+
+    name, most = "pulley_slip", 0.12
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.3, 0.8)))
+
+    def sensed(self, felt: Felt) -> Felt:
+        wave = 1.0 + self.worn * np.cos(felt.carriage / self.pulley)
+        return _unseen(felt, self.strength * wave)
+
+
+def _unseen(felt: Felt, creep: Array) -> Felt:
+    """The carriage as its encoder sees it where the belt creeps by this share of what is seen."""
+    step = felt.scene.motion.step
+    missed = np.gradient(felt.carriage, step) * creep / (1.0 + creep)
+    return felt.read(carriage=felt.carriage - summed(missed, step))
+
+
+@dataclass(frozen=True)
+class Latency(Effect):
+    """One channel is late; its forms say how."""
 
     channel: str = "sinkage"
 
@@ -94,53 +125,38 @@ class SensorLatency(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, str(rng.choice(("sinkage", "current", "force"))))
 
-    def sensed(self, felt: Felt) -> Felt:
-        names = ("pull", "load", "torque") if self.channel == "force" else (self.channel,)
-        return felt.read(
-            **{name: self._late(getattr(felt, name), felt.scene.motion.time) for name in names}
-        )
+    def late(self, values: Array, time: Array) -> Array:
+        raise NotImplementedError
 
-    def _late(self, values: Array, time: Array) -> Array:
+    def sensed(self, felt: Felt) -> Felt:
+        if not self.strength:
+            return felt
+        names, time = FORCE if self.channel == "force" else (self.channel,), felt.scene.motion.time
+        return felt.read(**{name: self.late(getattr(felt, name), time) for name in names})
+
+
+@dataclass(frozen=True)
+class FilteredLatency(Latency):
+    """Half by transport and half by a low-pass filter."""
+
+    def late(self, values: Array, time: Array) -> Array:
         moved = np.interp(time - 0.5 * self.strength, time, values)
-        gain = 1.0 - np.exp(-(time[1] - time[0]) / max(0.5 * self.strength, 1e-9))
-        state, late = float(moved[0]), []
-        for value in moved.tolist():
-            state += gain * (value - state)
-            late.append(state)
-        return np.array(late)
+        return lagged(moved, np.full(time.size, time[1] - time[0]), 0.5 * self.strength)
 
 
 @dataclass(frozen=True)
-class SinkageDatum(Effect):
-    """The potentiometer's zero is z₀ off the surface."""
+class AveragedLatency(Latency):
+    """The mean of the last 2 τ. Source: an integrating converter."""
 
-    name, signed, most = "sinkage_datum", True, 0.005
-
-    def sensed(self, felt: Felt) -> Felt:
-        return felt.read(sinkage=felt.sinkage + self.strength)
-
-    def coinciding(self) -> dict[str, float]:
-        return {"offset": self.strength}
-
-
-@dataclass(frozen=True)
-class SinkageGain(Effect):
-    """The potentiometer's scale is off by a factor."""
-
-    name, signed, most = "sinkage_gain", True, 0.25
-
-    def sensed(self, felt: Felt) -> Felt:
-        return felt.read(sinkage=felt.sinkage * (1.0 + self.strength))
-
-    def coinciding(self) -> dict[str, float]:
-        return {"gain": self.strength}
+    def late(self, values: Array, time: Array) -> Array:
+        return mean_before(values, time, 2.0 * self.strength)
 
 
 EFFECTS: tuple[type[Effect], ...] = (
-    CurrentOffset,
-    ForceCrosstalk,
-    PulleySlip,
-    SensorLatency,
-    SinkageDatum,
-    SinkageGain,
+    TurnedSensor,
+    BendingSensor,
+    CreepingBelt,
+    WornPulley,
+    FilteredLatency,
+    AveragedLatency,
 )

@@ -54,23 +54,6 @@ class SurfaceWaves(Effect):
 
 
 @dataclass(frozen=True)
-class PotentiometerDrift(Effect):
-    """The potentiometer warms up with the room and drifts, by z_d a run's length."""
-
-    span: float = 30.0
-
-    name, signed, most = "potentiometer_drift", True, 0.003
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(cls.most * cls.sign(rng), facts.duration)
-
-    def sensed(self, felt: Felt) -> Felt:
-        time = felt.scene.motion.time
-        return felt.read(sinkage=felt.sinkage + self.strength * (time - time[0]) / self.span)
-
-
-@dataclass(frozen=True)
 class MagneticSaturation(Effect):
     """Iron saturates: torque K_t I (1 − (I/I_s)²); strength is the shortfall at the typical
     current.
@@ -147,12 +130,52 @@ class Thixotropy(Effect):
         return replace(scene, torque=scene.torque * (1.0 + gain))
 
 
+@dataclass(frozen=True)
+class ShearBands(Effect):
+    """Soil fails in bands: torque and pull swell and fall once each time the rim has slid by l.
+
+    T (1 + a g), g a saw of the sliding path over l.
+    """
+
+    spacing: float = 0.01  # l [m]
+
+    name, most = "shear_bands", 0.4
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.01, 0.04)))
+
+    def forces(self, scene: Scene) -> Scene:
+        path = np.cumsum(np.abs(scene.rim_speed - scene.motion.speed)) * scene.motion.step
+        swell = scene.torque * self.strength * (np.mod(path / self.spacing, 1.0) - 0.5)
+        return replace(
+            scene,
+            torque=scene.torque + swell,
+            pull=scene.pull + swell / scene.rig.radius,
+        )
+
+
+@dataclass(frozen=True)
+class CableTwist(Effect):
+    """The motor's cable winds up with the wheel: torque M ψ/2π, both ways."""
+
+    name, most = "cable_twist", 0.5
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(0.3 * facts.torque)
+
+    def loss(self, scene: Scene) -> Array:
+        return np.asarray(self.strength * scene.motion.turn / (2.0 * np.pi))
+
+
 EFFECTS: tuple[type[Effect], ...] = (
     CableDrag,
     SurfaceWaves,
-    PotentiometerDrift,
     MagneticSaturation,
     BuildingVibration,
     RailJoint,
     Thixotropy,
+    ShearBands,
+    CableTwist,
 )

@@ -1,4 +1,4 @@
-"""Effects of the wheel's body: what its front, faces, lugs, shape and mass add to the rim of Eqs.
+"""Effects of the wheel's body: what its front, faces, shape and mass add to the rim of Eqs.
 (8)-(10).
 """
 
@@ -9,21 +9,14 @@ from typing import Self
 
 import numpy as np
 
+from gritd.tools.proof.blind.plant.concealed.pressure import WEIGHT, passive
 from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Motion, Scene
 
-WEIGHT = 15e3  # unit weight of the soil γ [N/m³]
-
-
-def passive(tan_phi: Array | float) -> Array:
-    """Coefficient of passive earth pressure K_p = (1 + sin φ)/(1 − sin φ) (Rankine)."""
-    sine = np.sin(np.arctan(tan_phi))
-    return np.asarray((1.0 + sine) / (1.0 - sine))
-
 
 @dataclass(frozen=True)
-class Bulldozing(Effect):
+class WallBulldozing(Effect):
     """DP − s b (½ γ z² K_p + 2 c z √K_p): passive earth pressure on a wall as wide as the wheel.
 
     Source: Terzaghi (1943), Theoretical Soil Mechanics, ch. 7, with Rankine's coefficient.
@@ -42,65 +35,31 @@ class Bulldozing(Effect):
 
 
 @dataclass(frozen=True)
-class Grousers(Effect):
-    """N separate lugs of height h, each a blade that pushes with passive pressure while it is in
-    the soil.
+class BowWaveBulldozing(Effect):
+    """DP − s b K_p (½ γ z² + q z): the heap ahead of the wheel weighs on the soil that it pushes,
+    q = γ h, h the height of a heap that holds a share of the rut.
 
-    A lug at θ, root at depth d, carries F = m b [½ γ ((d + h)² − d²) K_p + 2 c h √K_p + K_p σ̄ h],
-    m the share 1 − e^(−j/k) that it has mobilised; T + F (r + h/2), DP + F cos θ, and F sin θ lifts
-    the wheel (read as sinkage).
-    Source: blade theory of Terzaghi (1943) with the surcharge σ̄ of the rim; lugs one by one as in
-    Skonieczny, Moreland, Wettergreen (2012), IEEE/RSJ IROS.
+    Source: universal earthmoving equation, Reece (1965), Proc. Inst. Mech. Eng. 179(3F), without
+    its cohesive term.
     """
 
-    count: int = 16
-    phase: float = 0.0
+    heap: float = 1.0  # h over z
 
-    name, most = "grousers", 0.008
+    name, most = "bulldozing", 3.0
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(cls.most, int(rng.integers(10, 28)), float(rng.uniform(0.0, 2.0 * np.pi)))
+        return cls(cls.most, float(rng.uniform(0.5, 2.0)))
 
     def forces(self, scene: Scene) -> Scene:
-        torque, pull, lift = np.zeros((3, scene.torque.size))
-        for lug in range(self.count):
-            push, theta = self._lug(scene, lug)
-            torque += push * (scene.rig.radius + 0.5 * self.strength)
-            pull += push * np.cos(theta)
-            lift += push * np.sin(theta)
-        sign = scene.direction * scene.moving
-        # dW/dz of a wheel
-        stiffness = 2.0 * np.maximum(scene.carried, 1.0) / np.maximum(scene.sinkage, 1e-3)
-        raised = np.where(scene.sinkage > 0.0, lift / stiffness, 0.0)
-        return replace(
-            scene,
-            torque=scene.torque + torque * sign,
-            pull=scene.pull + pull * sign,
-            sinkage=scene.sinkage - raised,
-        )
-
-    def _lug(self, scene: Scene, lug: int) -> tuple[Array, Array]:
-        """Push of one lug [N] and its angle θ [rad], counted towards the entry."""
-        turned = scene.motion.turn * scene.direction + self.phase + 2.0 * np.pi * lug / self.count
-        theta = np.mod(-turned + np.pi, 2.0 * np.pi) - np.pi
-        radius, height = scene.rig.radius, self.strength
-        root = np.maximum(radius * (np.cos(theta) - np.cos(scene.theta_1)), 0.0)
-        entered = np.clip((scene.theta_1 - theta) / 0.1, 0.0, 1.0) * np.clip(
-            (theta + 0.3) / 0.3, 0.0, 1.0
-        )
-        coefficient = passive(scene.ground.tan_phi)
-        pressure = 0.5 * WEIGHT * ((root + height) ** 2 - root**2) * coefficient
-        pressure = pressure + 2.0 * scene.ground.cohesion * height * np.sqrt(coefficient)
-        pressure = pressure + coefficient * scene.pressure * height
-        swept = np.maximum(scene.theta_1 - theta, 0.0)
-        jay = radius * (swept - scene.ratio * (np.sin(scene.theta_1) - np.sin(theta)))
-        mobilised = 1.0 - np.exp(-np.maximum(jay, 0.0) / scene.ground.shear_modulus)
-        return scene.rig.width * pressure * mobilised * entered, theta
+        depth = np.maximum(scene.sinkage, 0.0)
+        wall = WEIGHT * depth**2 * (0.5 + self.heap) * passive(scene.ground.tan_phi)
+        resistance = self.strength * scene.rig.width * wall
+        return replace(scene, pull=scene.pull - resistance * scene.direction * scene.moving)
 
 
 @dataclass(frozen=True)
-class SidewallFriction(Effect):
+class RestingSidewall(Effect):
     """Each buried face slides as one area at its centroid, pressed by (1 − sin φ) of the rim's mean
     stress.
 
@@ -111,27 +70,41 @@ class SidewallFriction(Effect):
     name, most = "sidewall_friction", 1.0
 
     def forces(self, scene: Scene) -> Scene:
-        radius, angle = scene.rig.radius, scene.theta_1
-        # the leading half of the segment
-        area = 0.5 * radius**2 * (angle - 0.5 * np.sin(2.0 * angle))
-        below = (
-            radius
-            * 2.0
-            * np.sin(angle) ** 3
-            / np.maximum(3.0 * (angle - 0.5 * np.sin(2.0 * angle)), 1e-12)
-        )
-        ahead = 0.4 * radius * np.sin(angle)
         rest = 1.0 - np.sin(np.arctan(scene.ground.tan_phi))
         strength = scene.ground.cohesion + rest * scene.pressure * scene.ground.tan_phi
-        force = 2.0 * self.strength * strength * area * scene.direction * scene.moving
-        back, up = below - radius * scene.ratio, ahead  # sliding velocity of the centroid over ω
-        size = np.hypot(back, up) + 1e-9
-        torque = force * (below * back + ahead * up) / size
-        return replace(scene, torque=scene.torque + torque, pull=scene.pull + force * back / size)
+        return _rubbed(scene, self.strength * strength)
 
 
 @dataclass(frozen=True)
-class WheelEccentricity(Effect):
+class AdheringSidewall(Effect):
+    """The same faces under adhesion c and the passive pressure of the soil beside them alone.
+
+    Source: adhesion and overburden on a buried face, after Osman (1964), J. Agric. Eng. Res. 9.
+    """
+
+    name, most = "sidewall_friction", 2.0
+
+    def forces(self, scene: Scene) -> Scene:
+        over = 0.5 * WEIGHT * np.maximum(scene.sinkage, 0.0) * passive(scene.ground.tan_phi)
+        strength = scene.ground.cohesion + over * scene.ground.tan_phi
+        return _rubbed(scene, self.strength * strength)
+
+
+def _rubbed(scene: Scene, strength: Array) -> Scene:
+    """Both faces slide as one area at its centroid under this shear stress [Pa]."""
+    radius, angle = scene.rig.radius, scene.theta_1
+    area = 0.5 * radius**2 * (angle - 0.5 * np.sin(2.0 * angle))  # the leading half of the segment
+    below = 2.0 * radius**3 * np.sin(angle) ** 3 / np.maximum(6.0 * area, 1e-12)
+    ahead = 0.4 * radius * np.sin(angle)
+    force = 2.0 * strength * area * scene.direction * scene.moving
+    back, up = below - radius * scene.ratio, ahead  # sliding velocity of the centroid over ω
+    size = np.hypot(back, up) + 1e-9
+    torque = force * (below * back + ahead * up) / size
+    return replace(scene, torque=scene.torque + torque, pull=scene.pull + force * back / size)
+
+
+@dataclass(frozen=True)
+class OffsetAxle(Effect):
     """The axle sits e beside the middle of a round wheel: R = e cos ψ' + √(r² − e² sin² ψ'); W
     lifts with it.
     """
@@ -145,21 +118,22 @@ class WheelEccentricity(Effect):
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
 
     def radius(self, radius: Array, motion: Motion) -> Array:
-        return self._below(radius, motion.turn)
+        return self.below(radius, motion.turn)
 
     def forces(self, scene: Scene) -> Scene:
         psi, step = scene.motion.turn, 1e-4
         base = np.full(psi.size, scene.rig.radius)
-        lever = (self._below(base, psi + step) - self._below(base, psi - step)) / (2.0 * step)
+        lever = (self.below(base, psi + step) - self.below(base, psi - step)) / (2.0 * step)
+        lifted = self.below(base, psi) - scene.rig.radius
         touching = scene.carried > 1.0
-        sinkage = np.where(
-            touching, scene.sinkage - (scene.radius - scene.rig.radius), scene.sinkage
-        )
         return replace(
-            scene, torque=scene.torque + scene.carried * lever * scene.moving, sinkage=sinkage
+            scene,
+            torque=scene.torque + scene.carried * lever * scene.moving,
+            sinkage=np.where(touching, scene.sinkage - lifted, scene.sinkage),
         )
 
-    def _below(self, radius: Array, turn: Array) -> Array:
+    def below(self, radius: Array, turn: Array) -> Array:
+        """Radius below the axle [m]."""
         angle = turn + self.phase
         return np.asarray(
             self.strength * np.cos(angle)
@@ -168,39 +142,149 @@ class WheelEccentricity(Effect):
 
 
 @dataclass(frozen=True)
-class WheelInertia(Effect):
-    """Torque J dω/dt for wheel and geared rotor. Newton's second law."""
+class DentedRim(OffsetAxle):
+    """One side of the rim is flat: R = r − e g, g a bell once a turn about ψ', as wide as its
+    flank.
+    """
+
+    flank: float = 0.7  # [rad]
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)), float(rng.uniform(0.6, 1.0)))
+
+    def below(self, radius: Array, turn: Array) -> Array:
+        narrow = 1.0 / self.flank**2
+        return np.asarray(
+            radius - self.strength * np.exp(narrow * (np.cos(turn + self.phase) - 1.0))
+        )
+
+
+@dataclass(frozen=True)
+class BentAxle(Effect):
+    """The hub runs out: it lifts the axle by e cos ψ' and drops it again, and the rim stays round.
+
+    Only the potentiometer sees it.
+    """
+
+    phase: float = 0.0
+
+    name, most = "wheel_eccentricity", 0.003
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
+
+    def sensed(self, felt: Felt) -> Felt:
+        wave = self.strength * np.cos(felt.scene.motion.turn + self.phase)
+        return felt.read(sinkage=felt.sinkage - wave * (felt.scene.carried > 1.0))
+
+
+@dataclass(frozen=True)
+class ElasticInertia(Effect):
+    """Torque J dω/dt of a rotor behind an elastic shaft: it follows within a tenth of a second.
+
+    Source: two masses and a damped spring; the rotor's acceleration is the wheel's through a
+    low-pass.
+    """
+
+    lag: float = 0.05  # [s]
 
     name, most = "wheel_inertia", 1.5
 
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.03, 0.12)))
+
     def loss(self, scene: Scene) -> Array:
-        return np.asarray(self.strength * scene.motion.alpha)
+        gain = -float(np.expm1(-scene.motion.step / self.lag))
+        state, torques = 0.0, []
+        for alpha in scene.motion.alpha.tolist():
+            state += gain * (alpha - state)
+            torques.append(self.strength * state)
+        return np.array(torques)
 
     def coinciding(self) -> dict[str, float]:
         return {"inertia": self.strength}
 
 
 @dataclass(frozen=True)
-class WheelRadiusError(Effect):
-    """The wheel's radius is r (1 + e); the configuration says r."""
+class GearedInertia(Effect):
+    """Torque J dω/dt over the gear's efficiency while it speeds up, times it while it slows down.
+
+    Source: power through a gear that loses a share either way.
+    """
+
+    efficiency: float = 0.85
+
+    name, most = "wheel_inertia", 1.5
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.75, 0.92)))
+
+    def loss(self, scene: Scene) -> Array:
+        alpha, omega = scene.motion.alpha, scene.motion.omega
+        factor = np.where(alpha * omega > 0.0, 1.0 / self.efficiency, self.efficiency)
+        return np.asarray(self.strength * alpha * factor)
+
+    def coinciding(self) -> dict[str, float]:
+        return {"inertia": self.strength}
+
+
+@dataclass(frozen=True)
+class WornRim(Effect):
+    """The wheel's radius is r (1 + e + e/10 cos 2ψ): worn, and not quite round; the configuration
+    says r.
+    """
+
+    phase: float = 0.0
 
     name, signed, most = "wheel_radius_error", True, 0.06
 
-    def radius(self, radius: Array, motion: Motion) -> Array:
-        return radius * (1.0 + self.strength)
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), float(rng.uniform(0.0, 2.0 * np.pi)))
 
-    def sensed(self, felt: Felt) -> Felt:
-        return felt
+    def radius(self, radius: Array, motion: Motion) -> Array:
+        shape = 1.0 + 0.1 * np.cos(2.0 * (motion.turn + self.phase))
+        return radius * (1.0 + self.strength * shape)
 
     def coinciding(self) -> dict[str, float]:
         return {"error": self.strength}
 
 
+@dataclass(frozen=True)
+class YieldingRim(Effect):
+    """The rim yields under load, so it rolls on r (1 + e (3/4 + W/4W₀)).
+
+    Source: effective rolling radius of an elastic wheel, Pacejka (2012), Tire and Vehicle
+    Dynamics, ch. 1.
+    """
+
+    weight: float = 60.0  # W₀ [N]
+
+    name, signed, most = "wheel_radius_error", True, 0.06
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.weight)
+
+    def radius(self, radius: Array, motion: Motion) -> Array:
+        pressed = 0.75 + 0.25 * motion.weight / self.weight
+        return radius * (1.0 + self.strength * pressed)
+
+
 EFFECTS: tuple[type[Effect], ...] = (
-    Bulldozing,
-    Grousers,
-    SidewallFriction,
-    WheelEccentricity,
-    WheelInertia,
-    WheelRadiusError,
+    WallBulldozing,
+    BowWaveBulldozing,
+    RestingSidewall,
+    AdheringSidewall,
+    OffsetAxle,
+    DentedRim,
+    BentAxle,
+    ElasticInertia,
+    GearedInertia,
+    WornRim,
+    YieldingRim,
 )

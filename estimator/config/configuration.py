@@ -14,10 +14,17 @@ from pathlib import Path
 from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.config.table import EffectSchema, table
-from gritd.estimator.config.yamltree import ConfigError, compose, read_text, serialise
+from gritd.estimator.config.yamltree import (
+    ConfigError,
+    Place,
+    compose,
+    is_ended,
+    read_text,
+    serialise,
+)
 from gritd.estimator.messages.run_info import RunInfo
 
-__all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text"]
+__all__ = ["ConfigError", "Configuration", "EffectSchema", "load", "loads", "read_text", "reload"]
 
 
 @dataclass(frozen=True)
@@ -29,12 +36,14 @@ class Configuration:
         same settings.
     source:   the file's name, for messages.
     run:      the `run` section, with its defaults where the file has none.
+    ended:    whether the file shows its end by a line '...'.
     """
 
     settings: Settings
     text: str
     source: str
     run: RunInfo = field(default_factory=RunInfo)
+    ended: bool = False
 
 
 def load(
@@ -42,6 +51,17 @@ def load(
 ) -> Configuration:
     """Read a configuration file; a relative DBC path counts from its folder. Raises ConfigError."""
     return loads(read_text(Path(path)), str(path), Path(path).resolve().parent, effect_schema)
+
+
+def reload(path: str | os.PathLike[str]) -> Configuration:
+    """Read a configuration file that takes the place of another while the daemon runs: an editor
+    may not have written all of it, so it has to show its end. Raises ConfigError.
+    """
+    text = read_text(Path(path))
+    configuration = loads(text, str(path), Path(path).resolve().parent)
+    if not configuration.ended:
+        raise Place(str(path), text.count("\n") + 1, "").error("no end", "'...' as the last line")
+    return configuration
 
 
 def loads(
@@ -56,4 +76,4 @@ def loads(
     Raises ConfigError.
     """
     (settings, run), complete = table(folder, effect_schema).read(compose(text, name))
-    return Configuration(settings, serialise(complete), name, run)
+    return Configuration(settings, serialise(complete), name, run, is_ended(text))

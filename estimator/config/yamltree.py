@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator
+from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ MAX_BYTES = 256 * 1024
 MAX_DEPTH = 20
 MAX_NODES = 5000
 
+# A text that is cut anywhere must not pass for a whole one: see docs/decisions/0008.
+CLOSING = "'...' as the last line, since the first is '---'"
+_WRITTEN: dict[str, Any] = {"allow_unicode": True, "explicit_start": True, "explicit_end": True}
 _PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _RESOLVER: Any = yaml.resolver.Resolver()
 
@@ -136,8 +140,24 @@ def compose(text: str, file: str) -> Node:
 
 
 def serialise(node: Node) -> str:
-    """YAML text of a tree; composing it again gives the same tree."""
-    return yaml.serialize(_yaml(node), width=10_000, allow_unicode=True)
+    """YAML text of a tree; composing it again gives the same tree, of a part of it none."""
+    return str(yaml.serialize(_yaml(node), width=10_000, **_WRITTEN))
+
+
+def dumped(document: AnyMapping[str, Any]) -> str:
+    """YAML text of a document; a part of it is no configuration."""
+    return str(yaml.safe_dump(dict(document), sort_keys=False, width=120, **_WRITTEN))
+
+
+def is_ended(text: str) -> bool:
+    """Whether a document that `compose` took shows its end: it is no part of another."""
+    events = yaml.parse(text, Loader=_PARSER)
+    return any(_marked(event) for event in events if isinstance(event, yaml.DocumentEndEvent))
+
+
+def _marked(event: yaml.Event) -> bool:
+    """Whether the begin or the end of a document stands in the text, as `---` or `...`."""
+    return bool(getattr(event, "explicit", False))
 
 
 def _yaml(node: Node) -> yaml.Node:
@@ -165,10 +185,12 @@ class _Composer:
 
     def document(self) -> Node:
         self._next()  # stream start
-        if isinstance(self._next(), yaml.StreamEndEvent):
+        if isinstance(start := self._next(), yaml.StreamEndEvent):
             raise self._top.error("nothing", "a configuration")
         node = self._node(self._next(), self._top, 0)
-        self._next()  # document end
+        end = self._next()
+        if _marked(start) and not _marked(end):
+            raise self._at(end, self._top).error("the end of the file", CLOSING)
         if not isinstance(second := self._next(), yaml.StreamEndEvent):
             raise self._at(second, self._top).error("a second document", "one document a file")
         return node

@@ -49,9 +49,13 @@ class Rerun:
         """Take over the checkpoint's configuration, as the daemon did. Raises RecordingError."""
         if checkpoint.configuration == self._text:
             return
-        before, self.pipeline = self.pipeline.settings, self._pipeline_of(checkpoint)
+        configuration = _configuration(checkpoint)
+        if configuration.text == self._text:  # as another version of gritd writes it
+            return
+        settings = self._settings_of(configuration)
+        before, self.pipeline = self.pipeline.settings, Pipeline(settings, self._engine)
         self._state = carried(self.pipeline, self._state, before)
-        self._text = checkpoint.configuration
+        self._text = configuration.text
 
     def resume(self, checkpoint: Checkpoint) -> bool:
         """Go on from the logged state; False if one that was known differs from it. Raises
@@ -66,10 +70,10 @@ class Rerun:
         self.known = True
         return same
 
-    def _pipeline_of(self, checkpoint: Checkpoint) -> Pipeline:
-        try:
-            return Pipeline(
-                self._settings_of(loads(checkpoint.configuration, "/checkpoint")), self._engine
-            )
-        except ConfigError as error:
-            raise RecordingError(str(error)) from None
+
+def _configuration(checkpoint: Checkpoint) -> Configuration:
+    """Raises RecordingError."""
+    try:
+        return loads(checkpoint.configuration, "/checkpoint")
+    except ConfigError as error:
+        raise RecordingError(str(error)) from None

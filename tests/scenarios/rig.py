@@ -23,6 +23,7 @@ import yaml
 from gritd.config import packaged
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.config import configuration as config
+from gritd.estimator.config.yamltree import dumped
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TOPICS
@@ -132,7 +133,7 @@ class Wires(Rig):
         document = yaml.safe_load(self.config.read_text())
         for section, values in sections.items():
             document[section].update(values)
-        self.config.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True))
+        self.config.write_text(dumped(document))
 
     def play(self, readings):
         """Send the readings in real time, from another thread."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import shutil
 import signal
 import time
 import tracemalloc
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 import yaml
 
-from gritd.estimator.config.configuration import ConfigError, loads
+from gritd.config import packaged
+from gritd.estimator.config.configuration import ConfigError, load, loads, reload
+from gritd.estimator.config.yamltree import dumped
 from tests.estimator.config.test_config import HOSTILE
 from tests.scenarios.rig import (
     TESTBED,
@@ -26,6 +29,7 @@ from tests.scenarios.rig import (
 )
 
 BAD_RELOAD = "SIGHUP with bad YAML"
+CUT = "YAML cut at every byte"
 BOMB = "YAML bomb, unsafe tag, duplicate key, 1e3 as text, no as false, NaN"
 
 
@@ -47,7 +51,7 @@ def broken(text, rng):
     elif mistake == "indent":
         lines[at] = "\t" + lines[at]
     elif mistake == "twice":
-        lines.insert(at, lines[0])
+        lines.insert(at, lines[1])
     elif mistake == "cut":
         lines = [*lines[:at], lines[at][: len(lines[at]) // 2] + ": {"]
     else:
@@ -87,6 +91,53 @@ def test_a_hundred_bad_files_change_nothing(tmp_path, seed, figure):
         BAD_RELOAD, WIRES, "parts of the recording begun", len(recordings(daemon.path())) - 1, "", 0
     )
     assert verified(daemon.path())
+
+
+def test_a_file_cut_at_every_byte(tmp_path, figure):
+    """The packaged file, one that `--apply` wrote and one by hand: no cut is taken for a whole."""
+    explained = dumped({**yaml.safe_load(TESTBED.text), "effects": {"bulldozing": {"share": 0.5}}})
+    by_hand = TESTBED.text.removeprefix("---\n").removesuffix("...\n")
+    texts = {
+        "reload": (packaged().read_text(), reload),
+        "after --apply": (explained, load),
+        "reload of a file by hand": (by_hand, reload),
+    }
+    path = tmp_path / "testbed.yaml"
+    shutil.copy(packaged().with_suffix(".dbc"), tmp_path)
+    for name, (text, take) in texts.items():
+        data = text.encode()
+        whole = None if take is reload and "by hand" in name else loads(text, "x", tmp_path).text
+        wrong = sum(taken(path, data[:cut], take) not in (None, whole) for cut in range(len(data)))
+        figure(CUT, "configuration reader", f"cuts, {name}", len(data))
+        figure(CUT, "configuration reader", f"cuts taken for another file, {name}", wrong, limit=0)
+
+
+def taken(path, data, take):
+    """What a file of these bytes means; None where it is refused with file and line."""
+    path.write_bytes(data)
+    try:
+        return take(path).text
+    except ConfigError as error:
+        assert re.match(rf"{re.escape(str(path))}:\d+: .+: found .+; expected .+", str(error))
+        return None
+
+
+def test_a_reload_of_a_file_that_is_being_written(tmp_path, seed, figure):
+    """SIGHUP at twenty moments of a slow save: the old configuration is kept until all is there."""
+    rng = random.Random(seed)
+    with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
+        good = wires.config.read_bytes()
+        cuts = sorted(rng.sample(range(len(good) - 5), 20))
+        for number, cut in enumerate(cuts, start=1):
+            wires.config.write_bytes(good[:cut])
+            daemon.signal(signal.SIGHUP)
+            daemon.heard("the old configuration is kept", number)
+        wires.config.write_bytes(good)
+        daemon.signal(signal.SIGHUP)
+        daemon.heard("unchanged")
+        daemon.stop()
+    begun = len(recordings(daemon.path())) - 1
+    figure(CUT, WIRES, "parts of the recording begun", begun, limit=0)
 
 
 def readable(text, folder):
@@ -148,7 +199,7 @@ def test_a_good_file_is_taken_over_between_two_ticks(tmp_path, seed, figure):
 def change(wires, how):
     document = yaml.safe_load(wires.config.read_text())
     how(document)
-    wires.config.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True))
+    wires.config.write_text(dumped(document))
 
 
 def test_the_same_file_again_changes_nothing(tmp_path, figure):

@@ -54,9 +54,11 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError(f"{arguments.file}: {error}", USAGE) from None
     if warning := open_to_all(Path(arguments.file)):
         print(warning, file=sys.stderr)
-    sys.stdout.write(
-        read.text if arguments.effective else f"{arguments.file}: valid\n\n{summary(read.settings)}"
-    )
+    if arguments.effective:
+        sys.stdout.write(read.text)
+        return DONE
+    ending = "" if read.ended else "; without a last line '...' it cannot be reloaded"
+    sys.stdout.write(f"{arguments.file}: valid{ending}\n\n{summary(read.settings)}")
     return DONE
 
 

@@ -60,6 +60,7 @@ ROWS = (
     "names that lead out of the folder",
     "symlinked lock, FIFO, killed parent",
     "world-writable configuration, readable recordings",
+    "YAML cut at every byte",
 )
 
 Figure = dict[str, Any]

@@ -15,7 +15,7 @@ from typing import TextIO
 
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader, ReaderStats
-from gritd.estimator.config.configuration import Configuration, load
+from gritd.estimator.config.configuration import Configuration, reload
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.daemon import notify
 from gritd.estimator.daemon.daemon import INFO, WARNING, WATCH, Daemon, DaemonError
@@ -184,7 +184,7 @@ class Watcher:
 
     def _load(self, daemon: Daemon) -> None:
         try:
-            configuration = load(self._config)
+            configuration = reload(self._config)
             self._loaded = configuration, daemon.change_to(configuration)
         except (ConfigError, DaemonError) as error:
             self._loaded = str(error)

@@ -13,6 +13,7 @@ import yaml
 
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Device
+from gritd.estimator.config.yamltree import dumped
 from gritd.tools.testbed.plant import PlantKind
 
 LINEARISATION = (
@@ -38,9 +39,7 @@ def write(
         document["effects"].pop(LINEARISATION, None)
     document["logging"]["directory"] = str(folder)
     path = folder / NAME
-    path.write_text(
-        yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120), encoding="utf-8"
-    )
+    path.write_text(dumped(document), encoding="utf-8")
     return path
 
 

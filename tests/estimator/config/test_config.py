@@ -307,6 +307,27 @@ def test_an_exact_wrench_is_refused(noise: str) -> None:
     assert f"channels.wrench.{name}: found 0 " in line and "above 1e-09 N" in line
 
 
+def test_a_file_that_marks_its_beginning_marks_its_end() -> None:
+    assert config.loads(f"# mine\n---\n{MINIMAL}...\n# done\n", "rig.yaml").ended
+    text = message(f"# mine\n---\n{MINIMAL}")
+    assert text.startswith("rig.yaml:22: document: found the end of the file; expected '...'")
+
+
+def test_a_file_by_hand_needs_its_end_for_a_reload_only(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(MINIMAL)
+    assert not config.load(path).ended
+    with pytest.raises(ConfigError, match=r":20: document: found no end; expected '\.\.\.' as"):
+        config.reload(path)
+    path.write_text(MINIMAL + "...\n")
+    assert config.reload(path) == config.load(path)
+
+
+def test_an_end_inside_a_value_is_none() -> None:
+    text = MINIMAL + 'run: {notes: "... and so on"}\n'
+    assert not config.loads(text, "rig.yaml").ended
+
+
 @pytest.mark.parametrize("text", ["", "\n# nothing\n", "hello", "[1, 2]", "3", "null", "{}"])
 def test_not_a_configuration(text: str) -> None:
     assert message(text).startswith("rig.yaml:1: ")

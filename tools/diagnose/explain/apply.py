@@ -10,7 +10,9 @@ from typing import Any
 import yaml
 
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.config.yamltree import dumped
 from gritd.estimator.effects import EFFECTS
+from gritd.estimator.visible import visible
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity
 
 
@@ -23,8 +25,7 @@ def applied(configuration: Configuration, found: Diagnosis) -> str:
     if found.law is not None and found.law.parameters:
         effects["empirical_law"] = _entry("empirical_law", found.law.parameters)
     document["effects"] = effects
-    head = f"# made by gritd diagnose: {found.summary}\n".replace("\n", " ").rstrip() + "\n"
-    return head + yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
+    return f"# made by gritd diagnose: {visible(found.summary)}\n{dumped(document)}"
 
 
 def _entry(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, Any]:

@@ -131,7 +131,14 @@ def configuration(known: Knowledge, nominal: float) -> str:
         "minimum": "1 N",
     }
     _channels(document, known)
-    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
+    return yaml.safe_dump(
+        document,
+        sort_keys=False,
+        allow_unicode=True,
+        width=120,
+        explicit_start=True,
+        explicit_end=True,
+    )
 
 
 def _soil(soil: dict[str, Stated]) -> dict[str, Any]:

@@ -162,7 +162,7 @@ def _families(
         Family(shape, own, *_gain(projected, own)) for shape, own in zip(shapes, spans, strict=True)
     ]
 
-    chance = chance_of(screening, screening.base, [w.shape.family for w in waves])
+    chance = chance_of(screening, model, [w.shape.family for w in waves])
     first = len(smooth)
     return projected, families[:first] + [
         replace(family, p=chance[family.shape], wave=wave, prior=wave.prior)

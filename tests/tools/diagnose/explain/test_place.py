@@ -26,6 +26,7 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
 from gritd.tools.proof.ours.cases import draw, record
+from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
 
 PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
@@ -109,6 +110,22 @@ def test_passes_differ_from_the_second_on() -> None:
     assert {p.channel for p in places} >= {"torque", "sinkage"}
     assert all(p.changes and p.changes[0] == 2.0 for p in places)
     assert "from run2 to run4" in places[0].where
+
+
+def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
+    """A wave that an accepted effect made: its chance is that beside the model that lacks it, not
+    beside the fit that the search began with.
+    """
+    effect = NextDoor(size=0.3)
+    drawn = plan(seed=3)
+    screening = prepared(WheelRig(record(drawn, (effect,)), drawn.settings))
+    accepted = explained(screening, effect)
+    held = unmoved(screening, accepted)
+
+    told = locate(screening, held, held.fitted.predicted)
+    assert ("drawbar_pull", "time") in {(place.channel, place.covariate) for place in told}
+    begun_elsewhere = replace(screening, base=accepted)
+    assert locate(begun_elsewhere, held, held.fitted.predicted) == told
 
 
 @pytest.mark.slow

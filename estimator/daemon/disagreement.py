@@ -13,7 +13,8 @@ from math import exp, hypot, isfinite, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.filter.measurement import COMPONENTS
-from gritd.estimator.messages.record import TICK_NAMES, Flag
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import TICK_NAMES
 
 NS = 1e-9
 MEMORY = 2.0  # [s] over which a channel's normalised error is averaged

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gritd.estimator.daemon.loop import LoopRecord
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.online.pipeline import TickRecord
+from gritd.estimator.messages.tick import LoopRecord, TickRow
 from gritd.estimator.recording.topics import CHECKPOINT_TOPIC, LOOP_TOPIC, TICK_TOPIC
 from gritd.estimator.recording.writer import WriterThread
 
@@ -17,7 +16,7 @@ class LogSink:
     def __init__(self, writer: WriterThread) -> None:
         self._writer = writer
 
-    def put(self, readings: Sequence[Reading], tick: TickRecord, loop: LoopRecord) -> None:
+    def put(self, readings: Sequence[Reading], tick: TickRow, loop: LoopRecord) -> None:
         stamp = loop.stamp
         self._writer.put(readings, [(TICK_TOPIC.name, stamp, tick), (LOOP_TOPIC.name, stamp, loop)])
 

@@ -9,27 +9,14 @@ from typing import NamedTuple, Protocol
 
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.messages.readings import NS, Reading
+from gritd.estimator.messages.tick import LoopRecord, TickRow
 from gritd.estimator.online.carry import carried
 from gritd.estimator.online.checkpoint import encode
-from gritd.estimator.online.pipeline import Pipeline, State, TickRecord
+from gritd.estimator.online.pipeline import Pipeline, State
 
 RECENT = 2500  # ticks whose lateness is remembered
 _SHARES = {"late_50": 0.5, "late_99": 0.99, "late_999": 0.999, "late_max": 1.0}
 MEND = NS  # [ns] after a loss in the log the state is logged anew, at most this often
-
-
-class LoopRecord(NamedTuple):
-    """One /loop message: what only the live loop can know. Order of record.LOOP_FIELDS."""
-
-    stamp: int  # [ns]
-    lateness: float  # [s]
-    duration: float  # [s]
-    missed: int
-    queued: int
-    dropped: int
-    log_queued: int
-    log_dropped: int
-    wall_offset: float  # [s]
 
 
 class Change(NamedTuple):
@@ -44,7 +31,7 @@ class Change(NamedTuple):
 class Sink(Protocol):
     """Where ticks go: the writer."""
 
-    def put(self, readings: Sequence[Reading], tick: TickRecord, loop: LoopRecord) -> None:
+    def put(self, readings: Sequence[Reading], tick: TickRow, loop: LoopRecord) -> None:
         """Must not block."""
 
     def counts(self) -> tuple[int, int]:
@@ -75,7 +62,7 @@ class Loop:
         self._log_dropped = 0  # as of the last checkpoint
         self._checkpointed = 0  # when that was [ns]
         self._lateness: deque[float] = deque(maxlen=RECENT)
-        self.latest: tuple[TickRecord, LoopRecord] | None = None
+        self.latest: tuple[TickRow, LoopRecord] | None = None
         self.ticks = self.missed = 0
 
     def ask(self, change: Change) -> None:
@@ -107,9 +94,7 @@ class Loop:
             state = self._between(state, deadline)
             deadline = self._next(deadline)
 
-    def _hand_over(
-        self, readings: list[Reading], tick: TickRecord, deadline: int, woken: int
-    ) -> None:
+    def _hand_over(self, readings: list[Reading], tick: TickRow, deadline: int, woken: int) -> None:
         waiting, dropped = self._sink.counts()
         loop = LoopRecord(
             stamp=deadline,

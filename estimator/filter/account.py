@@ -1,132 +1,110 @@
-"""What a tick's record says of the tracker: measured, estimated and predicted quantities, the
-account of the updates.
-
-Each block is a plain tuple in the order of its names, and the blocks follow one another as in
-record.TICK_FIELDS.
+"""What a tick says of the tracker: measured, estimated and predicted quantities, the filter's
+health, the account of its updates. Each function makes one block of `messages.tick.Tick`.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import nan, sqrt
 
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
-from gritd.estimator.filter.pull import Pull
-from gritd.estimator.filter.tracker import Account, Aid, Tracker, TrackState
-from gritd.estimator.messages.record import NOT_A_NUMBER
+from gritd.estimator.filter.tracker import Account, Tracker, TrackState
+from gritd.estimator.messages.tick import (
+    Aid,
+    FilterHealth,
+    Measurements,
+    Predictions,
+    SoilEstimate,
+)
 from gritd.estimator.wheel.sync import Measured, Snapshot
 from gritd.estimator.wheel.wheel_state import WheelState
 
-Row = tuple[float, ...]
-
-NO_AID = Aid(0.0, 0.0, 0.0, 0.0, 0.0, False)
-NOTHING = Measured(NOT_A_NUMBER, NOT_A_NUMBER)
+NO_AIDS = (Aid(0.0, 0.0, 0.0, 0.0, 0.0, False),) * len(COMPONENTS)
+NO_PREDICTIONS = Predictions(*(nan,) * len(Predictions._fields))
 
 
-def _pairs(*names: str) -> tuple[str, ...]:
-    return tuple(label for name in names for label in (name, f"{name}_sigma"))
-
-
-MEASURED = (
-    "wheel_angle",
-    *_pairs("wheel_speed"),
-    "carriage_position",
-    *_pairs("carriage_speed", "slip", "sinkage", "theta_1"),
-    "theta_m",
-    "current",
-    "temperature",
-    *_pairs("torque", "load", "drawbar_pull"),
-)
-ESTIMATED = (
-    *_pairs("cohesion", "tan_phi", "shear_modulus"),
-    "cov_c_tan_phi",
-    "cov_c_ln_k",
-    "cov_tan_phi_ln_k",
-)
-PREDICTED = _pairs(
-    "torque_predicted", "load_predicted", "drawbar_pull_predicted", "rolling_resistance"
-)
-LARGEST = (*_pairs("drawbar_pull_max"), "drawbar_pull_max_slip")
-HEALTH = ("separability", "consistency", "updates", "resets")
-AIDED = tuple(f"{component}_{name}" for component in COMPONENTS for name in Aid._fields)
-NAMES = (*MEASURED, *ESTIMATED, *PREDICTED, *LARGEST, *HEALTH, *AIDED)
-
-
-def record(tracker: Tracker, state: TrackState, account: Account, pull: Pull) -> Row:
-    """Values in the order of NAMES, SI."""
-    return (
-        *measured(account.snapshot, account.now),
-        *estimated(state.estimate),
-        *predicted(tracker.measurement, state.estimate, account),
-        *pull,
-        *health(tracker, state),
-        *aided(account.aids),
+def measurements(snapshot: Snapshot, now: WheelState) -> Measurements:
+    """The window as measured, effects accounted for."""
+    theta_1 = _with_sigma(now)
+    return Measurements(
+        wheel_angle=snapshot.wheel_angle,
+        wheel_speed=snapshot.wheel_speed.value,
+        wheel_speed_sigma=snapshot.wheel_speed.sigma,
+        carriage_position=snapshot.carriage_position,
+        carriage_speed=snapshot.carriage_speed.value,
+        carriage_speed_sigma=snapshot.carriage_speed.sigma,
+        slip=now.slip.value,
+        slip_sigma=now.slip.sigma,
+        sinkage=now.sinkage.value,
+        sinkage_sigma=now.sinkage.sigma,
+        theta_1=theta_1.value,
+        theta_1_sigma=theta_1.sigma,
+        theta_m=now.theta_m,
+        current=snapshot.current.value,
+        temperature=snapshot.temperature,
+        torque=now.torque.value,
+        torque_sigma=now.torque.sigma,
+        load=now.load.value,
+        load_sigma=now.load.sigma,
+        drawbar_pull=now.drawbar_pull.value,
+        drawbar_pull_sigma=now.drawbar_pull.sigma,
     )
 
 
-def measured(snapshot: Snapshot, now: WheelState) -> Row:
-    """In the order of MEASURED."""
-    return (
-        snapshot.wheel_angle,
-        *snapshot.wheel_speed,
-        snapshot.carriage_position,
-        *snapshot.carriage_speed,
-        *now.slip,
-        *now.sinkage,
-        *_angle(now),
-        now.theta_m,
-        snapshot.current.value,
-        snapshot.temperature,
-        *now.torque,
-        *now.load,
-        *now.drawbar_pull,
-    )
-
-
-def estimated(estimate: Estimate) -> Row:
-    """In the order of ESTIMATED."""
+def soil_estimate(estimate: Estimate) -> SoilEstimate:
+    """The estimate in SI: the state is [c/kPa, tan φ, ln k]."""
     P = estimate.P
     c, tan_phi, k = soil(estimate)
-    return (
-        c,
-        sqrt(P[C][C]) * KPA,
-        tan_phi,
-        sqrt(P[TAN_PHI][TAN_PHI]),
-        k,
-        k * sqrt(P[LN_K][LN_K]),
-        P[C][TAN_PHI] * KPA,
-        P[C][LN_K] * KPA,
-        P[TAN_PHI][LN_K],
+    return SoilEstimate(
+        cohesion=c,
+        cohesion_sigma=sqrt(P[C][C]) * KPA,
+        tan_phi=tan_phi,
+        tan_phi_sigma=sqrt(P[TAN_PHI][TAN_PHI]),
+        shear_modulus=k,
+        shear_modulus_sigma=k * sqrt(P[LN_K][LN_K]),
+        cov_c_tan_phi=P[C][TAN_PHI] * KPA,
+        cov_c_ln_k=P[C][LN_K] * KPA,
+        cov_tan_phi_ln_k=P[TAN_PHI][LN_K],
     )
 
 
-def predicted(measurement: Measurement, estimate: Estimate, account: Account) -> Row:
-    """In the order of PREDICTED: what the estimate says of this window, NaN where the wheel touches
-    nothing.
-    """
-    torque = pull = resistance = load = NOTHING
+def predictions(measurement: Measurement, estimate: Estimate, account: Account) -> Predictions:
+    """What the estimate says of this window; NaN where the wheel touches nothing."""
+    if not account.touching:
+        return NO_PREDICTIONS
+
     now = account.now
-    if account.touching:
-        prediction = measurement.predict(estimate, now)
-        sigmas = measurement.sigmas(estimate, now, prediction)
-        torque, pull, resistance = [
-            Measured(q.value, sigma) for q, sigma in zip(prediction, sigmas, strict=True)
-        ]
-        load = measurement.model.load(*soil(estimate), _angle(now), now.theta_m, now.slip.value)
-    return *torque, *load, *pull, *resistance
-
-
-def health(tracker: Tracker, state: TrackState) -> Row:
-    """In the order of HEALTH."""
-    return tracker.separability(state.estimate), state.consistency, state.updates, state.resets
-
-
-def aided(aids: tuple[Aid, ...]) -> Row:
-    """In the order of AIDED: the account of each component, zeros where it was not offered."""
-    return tuple(
-        [value for aid in (*aids, *(NO_AID,) * (len(COMPONENTS) - len(aids))) for value in aid]
+    prediction = measurement.predict(estimate, now)
+    torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(estimate, now, prediction)
+    load = measurement.model.load(*soil(estimate), _with_sigma(now), now.theta_m, now.slip.value)
+    return Predictions(
+        torque_predicted=prediction.torque.value,
+        torque_predicted_sigma=torque_sigma,
+        load_predicted=load.value,
+        load_predicted_sigma=load.sigma,
+        drawbar_pull_predicted=prediction.drawbar_pull.value,
+        drawbar_pull_predicted_sigma=pull_sigma,
+        rolling_resistance=prediction.resistance.value,
+        rolling_resistance_sigma=resistance_sigma,
     )
 
 
-def _angle(now: WheelState) -> Measured:
+def health(tracker: Tracker, state: TrackState) -> FilterHealth:
+    """Whether the estimate can be trusted."""
+    return FilterHealth(
+        separability=tracker.separability(state.estimate),
+        consistency=state.consistency,
+        updates=state.updates,
+        resets=state.resets,
+    )
+
+
+def aids(account: Account) -> tuple[Aid, Aid]:
+    """The account of torque and of drawbar pull; zeros where one was not offered."""
+    torque, drawbar_pull = (account.aids + NO_AIDS)[: len(COMPONENTS)]
+    return torque, drawbar_pull
+
+
+def _with_sigma(now: WheelState) -> Measured:
+    """θ₁ with its standard deviation [rad]."""
     return Measured(now.theta_1.value, now.theta_1.d_sinkage * now.sinkage.sigma)

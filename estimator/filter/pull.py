@@ -7,12 +7,12 @@ and starts from the latest update when it is not under way; its result is some t
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.model import Prediction
-from gritd.estimator.messages.record import NOT_A_NUMBER
 from gritd.estimator.wheel.wheel_state import WheelState
 
 SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)
@@ -21,9 +21,9 @@ SLIPS = (0.2, 0.4, 0.6, 0.8, 1.0)
 class Pull(NamedTuple):
     """The largest drawbar pull."""
 
-    value: float = NOT_A_NUMBER  # [N]
-    sigma: float = NOT_A_NUMBER  # [N]
-    slip: float = NOT_A_NUMBER  # at which it is reached [-]
+    value: float = nan  # [N]
+    sigma: float = nan  # [N]
+    slip: float = nan  # at which it is reached [-]
 
 
 UNKNOWN = Pull()
@@ -37,7 +37,7 @@ class Search(NamedTuple):
     pulls: tuple[float, ...] = ()
 
 
-def searched(measurement: Measurement, search: Search, known: Pull) -> tuple[Search | None, Pull]:
+def search_on(measurement: Measurement, search: Search, known: Pull) -> tuple[Search | None, Pull]:
     """One step of the search, and the result so far; no search after the last step."""
     if len(search.pulls) < len(SLIPS):
         _, prediction = _at(measurement, search, SLIPS[len(search.pulls)])

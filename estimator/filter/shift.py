@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from gritd.estimator.effects import in_order
 from gritd.estimator.effects.base import Effect
@@ -34,6 +35,7 @@ DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
+ORDERS = tuple(np.arange(degree + 1) for degree in DEGREE)  # of the polynomials in θ₁ and i
 INSIDE = 1.0 - 1e-12  # as near to an edge as sin t allows
 ORDER = 24  # quadrature nodes in each zone
 INTEGRALS = len(Integrals._fields)
@@ -93,7 +95,7 @@ class IntegralShift:
         """The tables at one point."""
         u, du = _unit(theta_1, THETA_1)
         v, dv = _unit(slip, SLIP)
-        rows, columns = _polynomials(u, DEGREE[0], du), _polynomials(v, DEGREE[1], dv)
+        rows, columns = _polynomials(u, ORDERS[0], du), _polynomials(v, ORDERS[1], dv)
         along_slip = (rows @ self._coefficients).reshape(
             -1, DEGREE[1] + 1
         )  # (2 for θ₁ · quantities, powers of i)
@@ -210,11 +212,10 @@ def _unit(x: float, span: tuple[float, float]) -> tuple[float, float]:
     return (-1.0 if x < low else 1.0), 0.0
 
 
-def _polynomials(x: float, degree: int, slope: float) -> Array:
-    """(2, degree + 1): T₀ … T_degree at x = cos t, and their derivatives n sin(nt)/sin t times
+def _polynomials(x: float, orders: NDArray[np.int_], slope: float) -> Array:
+    """(2, m): Tₙ at x = cos t for the orders n (m,), and their derivatives n sin(nt)/sin t times
     slope.
     """
     angle = acos(min(max(x, -INSIDE), INSIDE))
-    orders = np.arange(degree + 1)
     phase = orders * angle
     return np.array((np.cos(phase), slope / sin(angle) * orders * np.sin(phase)))

@@ -7,7 +7,7 @@ done. It reads no clock and keeps nothing between calls.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, hypot, log, sqrt
+from math import exp, hypot, log, nan, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
@@ -28,7 +28,8 @@ from gritd.estimator.filter.estimate import (
 from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
 from gritd.estimator.messages.readings import NS
-from gritd.estimator.messages.record import CHANNEL_BITS, NOT_A_NUMBER, Flag, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
+from gritd.estimator.messages.tick import Aid
 from gritd.estimator.wheel.chain import Context
 from gritd.estimator.wheel.sync import Snapshot
 from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
@@ -56,17 +57,6 @@ WIDEST = 6  # … so often
 
 
 Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
-
-
-class Aid(NamedTuple):
-    """The account of one measurement component (STYLE rule 6)."""
-
-    z: float
-    r: float
-    innovation: float
-    s: float
-    test_ratio: float
-    accepted: bool
 
 
 class Account(NamedTuple):
@@ -110,7 +100,7 @@ class TrackState(NamedTuple):
         """Mean normalised innovation squared per component; 1 when the stated noise is the real
         one.
         """
-        return self.surprise / self.components if self.components > 0.0 else NOT_A_NUMBER
+        return self.surprise / self.components if self.components > 0.0 else nan
 
 
 class Tracker:

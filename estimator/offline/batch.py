@@ -9,39 +9,67 @@ tracker is that of the live loop.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from math import nan
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.account import (
-    AIDED,
-    ESTIMATED,
-    HEALTH,
-    MEASURED,
-    Row,
-    aided,
-    estimated,
-    health,
-    measured,
-)
+from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
 from gritd.estimator.filter.tracker import Account, Tracker, TrackState
 from gritd.estimator.messages.readings import NS
-from gritd.estimator.messages.record import NOT_A_NUMBER, TICK_FIELDS
+from gritd.estimator.messages.tick import (
+    TICK_FIELDS,
+    Aid,
+    FilterHealth,
+    Measurements,
+    SoilEstimate,
+    names_of,
+    row,
+)
 from gritd.estimator.offline.snapshots import Ints, played, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.wheel.wheel_state import wheel_state
 
 Table = NDArray[np.void]  # structured
 
-STATE = ("evaluated", "status", "flags", "stale", "stuck")
-PREDICTED = ("torque_predicted", "drawbar_pull_predicted", "rolling_resistance")
-ESTIMATES = (*STATE, *MEASURED, *ESTIMATED, *PREDICTED, *HEALTH, *AIDED)
-SIGNALS = ("evaluated", "stale", "stuck", *MEASURED)
 _KINDS = {"float64": "<f8", "bool": "?"}
 _DTYPES = {name: _KINDS.get(kind, "<i8") for name, kind, _ in TICK_FIELDS}
+
+
+class WindowHead(NamedTuple):
+    """Of `tick.Head` what belongs to a window."""
+
+    evaluated: int
+    status: int
+    flags: int
+    stale: int
+    stuck: int
+
+
+class PointPredictions(NamedTuple):
+    """Of `tick.Predictions` what needs no standard deviations; NaN where nothing is touched."""
+
+    torque_predicted: float = nan
+    drawbar_pull_predicted: float = nan
+    rolling_resistance: float = nan
+
+
+class Window(NamedTuple):
+    """What is kept of one window: blocks and names of `Tick`."""
+
+    head: WindowHead
+    measurements: Measurements
+    soil: SoilEstimate
+    predictions: PointPredictions
+    health: FilterHealth
+    torque: Annotated[Aid, "N·m"]
+    drawbar_pull: Annotated[Aid, "N"]
+
+
+ESTIMATES = names_of(Window)
+_WINDOW_DTYPE = np.dtype([(name, _DTYPES[name]) for name in ESTIMATES])
 
 
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
@@ -59,26 +87,8 @@ def estimates(settings: Settings, recording: Recording, engine: str = "plain") -
     state, rows = tracker.start(), []
     for snapshot in snapshots(pipeline.settings, replayed, chosen):
         state, account = tracker.step(state, snapshot)
-        rows.append(_row(tracker, state, account))
-    return _table(ESTIMATES, rows)
-
-
-def signals(settings: Settings, recording: Recording, every_tick: bool = False) -> Table:
-    """What the sensors say of the wheel, without a filter: shape (n,), fields SIGNALS, each as in
-    /tick.
-
-    One row a window, which share no reading; or one a tick, from overlapping windows.
-    """
-    replayed = played(recording, settings.rates.tick)
-    all_ticks = np.arange(len(replayed.ticks))
-    chosen = (
-        all_ticks if every_tick else window_ends(replayed.ticks, round(NS / settings.rates.update))
-    )
-    rows = [
-        (s.evaluated, s.stale, s.stuck, *measured(s, wheel_state(settings, s)))
-        for s in snapshots(settings, replayed, chosen)
-    ]
-    return _table(SIGNALS, rows)
+        rows.append(row(_window(tracker, state, account)))
+    return np.array(rows, dtype=_WINDOW_DTYPE)
 
 
 def window_ends(ticks: Ints, length: int) -> Ints:
@@ -92,29 +102,35 @@ def window_ends(ticks: Ints, length: int) -> Ints:
     return np.array(ends, dtype=np.int64)
 
 
-def _row(tracker: Tracker, state: TrackState, account: Account) -> Row:
-    """In the order of ESTIMATES."""
+def _window(tracker: Tracker, state: TrackState, account: Account) -> Window:
+    """One window, after its update."""
     snapshot = account.snapshot
-    return (
-        snapshot.evaluated,
-        account.status,
-        account.flags,
-        snapshot.stale,
-        snapshot.stuck,
-        *measured(snapshot, account.now),
-        *estimated(state.estimate),
-        *_predicted(tracker, state, account),
-        *health(tracker, state),
-        *aided(account.aids),
+    torque, drawbar_pull = aids(account)
+    return Window(
+        head=WindowHead(
+            evaluated=snapshot.evaluated,
+            status=account.status,
+            flags=account.flags,
+            stale=snapshot.stale,
+            stuck=snapshot.stuck,
+        ),
+        measurements=measurements(snapshot, account.now),
+        soil=soil_estimate(state.estimate),
+        predictions=_predictions(tracker, state, account),
+        health=health(tracker, state),
+        torque=torque,
+        drawbar_pull=drawbar_pull,
     )
 
 
-def _predicted(tracker: Tracker, state: TrackState, account: Account) -> Iterable[float]:
-    """T, DP and resistance at the estimate after the update."""
+def _predictions(tracker: Tracker, state: TrackState, account: Account) -> PointPredictions:
+    """At the estimate after the update."""
     if not account.touching:
-        return (NOT_A_NUMBER,) * len(PREDICTED)
-    return [quantity.value for quantity in tracker.measurement.predict(state.estimate, account.now)]
+        return PointPredictions()
 
-
-def _table(names: Sequence[str], rows: list[Row]) -> Table:
-    return np.array(rows, dtype=[(name, _DTYPES[name]) for name in names])
+    prediction = tracker.measurement.predict(state.estimate, account.now)
+    return PointPredictions(
+        torque_predicted=prediction.torque.value,
+        drawbar_pull_predicted=prediction.drawbar_pull.value,
+        rolling_resistance=prediction.resistance.value,
+    )

@@ -13,10 +13,11 @@ from collections.abc import Callable
 
 from gritd.estimator.config.configuration import ConfigError, Configuration, loads
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.messages.tick import TickRow
 from gritd.estimator.offline.playback import Checkpoint, RecordedTick
 from gritd.estimator.online.carry import carried
 from gritd.estimator.online.checkpoint import decode, encode
-from gritd.estimator.online.pipeline import Pipeline, TickRecord
+from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.mcapfile import RecordingError
 
 
@@ -37,7 +38,7 @@ class Rerun:
         self._state = self.pipeline.start()
         self.known = True  # whether the state is the run's own, so that its ticks can be compared
 
-    def step(self, tick: RecordedTick) -> TickRecord:
+    def step(self, tick: RecordedTick) -> TickRow:
         self._state, record = self.pipeline.step(self._state, tick.readings, tick.stamp)
         return record
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS, WRENCH_FIELDS
-from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array

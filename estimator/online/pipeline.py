@@ -8,17 +8,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.account import record
-from gritd.estimator.filter.pull import UNKNOWN, Pull, Search, searched
-from gritd.estimator.filter.tracker import Tracker, TrackState
+from gritd.estimator.filter.account import (
+    aids,
+    health,
+    measurements,
+    predictions,
+    soil_estimate,
+)
+from gritd.estimator.filter.pull import UNKNOWN, Pull, Search, search_on
+from gritd.estimator.filter.tracker import Account, Tracker, TrackState
 from gritd.estimator.messages.readings import NS, Reading
-from gritd.estimator.messages.record import Flag
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import Head, LargestPull, Tick, TickRow, row
 from gritd.estimator.wheel.chain import with_latencies
 from gritd.estimator.wheel.sync import Sync
 
 MOST = (1 << 32) - 1  # a tick's counters go so far
-
-TickRecord = tuple[float, ...]  # values in the order of record.TICK_FIELDS; times are integer ns
 
 
 @dataclass(frozen=True)
@@ -47,36 +52,59 @@ class Pipeline:
     def start(self) -> State:
         return State(Sync(self.settings), self.tracker.start())
 
-    def step(self, state: State, readings: Sequence[Reading], t: int) -> tuple[State, TickRecord]:
-        """One tick at time t [ns]. Deterministic: the same states and readings give the same bits."""
+    def step(self, state: State, readings: Sequence[Reading], t: int) -> tuple[State, TickRow]:
+        """One tick at time t [ns]. Deterministic: the same states and readings give the same
+        bits.
+        """
         sync = state.sync
         for reading in readings:
             sync.push(reading)
+
         track, account = self.tracker.step(state.track, sync.snapshot(t))
+
         search, pull = state.search, state.pull
         if search is not None:
-            search, pull = searched(self.tracker.measurement, search, pull)
+            search, pull = search_on(self.tracker.measurement, search, pull)
         elif account.aids:
             search = Search(track.estimate, account.now)
+
         first = t if state.first < 0 else state.first
-        counters = sync.counters
+        late, jumps = sync.counters.late, sync.counters.jumps
+        after = State(sync, track, search, pull, first, late, jumps)
+        return after, row(self._tick(state, after, account, len(readings), t))
+
+    def _tick(self, before: State, after: State, account: Account, consumed: int, t: int) -> Tick:
+        """What the tick at t [ns] says."""
+        estimate = after.track.estimate
+        torque, drawbar_pull = aids(account)
+        return Tick(
+            head=self._head(before, after, account, consumed, t),
+            measurements=measurements(account.snapshot, account.now),
+            soil=soil_estimate(estimate),
+            predictions=predictions(self.tracker.measurement, estimate, account),
+            largest_pull=LargestPull(*after.pull),
+            health=health(self.tracker, after.track),
+            torque=torque,
+            drawbar_pull=drawbar_pull,
+        )
+
+    def _head(self, before: State, after: State, account: Account, consumed: int, t: int) -> Head:
+        """When the tick was and what came in; to the tracker's flags those of the readings."""
+        counters, snapshot = after.sync.counters, account.snapshot
         flags = account.flags
-        flags += Flag.LATE_READINGS * (counters.late > state.late) + Flag.COUNTER_JUMP * (
-            counters.jumps > state.jumps
+        flags += Flag.LATE_READINGS * (after.late > before.late)
+        flags += Flag.COUNTER_JUMP * (after.jumps > before.jumps)
+        return Head(
+            stamp=t,
+            evaluated=snapshot.evaluated,
+            sequence=round((t - after.first) / self._period),
+            consumed=consumed,
+            status=int(account.status),
+            flags=flags,
+            stale=snapshot.stale,
+            stuck=snapshot.stuck,
+            late=min(counters.late, MOST),
+            duplicates=min(counters.duplicates, MOST),
+            jumps=min(counters.jumps, MOST),
+            invalid=min(counters.invalid, MOST),
         )
-        fields = (
-            t,
-            account.snapshot.evaluated,
-            round((t - first) / self._period),
-            len(readings),
-            int(account.status),
-            flags,
-            account.snapshot.stale,
-            account.snapshot.stuck,
-            *(
-                min(count, MOST)
-                for count in (counters.late, counters.duplicates, counters.jumps, counters.invalid)
-            ),
-            *record(self.tracker, track, account, pull),
-        )
-        return State(sync, track, search, pull, first, counters.late, counters.jumps), fields

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gritd.estimator.messages.readings import WRENCH_FIELDS
-from gritd.estimator.messages.record import LOOP_FIELDS, TICK_FIELDS
+from gritd.estimator.messages.tick import LOOP_FIELDS, TICK_FIELDS
 from gritd.estimator.recording.cdr import STRING, TIME, Field, Topic
 
 _STAMP: Field = ("stamp", TIME, "when the sample was taken")

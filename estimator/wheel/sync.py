@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from gritd.estimator.config.settings import Channel, Settings
 from gritd.estimator.messages.readings import NS, Reading
-from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.wheel.geometry import slope_sigma
 
 STUCK_AFTER = int(0.34 * NS)  # [ns] a live sensor shows noise or motion sooner than this
@@ -236,6 +236,7 @@ class Sync:
             if name not in _ENCODERS
         }
         self._wrench = self._wrench_windows()
+        self._limits = _wrench_limits(settings)
         self._stale_after = {
             name: round(ch.stale_after * NS) for name, ch in settings.channels.items()
         }
@@ -305,14 +306,14 @@ class Sync:
         self._slopes[reading.channel].insert(reading.stamp, reading.value, self.counters)
 
     def _push_wrench(self, reading: Reading) -> None:
-        wrench, value = self.settings.wrench, reading.value
-        assert wrench is not None and isinstance(value, tuple)
-        limits = (wrench.max_force,) * 3 + (wrench.max_torque,) * 3
-        if not all(
-            isnan(v) or abs(v) <= limit for v, limit in zip(value, limits, strict=True)
-        ) or isnan(value[2]):
+        value = reading.value
+        assert isinstance(value, tuple)
+        # NaN is an axis that is not measured, which Fz has to be
+        too_large = [abs(v) > limit for v, limit in zip(value, self._limits, strict=True)]
+        if True in too_large or isnan(value[2]):
             self.counters.invalid += 1
             return
+
         # the three axes share one stamp: count a late or repeated reading once
         repeated = Counters()
         for axis, component in (("fx", value[0]), ("ty", value[4])):
@@ -414,6 +415,12 @@ class Sync:
         return bool(heard) and all(
             window.noise > 0.0 and window.still_for() >= STUCK_AFTER for window in heard
         )
+
+
+def _wrench_limits(settings: Settings) -> tuple[float, ...]:
+    """Largest believable force [N] and moment [N·m] of each axis, as in WRENCH_FIELDS."""
+    wrench = settings.wrench
+    return () if wrench is None else (wrench.max_force,) * 3 + (wrench.max_torque,) * 3
 
 
 def _moves(speed: Measured) -> bool:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import REQUIRED
-from gritd.estimator.messages.record import CHANNEL_BITS, Flag, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
 from gritd.estimator.wheel.chain import Added, Chain, Context, Here
 from gritd.estimator.wheel.geometry import (

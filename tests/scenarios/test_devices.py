@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from gritd.estimator.messages.record import CHANNEL_BITS, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Status
 from tests.drivers.test_framing_serial import damage
 from tests.scenarios.rig import WIRES, driven, rows, service, verified
 

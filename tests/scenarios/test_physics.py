@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.messages.record import TICK_NAMES, Status
+from gritd.estimator.messages.status import Status
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.wheel.geometry import entry_angle

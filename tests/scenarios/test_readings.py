@@ -13,7 +13,8 @@ from gritd.drivers.build import build_decoder
 from gritd.drivers.can_link import packed
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.record import CHANNEL_BITS, TICK_NAMES, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Status
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.estimator.wheel.sync import Sync

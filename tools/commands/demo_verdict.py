@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.config.configuration import loads
-from gritd.estimator.messages.record import TICK_NAMES
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.offline.playback import played
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.cdr import Rows

@@ -12,11 +12,11 @@ import numpy as np
 
 from gritd.estimator.config.configuration import Configuration, load, loads
 from gritd.estimator.config.settings import ENGINES, Settings, settings_of_run
-from gritd.estimator.messages.record import TICK_FIELDS, TICK_NAMES, Status
+from gritd.estimator.messages.status import Status
+from gritd.estimator.messages.tick import TICK_FIELDS, TICK_NAMES, TickRow
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import RecordedTick, played, without_absent
 from gritd.estimator.offline.rerun import Rerun
-from gritd.estimator.online.pipeline import TickRecord
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
@@ -138,7 +138,7 @@ class Differences:
                 f"checkpoint before the tick at {stamp}: not the state that the ticks before it lead to"
             )
 
-    def compare(self, logged: TickRecord, computed: TickRecord) -> None:
+    def compare(self, logged: TickRow, computed: TickRow) -> None:
         self.compared += 1
         encode = TICK_TOPIC.codec.encode
         if encode(logged) == encode(computed):

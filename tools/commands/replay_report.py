@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gritd.estimator.messages.record import Flag, Status
+from gritd.estimator.messages.status import Flag, Status
 
 Rows = NDArray[np.void]  # structured: fields of /tick, one row a tick or one a window
 SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))

@@ -33,8 +33,8 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.config.settings import ENGINES, Settings
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.record import TICK_NAMES
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline, State
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.run_writer import RunWriter

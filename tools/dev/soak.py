@@ -30,7 +30,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import ENGINES, Rates, Settings
 from gritd.estimator.messages.readings import ENCODERS, NS, Reading
-from gritd.estimator.messages.record import TICK_NAMES
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import DONE, FAILED, Parser

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from gritd.estimator.messages.record import Status
+from gritd.estimator.messages.status import Status
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.terramechanics.soil import Array
 

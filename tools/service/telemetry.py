@@ -13,7 +13,8 @@ from typing import Any
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader
 from gritd.estimator.daemon.daemon import Daemon
-from gritd.estimator.messages.record import CHANNEL_BITS, TICK_NAMES, Flag, Status
+from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
+from gritd.estimator.messages.tick import TICK_NAMES
 
 Report = dict[str, Any]
 

@@ -22,7 +22,8 @@ from gritd.estimator.daemon.daemon import INFO, WARNING, WATCH, Daemon, DaemonEr
 from gritd.estimator.daemon.loop import Change
 from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import Publisher
-from gritd.estimator.messages.record import TICK_NAMES, Flag, Status
+from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.recording.retention import trim
 
 TIDY = 5.0  # [s] between looks at the disk

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from gritd.estimator.daemon.disagreement import Watch
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.record import TICK_NAMES, Flag
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.tools.commands.status import summary
 from tests.estimator.filter.test_tracker import RIG, TRUTH

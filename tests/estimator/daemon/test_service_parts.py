@@ -27,8 +27,8 @@ from gritd.estimator.daemon.lock import LockError, locked
 from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
 from gritd.estimator.messages.readings import Reading
-from gritd.estimator.messages.record import CHANNEL_BITS
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.retention import sweep, trim
 from gritd.estimator.recording.salvage import read

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Rates, Uncertain
-from gritd.estimator.messages.record import TICK_NAMES, Flag, Status
+from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from tests.linear_plant import ONE_LOAD, THREE_LOADS, readings
 from tests.rig import CHANNELS, SETTINGS, WRENCH, calibration

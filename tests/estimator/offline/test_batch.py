@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from gritd.estimator.config.settings import Rates
 from gritd.estimator.messages.readings import CHANNELS, NS, Reading
-from gritd.estimator.messages.record import TICK_NAMES, Flag
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.offline.batch import ESTIMATES, SIGNALS, estimates, signals, window_ends
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.offline.batch import ESTIMATES, estimates, window_ends
 from gritd.estimator.offline.playback import played as replayed
 from gritd.estimator.offline.snapshots import Played, Stream, snapshots
 from gritd.estimator.online.pipeline import Pipeline
@@ -211,18 +212,6 @@ def test_estimates_are_those_of_the_ticks_at_window_ends(tmp_path, with_ticks, w
             np.testing.assert_allclose(
                 rows[name], at_ends[name], rtol=1e-9, atol=floor, err_msg=name
             )
-
-
-@pytest.mark.parametrize("every_tick", [True, False])
-def test_signals_are_those_of_the_ticks(tmp_path, every_tick):
-    rig = replace(SETTINGS, wrench=WRENCH)
-    recording = recorded(tmp_path / "run.mcap", rig, with_ticks=False)
-    ticks = by_ticks(rig, recording)
-    rows = signals(rig, recording, every_tick)
-    at = ticks[np.isin(ticks["evaluated"], rows["evaluated"])]
-    assert len(rows) == len(at) and (len(at) == len(ticks)) == every_tick
-    for name in SIGNALS:
-        np.testing.assert_allclose(rows[name], at[name], rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 def test_both_engines_take_a_recording_at_once(tmp_path):

@@ -11,7 +11,7 @@ from gritd.config import packaged
 from gritd.estimator.config.configuration import load
 from gritd.estimator.config.settings import ConfiguredEffect, Rates, Uncertain
 from gritd.estimator.effects import EFFECTS
-from gritd.estimator.messages.record import TICK_NAMES
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.tools.commands.simulate import simulate_run, soil_of
 from gritd.tools.testbed.fingerprints import typical

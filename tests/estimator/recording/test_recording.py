@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mcap.records import ChunkIndex
 
 from gritd.estimator.messages.readings import CHANNELS, Reading
-from gritd.estimator.messages.record import TICK_FIELDS
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.recording.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
 from gritd.estimator.recording.chunk_index import ChunkIndexes
 from gritd.estimator.recording.mcapfile import RecordingError, record_bytes

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.estimator.messages.readings import NS, Reading
-from gritd.estimator.messages.record import CHANNEL_BITS
+from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.wheel.sync import Sync
 from tests.rig import SETTINGS, readings_of
 

@@ -16,7 +16,8 @@ from gritd.config import packaged
 from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
 from gritd.estimator.config import configuration as config
-from gritd.estimator.messages.record import TICK_NAMES, Status
+from gritd.estimator.messages.status import Status
+from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.tools.commands import simulate
 from gritd.tools.testbed import plant, rig_config

@@ -429,7 +429,7 @@ def test_sigterm_under_load(tmp_path, seed, figure):
 
 
 SLOW_MEDIUM = """
-import time, estimator.recording.syncer as m
+import time, gritd.estimator.recording.syncer as m
 began, sync = time.monotonic(), m.sync
 def waiting(file):
     if time.monotonic() > began + 3.0: time.sleep(3600)

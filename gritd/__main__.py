@@ -2,7 +2,7 @@
 
 import sys
 
-from gritd.tools.cli.main import main
+from gritd.tools.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

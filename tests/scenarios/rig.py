@@ -29,7 +29,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TOPICS
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay
-from gritd.tools.commands.status import connected, reports
+from gritd.tools.service.client import connected, reports
 from gritd.tools.testbed import rig_config
 from gritd.tools.testbed.testbed import experiment, in_transit, play
 from gritd.tools.testbed.wires import Rig, has_multicast, messages, slcan_line
@@ -219,8 +219,8 @@ class DaemonProcess:
         if watchdog:
             environment["WATCHDOG_USEC"] = str(int(watchdog * 1e6))
         becoming = "" if user is None else BECOMING.format(user=user, config=str(config))
-        code = f"{becoming}\n{prelude}\nimport sys, gritd.tools.commands.run, gritd.tools.service.serve, gritd.tools.cli.main\nprint('loaded', flush=True)\n"
-        code += "sys.exit(gritd.tools.cli.main.main(sys.argv[1:]))"
+        code = f"{becoming}\n{prelude}\nimport sys, gritd.tools.commands.run, gritd.tools.service.serve, gritd.tools.main\nprint('loaded', flush=True)\n"
+        code += "sys.exit(gritd.tools.main.main(sys.argv[1:]))"
         command = ["--config", str(config), "--socket", self.socket, "--status", "0"]
         self.process = subprocess.Popen(
             [sys.executable, "-c", code, "run", *command, *arguments],

@@ -154,9 +154,9 @@ def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
     root can read.
     """
     nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
-    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, gritd.tools.cli.main, gritd.tools.commands.run"
+    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys, gritd.tools.main, gritd.tools.commands.run"
     becoming = f"os.setgroups([]); os.setgid({nobody}); os.setuid({nobody})"
-    code = f"{loaded}; {becoming}; sys.exit(gritd.tools.cli.main.main(sys.argv[1:]))"
+    code = f"{loaded}; {becoming}; sys.exit(gritd.tools.main.main(sys.argv[1:]))"
     with Wires(folder_of_nobody, logging={"directory": str(logs)}) as wires:
         logs.mkdir(mode=0o555)
         began = time.monotonic()
@@ -242,7 +242,7 @@ def test_killed_while_logging(tmp_path, seed, figure):
 
 WRITER = """
 import mmap, os, struct, sys, time
-from gritd.estimator.daemon.daemon import real_time
+from gritd.estimator.daemon.scheduling import real_time
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.writer import WriterThread
 from gritd.estimator.messages.readings import Reading

@@ -22,7 +22,7 @@ import pytest
 from gritd.estimator.daemon.publish import MAX_CLIENTS
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
-from gritd.tools.commands.status import connected, reports
+from gritd.tools.service.client import connected, reports
 from tests.scenarios.rig import (
     LIMIT,
     ROOT,

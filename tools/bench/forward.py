@@ -22,9 +22,9 @@ from gritd.estimator.model import balance
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import ContactLaw
 from gritd.estimator.terramechanics.soil import Soil, Wheel
-from gritd.tools.commands.simulate import soil_of
 from gritd.tools.testbed.fingerprints import typical
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import soil_of
 
 RATE = 250.0  # [Hz]
 ONE_OF_EACH = (

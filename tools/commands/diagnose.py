@@ -26,7 +26,6 @@ from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.terminal import control
 from gritd.tools.commands import diagnose_campaigns as campaigns
-from gritd.tools.commands import diagnose_redo as redo
 from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.innovations import with_innovations
@@ -34,6 +33,7 @@ from gritd.tools.diagnose.explain.result import Diagnosis, NextExperiment
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, read_all
+from gritd.tools.report import record
 
 
 def main(argv: Sequence[str]) -> int:
@@ -73,16 +73,16 @@ def _again(arguments: argparse.Namespace) -> int:
             "diagnose --redo: expected no recordings, --config or --seed: they are in the file",
             USAGE,
         )
-    then = redo.read(arguments.redo, arguments.data)
-    redo.check(then)
+    then = record.read(arguments.redo, arguments.data)
+    record.check(then)
     configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
     found, _ = of_files(
         list(then.files), configuration, then.seed, _said, arguments.jobs, then.command
     )
     _write(arguments, found, configuration)
-    differs = list(redo.differences(then, redo.Record.of(found)))
+    differs = list(record.differences(then, record.Record.of(found)))
     print(text(found))
-    for line in redo.changed_versions(then):
+    for line in record.changed_versions(then):
         print(f"note: computed with {line}")
     print(f"redone: {'; '.join(differs) or f'the same as in {arguments.redo}'}")
     return FAILED if differs else DONE

@@ -12,7 +12,7 @@ from pathlib import Path
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.files import unwritten
-from gritd.tools.importers.registry import rigs
+from gritd.tools.importers.registry import importers
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,7 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     args = _parser().parse_args(argv)
     try:
-        written = rigs()[args.rig].run(args, lambda line: print(line, flush=True))
+        written = importers()[args.rig].run(args, lambda line: print(line, flush=True))
     except RecordingError as error:
         raise unwritten(error) from None
     for path in written:
@@ -35,7 +35,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Other rigs' public data to recordings; see docs/importing.md.",
     )
     commands = parser.add_subparsers(dest="rig", metavar="RIG", required=True)
-    for name, rig in rigs().items():
+    for name, rig in importers().items():
         command = commands.add_parser(name, help=rig.SUMMARY, description=rig.SUMMARY)
         command.add_argument(
             "paths", nargs="+", type=Path, metavar="PATH", help="files, or folders to search"

@@ -12,14 +12,8 @@ from typing import Any
 
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.terminal import control
-from gritd.tools.commands.status import (
-    Report,
-    add_socket,
-    connected,
-    disagreement,
-    reports,
-    told,
-)
+from gritd.tools.commands.status import disagreement
+from gritd.tools.service.client import Report, add_socket, connected, reports, told
 
 EVERY = 0.2  # [s] between pictures
 OPEN, CLOSE = (

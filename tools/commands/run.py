@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
 from gritd.estimator.daemon.lock import LockError, locked
 from gritd.tools.cli.command import FAILED, CommandError, Parser, file_name, number, whole
+from gritd.tools.service.client import SOCKET
 
 if TYPE_CHECKING:
     from gritd.estimator.messages.run_info import RunInfo
-
-SOCKET = "gritd.sock"
 
 
 def main(argv: Sequence[str]) -> int:

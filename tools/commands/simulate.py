@@ -5,10 +5,8 @@ files beside it.
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from math import sqrt
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,30 +17,21 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config import units
 from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.schema import Quantity
-from gritd.estimator.config.settings import Calibration, Channel, Settings, Wrench
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
-from gritd.estimator.messages.readings import ENCODERS, WRENCH_FIELDS, Reading
+from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.model.forward import Response, simulate_arrays
 from gritd.estimator.offline.measured import measured_run
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.stages.situation import Motion
-from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.files import recording as recorded
 from gritd.tools.cli.files import unwritten, vacant
 from gritd.tools.testbed import schedule as schedules
+from gritd.tools.testbed.run_files import write, write_truth
+from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 
-START = 1_767_225_600_000_000_000  # [ns] 2026-01-01: a recording made twice is the same to the byte
-NS = 1_000_000_000
-TRANSPORT = 1_000_000  # [ns] from a stamp to its receipt
-ADC_STEPS = 1 << 16  # over the channel's valid range
-AMBIENT = 21.0  # [°C]
-# [count²] variance of rounding to whole counts; the stated noise of an encoder includes it
-ROUNDING = 1.0 / 12.0
-SPARSE = 250  # samples from one temperature to the next
 SOIL_VALUES = {  # with the bounds that they have in a configuration
     "cohesion": Quantity("Pa", low=0.0, high=1e6),
     "tan_phi": Quantity("", above=0.0, high=5.0),
@@ -51,155 +40,6 @@ SOIL_VALUES = {  # with the bounds that they have in a configuration
     "modulus_factor": Quantity("", above=0.0, high=100.0),
 }
 MOST_SAMPLES = 1_800_000  # 2 h at 250 Hz: the run is made in memory, 1.9 kB a sample
-
-
-@dataclass(frozen=True)
-class Run:
-    """A simulated run: what the controller was told, what happened, and what the sensors sent."""
-
-    motion: Motion
-    response: Response
-    readings: list[Reading]
-
-
-def simulate_run(
-    settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect], seed: int
-) -> Run:
-    """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
-    constant = settings.drive.torque_constant.value
-    response = simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
-    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
-
-
-def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> Soil:
-    """The configured soil, with some of its values replaced; modulus_factor multiplies K."""
-    prior, changed = settings.soil, dict(changed or {})
-    factor = changed.pop("modulus_factor", 1.0)
-    soil = Soil(
-        cohesion=prior.cohesion.value,
-        tan_phi=prior.tan_phi.value,
-        shear_modulus=prior.shear_modulus.value,
-        exponent=prior.exponent.value,
-        modulus=prior.pressure_sinkage.modulus(settings.wheel.width) * factor,
-    )
-    return replace(soil, **changed)
-
-
-# ---- sensors -------------------------------------------------------------------------------------
-# ------------------
-
-
-def readings(
-    settings: Settings, motion: Motion, response: Response, rng: np.random.Generator
-) -> list[Reading]:
-    """What the channels send, in order of receipt: calibration undone, latency, noise, counts and
-    ADC steps.
-    """
-    values = {
-        "wheel_encoder": np.asarray(motion.wheel_angle),
-        "carriage_encoder": np.asarray(motion.carriage_position) / settings.pulley_radius,
-        "sinkage_pot": np.asarray(response.sensed.sinkage),
-        "motor_shunt": np.asarray(response.sensed.current),
-        "motor_temperature": np.full(np.shape(motion.time), AMBIENT),
-    }
-    sent = []
-    for name, channel in settings.channels.items():
-        some = slice(None, None, SPARSE if name == "motor_temperature" else 1)
-        sent.append(_channel(channel, np.asarray(motion.time)[some], values[name][some], rng))
-    if settings.wrench is not None:
-        sent.append(_wrench(settings.wrench, np.asarray(motion.time), response, rng))
-    return sorted(
-        (reading for channel in sent for reading in channel), key=lambda r: (r.received, r.channel)
-    )
-
-
-def _channel(
-    channel: Channel, time: Array, physical: Array, rng: np.random.Generator
-) -> Iterable[Reading]:
-    counted = channel.name in ENCODERS
-    noise = sqrt(max(channel.noise**2 - ROUNDING, 0.0)) if counted else channel.noise
-    raw = _raw(channel.calibration, physical) + noise * rng.standard_normal(time.size)
-    stamps = _stamps(time, channel.latency)
-    if counted:
-        counts = np.rint(raw).astype(np.int64).tolist()
-        return [
-            Reading(s, channel.name, count, s + TRANSPORT)
-            for s, count in zip(stamps, counts, strict=True)
-        ]
-    step = (channel.high - channel.low) / ADC_STEPS
-    volts = np.clip(
-        channel.low + step * np.rint((raw - channel.low) / step), channel.low, channel.high
-    ).tolist()
-    return [
-        Reading(s, channel.name, value, s + TRANSPORT)
-        for s, value in zip(stamps, volts, strict=True)
-    ]
-
-
-def _wrench(
-    wrench: Wrench, time: Array, response: Response, rng: np.random.Generator
-) -> Iterable[Reading]:
-    sensed = response.sensed
-    axes = dict.fromkeys(WRENCH_FIELDS, np.zeros(time.size))
-    axes["fx"] = _raw(wrench.drawbar_pull, np.asarray(sensed.drawbar_pull))
-    axes["fz"] = _raw(wrench.load, np.asarray(sensed.load))
-    axes["ty"] = _raw(wrench.torque, np.asarray(sensed.torque))
-    noise = np.repeat([wrench.force_noise, wrench.torque_noise], 3)
-    noisy = (
-        axes[name] + sigma * rng.standard_normal(time.size)
-        for name, sigma in zip(WRENCH_FIELDS, noise, strict=True)
-    )
-    six = np.stack(list(noisy), axis=1).tolist()
-    stamps = _stamps(time, wrench.latency)
-    return [
-        Reading(s, "wrench", tuple(row), s + TRANSPORT) for s, row in zip(stamps, six, strict=True)
-    ]
-
-
-def _raw(calibration: Calibration, physical: Array) -> Array:
-    raw: Array = (physical - calibration.offset.value) / calibration.scale.value
-    return raw
-
-
-def _stamps(time: Array, latency: float) -> list[int]:
-    stamps: list[int] = (START + np.rint((time + latency) * NS).astype(np.int64)).tolist()
-    return stamps
-
-
-# ---- files ---------------------------------------------------------------------------------------
-# ------------------
-
-
-def write(path: Path, configuration: config.Configuration, info: RunInfo, run: Run) -> None:
-    """The recording, raw topics only. Raises RecordingError."""
-    writer = RunWriter(path, (), configuration.text, info)
-    try:
-        for reading in run.readings:
-            writer.reading(reading)
-    finally:
-        writer.close()
-
-
-def write_truth(
-    path: Path, settings: Settings, soil: Soil, acting: Sequence[Effect], run: Run, seed: int
-) -> None:
-    """PATH.truth.json with soil, effects and seed; PATH.truth.npz with the true arrays."""
-    said = {
-        "wheel": asdict(settings.wheel),
-        "soil": asdict(soil),
-        "effects": {effect.name: asdict(effect) for effect in acting},
-        "seed": seed,
-        "overloaded_samples": int(run.response.overloaded.sum()),
-    }
-    path.with_suffix(".truth.json").write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
-    sensed = {f"sensed_{name}": value for name, value in vars(run.response.sensed).items()}
-    arrays = {**sensed, **vars(run.motion), **vars(run.response)}
-    kept = {name: value for name, value in arrays.items() if name != "sensed" and value is not None}
-    np.savez_compressed(path.with_suffix(".truth.npz"), **kept)
-
-
-# ---- command -------------------------------------------------------------------------------------
-# ------------------
 
 
 def main(argv: Sequence[str]) -> int:

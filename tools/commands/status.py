@@ -5,24 +5,13 @@ Prometheus.
 from __future__ import annotations
 
 import json
-import os
-import socket
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from gritd.estimator.visible import visible
-from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser
-from gritd.tools.commands.run import SOCKET
-
-PLACES = (Path("/run/gritd") / SOCKET, Path("runs") / SOCKET)
-PATIENCE = 10.0  # [s] with a daemon, or a computer, that is held up
-MAX_LINE = 1 << 20  # [bytes] of a report
-NO_GRITD = "what answers on this socket is no gritd"
-
-Report = dict[str, Any]
+from gritd.tools.cli.command import DONE, FAILED, Parser
+from gritd.tools.service.client import Report, add_socket, connected, reports, told
 
 # metric -> (type, help, path in the report)
 METRICS = {
@@ -81,80 +70,10 @@ def _parser() -> Parser:
     return parser
 
 
-def add_socket(parser: Parser) -> None:
-    """The option that says where the daemon is."""
-    places = ", then ".join(map(str, PLACES))
-    parser.add_argument(
-        "--socket", metavar="PATH", help=f"the daemon's status socket (default: {places})"
-    )
-
-
 def _text(arguments: Namespace, report: Report) -> str:
     if arguments.json:
         return json.dumps(report, indent=2)
     return "\n".join(told(prometheus if arguments.prometheus else summary, report))
-
-
-def told(form: Callable[[Report], Iterator[str]], report: Report) -> list[str]:
-    """A report in lines, whoever sent it. Raises CommandError where a field is missing."""
-    try:
-        return [visible(line) for line in form(report)]
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        raise CommandError(NO_GRITD) from None
-
-
-# --- the socket -----------------------------------------------------------------------------------
-# ------------------
-
-
-def connected(given: str | None) -> socket.socket:
-    """A connection to the daemon. Raises CommandError."""
-    path = Path(given) if given else next((place for place in PLACES if place.exists()), PLACES[-1])
-    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    connection.settimeout(PATIENCE)
-    try:
-        connection.connect(os.fsencode(path))
-    except OSError as error:
-        connection.close()
-        raise CommandError(
-            f"{path}: no daemon answers: {(error.strerror or str(error)).lower()}"
-        ) from None
-    return connection
-
-
-def reports(connection: socket.socket) -> Iterator[Report]:
-    """The reports as they come. Raises CommandError where the daemon ends or is silent."""
-    waiting = b""
-    while True:
-        line, found, rest = waiting.partition(b"\n")
-        if found:
-            waiting = rest
-            yield _parsed(line)
-        else:
-            waiting += _more(connection, MAX_LINE - len(waiting))
-
-
-def _more(connection: socket.socket, room: int) -> bytes:
-    try:
-        data = connection.recv(min(1 << 16, room))
-    except OSError as error:
-        raise CommandError(f"the daemon is silent: {str(error).lower()}") from None
-    if not data:
-        raise CommandError("the daemon has ended")
-    return data
-
-
-def _parsed(line: bytes) -> Report:
-    try:
-        report = json.loads(line)
-    except (ValueError, RecursionError):
-        report = None
-    if (
-        not isinstance(report, dict)
-        or not {"healthy", "status", "tick", "loop", "log", "devices"} <= report.keys()
-    ):
-        raise CommandError(NO_GRITD)
-    return report
 
 
 # --- the forms ------------------------------------------------------------------------------------

@@ -33,13 +33,13 @@ from gritd.estimator.messages.readings import ENCODERS, NS, Reading
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.threads.stop_request import StopRequest
+from gritd.tools.cli.child import Child
 from gritd.tools.cli.command import DONE, FAILED, Parser
-from gritd.tools.cli.main import guarded
-from gritd.tools.commands.demo import Child
-from gritd.tools.commands.simulate import readings
-from gritd.tools.commands.status import connected, reports
+from gritd.tools.cli.guard import guarded
+from gritd.tools.service.client import connected, reports
 from gritd.tools.testbed import plant
 from gritd.tools.testbed.schedule import motion_of
+from gritd.tools.testbed.sensors import readings
 from gritd.tools.testbed.testbed import PLAYED
 
 LAP = 300.0  # [s] a simulated run, driven again and again

@@ -1,6 +1,4 @@
-"""Importers of other rigs' public data, one file a rig. A module here with the names of `Rig` is
-found by itself.
-"""
+"""What an importer offers, and all of them by name: every module of `rigs/` is one."""
 
 from __future__ import annotations
 
@@ -11,20 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol, cast
 
-SHARED = (
-    "registry",
-    "_files",
-    "_recording",
-    "_segments",
-)  # modules of this package that are no importer
+from gritd.tools.importers import rigs
 
-Progress = Callable[[str], None]
+Tell = Callable[[str], None]  # takes a line for the user
 
 
-class Rig(Protocol):
-    """What a module of this folder offers. `run` gets `paths` and `output` beside its own
-    arguments.
-    """
+class Importer(Protocol):
+    """A module of `rigs/`. `run` gets `paths` and `output` beside its own arguments."""
 
     NAME: str
     SUMMARY: str
@@ -34,26 +25,14 @@ class Rig(Protocol):
         """Options of this rig alone."""
 
     @staticmethod
-    def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+    def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         """Write the recordings and their configuration; returns what was written. Raises
         RigFileError.
         """
 
 
-def rigs() -> dict[str, Rig]:
-    """Every importer by its name; the modules of SHARED are none."""
-    folder = str(Path(__file__).parent)
-    names = sorted(info.name for info in pkgutil.iter_modules([folder]) if info.name not in SHARED)
-    modules = (cast(Rig, importlib.import_module(f"{__package__}.{name}")) for name in names)
+def importers() -> dict[str, Importer]:
+    """Every importer by its name."""
+    names = sorted(module.name for module in pkgutil.iter_modules(rigs.__path__))
+    modules = (cast(Importer, importlib.import_module(f"{rigs.__name__}.{name}")) for name in names)
     return {module.NAME: module for module in modules}
-
-
-def positive(text: str) -> float:
-    """A command-line number that is finite and above zero. Raises ArgumentTypeError."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number above 0")
-    return value

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from gritd.tools.cli.wording import listed, number, percent, shown, spaced
-from gritd.tools.commands import diagnose_redo as diagnosed
 from gritd.tools.diagnose.explain.result import (
     STRAINED,
     Diagnosis,
@@ -19,7 +18,7 @@ from gritd.tools.diagnose.explain.result import (
     SoilFit,
     Trace,
 )
-from gritd.tools.report import figures, hypotheses, redo, tables
+from gritd.tools.report import figures, hypotheses, record, redo, tables
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
     counted,
@@ -340,7 +339,7 @@ def _again(found: Diagnosis, name: str) -> list[Markup] | None:
         return None
     command = shlex.join(["gritd", "diagnose", "--redo", name])
     said = "This page holds what it takes beside the recordings: they are checked by their hashes, and results compared."
-    embedded = tag("pre", diagnosed.as_json(found), id=diagnosed.EMBEDDED, hidden="hidden")
+    embedded = tag("pre", record.as_json(found), id=record.EMBEDDED, hidden="hidden")
     return [paragraph(said), tag("pre", command, class_="command"), embedded]
 
 

@@ -18,8 +18,9 @@ from gritd.estimator.model.forward import Response
 from gritd.estimator.stages.situation import Motion, Sensed, situation_of
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.commands.simulate import Run, readings, simulate_run, soil_of
 from gritd.tools.testbed.schedule import Schedule, Segment
+from gritd.tools.testbed.sensors import readings
+from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 
 PlantKind = Literal["original", "linear"]
 

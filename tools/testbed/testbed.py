@@ -31,11 +31,12 @@ from gritd.estimator.messages.readings import Reading
 from gritd.estimator.terramechanics.soil import Soil
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import DONE, Parser, number, whole
-from gritd.tools.cli.main import guarded
-from gritd.tools.commands import simulate
-from gritd.tools.testbed import plant, rig_config
+from gritd.tools.cli.guard import guarded
+from gritd.tools.testbed import plant, rig_config, run_files
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.schedule import motion_of
+from gritd.tools.testbed.sensors import START
+from gritd.tools.testbed.simulation import Run
 from gritd.tools.testbed.wires import CanKind, Rig
 
 NS = 1_000_000_000
@@ -54,7 +55,7 @@ class Experiment:
 
     configuration: Configuration
     soil: Soil
-    run: simulate.Run
+    run: Run
     plant: PlantKind
     seed: int
 
@@ -93,7 +94,7 @@ def in_transit(readings: Iterable[Reading], seed: int) -> list[Reading]:
     sent = list(readings)
     rng = np.random.default_rng(seed)
     delays = np.minimum(rng.exponential(JITTER, len(sent)), LONGEST_JITTER) * NS
-    zero = simulate.START
+    zero = START
     moved = [
         Reading(r.stamp - zero, r.channel, r.value, r.received - zero + int(delay))
         for r, delay in zip(sent, delays, strict=True)
@@ -150,7 +151,7 @@ def write_truth(folder: Path, prepared: Experiment) -> None:
     """testbed.truth.json and testbed.truth.npz, as `gritd simulate` writes them."""
     settings = prepared.configuration.settings
     acting = effects.configured(settings.effects)
-    simulate.write_truth(
+    run_files.write_truth(
         folder / NAME, settings, prepared.soil, acting, prepared.run, prepared.seed
     )
 

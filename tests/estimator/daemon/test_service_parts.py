@@ -37,6 +37,7 @@ from gritd.estimator.threads import waiting
 from gritd.estimator.threads.pulse import Pulse, silent
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import monitor, status
+from gritd.tools.service import client
 
 ROOT = Path(__file__).parents[3]
 REPORT = {
@@ -278,8 +279,8 @@ def test_the_socket_is_for_user_and_group_only(publisher):
 
 def test_reports_are_lines_of_strict_json_ten_a_second_at_most(publisher):
     start = time.monotonic()
-    with status.connected(str(publisher.path)) as connection:
-        for _, report in zip(range(4), status.reports(connection), strict=False):
+    with client.connected(str(publisher.path)) as connection:
+        for _, report in zip(range(4), client.reports(connection), strict=False):
             assert report == json.loads(json.dumps(REPORT))
     assert time.monotonic() - start >= 0.3
     assert line_of({"a": [math.nan, math.inf, 1.5]}) == b'{"a":[null,null,1.5]}\n'
@@ -288,8 +289,8 @@ def test_reports_are_lines_of_strict_json_ten_a_second_at_most(publisher):
 def test_a_client_that_does_not_read_is_left_and_others_are_served(publisher, monkeypatch):
     lines = {"text": "x" * 40_000, **REPORT}
     monkeypatch.setattr(publisher, "_report", lambda: lines)
-    with status.connected(str(publisher.path)), status.connected(str(publisher.path)) as eager:
-        served = iter(status.reports(eager))
+    with client.connected(str(publisher.path)), client.connected(str(publisher.path)) as eager:
+        served = iter(client.reports(eager))
         while len(publisher._clients) != 1:
             assert next(served)["pid"] == 1
         assert next(served)["pid"] == 1 and publisher.alive
@@ -298,11 +299,11 @@ def test_a_client_that_does_not_read_is_left_and_others_are_served(publisher, mo
 def test_more_clients_than_there_is_room_for_are_turned_away(publisher):
     connections = []
     for _ in range(MAX_CLIENTS):
-        connections.append(status.connected(str(publisher.path)))
-        assert next(status.reports(connections[-1]))["pid"] == 1
-    with status.connected(str(publisher.path)) as late, pytest.raises(CommandError):
-        next(status.reports(late))
-    assert next(status.reports(connections[0]))["pid"] == 1
+        connections.append(client.connected(str(publisher.path)))
+        assert next(client.reports(connections[-1]))["pid"] == 1
+    with client.connected(str(publisher.path)) as late, pytest.raises(CommandError):
+        next(client.reports(late))
+    assert next(client.reports(connections[0]))["pid"] == 1
     for connection in connections:
         connection.close()
 
@@ -356,10 +357,10 @@ def test_what_is_no_daemon_is_one_line(tmp_path, line):
     with socket.socket(socket.AF_UNIX) as other:
         other.bind(str(path))
         other.listen()
-        connection = status.connected(str(path))
+        connection = client.connected(str(path))
         other.accept()[0].sendall(line)
         with connection, pytest.raises(CommandError, match="no gritd"):
-            next(status.reports(connection))
+            next(client.reports(connection))
 
 
 def test_the_monitor_shows_channels_devices_and_log(publisher, capsys):

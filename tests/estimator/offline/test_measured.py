@@ -16,8 +16,9 @@ from gritd.estimator.offline.measured import SENSED, MeasuredRun, measured_run
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
-from gritd.tools.commands.simulate import Run, simulate_run, soil_of, write
+from gritd.tools.testbed.run_files import write
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 
 CONFIGURATION = config.load(packaged())
 SETTINGS = CONFIGURATION.settings

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.commands.simulate import simulate_run, soil_of
 from gritd.tools.testbed.plant import schedule
 from gritd.tools.testbed.schedule import motion_of
+from gritd.tools.testbed.simulation import simulate_run, soil_of
 from tests.estimator.online.test_online import SETTINGS, last_tick
 
 MOTION = motion_of(schedule(60.0), SETTINGS.wheel.radius, 50.0)

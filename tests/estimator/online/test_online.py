@@ -13,10 +13,10 @@ from gritd.estimator.config.settings import ConfiguredEffect, Rates, Uncertain
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.tools.commands.simulate import simulate_run, soil_of
 from gritd.tools.testbed.fingerprints import typical
 from gritd.tools.testbed.plant import schedule
 from gritd.tools.testbed.schedule import motion_of
+from gritd.tools.testbed.simulation import simulate_run, soil_of
 
 TESTBED = load(packaged()).settings
 SETTINGS = replace(

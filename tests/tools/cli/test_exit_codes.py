@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gritd.config import packaged
-from gritd.tools.cli import main as cli
+from gritd.tools import main as cli
 
 CONFIG = ["--config", str(packaged())]
 COMMANDS = {

@@ -13,9 +13,10 @@ import pytest
 
 from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.estimator.threads.stop_request import StopRequest
+from gritd.tools.cli.child import Child
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import demo
-from gritd.tools.commands import demo_verdict as verdict
+from gritd.tools.commands import demo_targets as targets
 from gritd.tools.report import figure
 from tests.drivers.rig import wait_until
 
@@ -91,7 +92,7 @@ def test_a_child_that_dies_is_named_with_its_last_words():
         pytest.raises(
             CommandError, match=r"the daemon ended early \(exit 2\): gritd: nowhere.yaml: .*"
         ),
-        demo.Child(StopRequest(), "daemon", "gritd", "run", "--config", "nowhere.yaml") as child,
+        Child(StopRequest(), "daemon", "gritd", "run", "--config", "nowhere.yaml") as child,
     ):
         child.wait_for("device ", 120.0)
 
@@ -123,8 +124,8 @@ def ticks_ending(seconds=60.0, n=200, **last):
 
 
 def test_a_run_within_its_targets_is_praised():
-    found = verdict.judge(ticks_ending(cohesion=830.0, tan_phi=0.605), TRUTH, "linear")
-    assert verdict.reasons(found) == [] and verdict.praise(found) == "all targets met"
+    found = targets.judge(ticks_ending(cohesion=830.0, tan_phi=0.605), TRUTH, "linear")
+    assert targets.reasons(found) == [] and targets.praise(found) == "all targets met"
 
 
 @pytest.mark.parametrize(
@@ -138,18 +139,18 @@ def test_a_run_within_its_targets_is_praised():
     ],
 )
 def test_a_missed_target_is_named_with_its_reason(plant, last, reason):
-    found = verdict.judge(ticks_ending(**last), TRUTH, plant)
-    assert reason in verdict.reasons(found)
-    assert any("missed" in line for line in verdict.table(found))
+    found = targets.judge(ticks_ending(**last), TRUTH, plant)
+    assert reason in targets.reasons(found)
+    assert any("missed" in line for line in targets.table(found))
 
 
 def test_a_short_run_is_not_held_to_targets():
-    found = verdict.judge(ticks_ending(seconds=20.0, cohesion=2000.0), TRUTH, "original")
-    assert verdict.reasons(found) == [] and "not held to targets" in verdict.praise(found)
+    found = targets.judge(ticks_ending(seconds=20.0, cohesion=2000.0), TRUTH, "original")
+    assert targets.reasons(found) == [] and "not held to targets" in targets.praise(found)
 
 
 def test_the_table_shows_estimate_truth_and_error_in_percent_and_sigma():
-    lines = verdict.table(verdict.judge(ticks_ending(cohesion=830.0), TRUTH, "linear"))
+    lines = targets.table(targets.judge(ticks_ending(cohesion=830.0), TRUTH, "linear"))
     assert " ".join(lines[1].split()) == "c 830.0 ± 20.0 Pa 800.0 Pa +3.8% +1.50 5% and 2 σ: met"
     assert " ".join(lines[3].split()) == "k 25.00 ± 0.50 mm 25.00 mm +0.0% +0.00 none"
 

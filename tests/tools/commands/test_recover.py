@@ -10,7 +10,7 @@ from mcap.opcode import Opcode
 
 from gritd.estimator.recording.blocks import records
 from gritd.estimator.recording.salvage import read
-from gritd.tools.cli import main as cli
+from gritd.tools import main as cli
 from gritd.tools.commands.recover import main
 from tests.estimator.recording.test_recording import write_sample
 from tests.estimator.recording.test_salvage import write_foreign

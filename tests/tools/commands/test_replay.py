@@ -18,7 +18,7 @@ from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
-from gritd.tools.cli import main as cli
+from gritd.tools import main as cli
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay
 from tests.linear_plant import readings

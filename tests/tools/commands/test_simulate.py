@@ -19,9 +19,10 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
-from gritd.tools.commands.simulate import main, simulate_run, soil_of
+from gritd.tools.commands.simulate import main
 from gritd.tools.testbed import schedule as schedules
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import simulate_run, soil_of
 
 SHORT = """
 ramp: 200 ms

@@ -13,12 +13,12 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Soil
-from gritd.tools.commands.simulate import soil_of
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import RATE, Plan, record
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import soil_of
 
 LOADS = (40.0, 70.0, 100.0)  # [N]
 SLIPS = (0.05, 0.2, 0.45)

@@ -19,9 +19,9 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.recording import salvage
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands.import_rig import main
-from gritd.tools.importers import mgst
-from gritd.tools.importers._recording import counts
-from gritd.tools.importers.registry import rigs
+from gritd.tools.importers.recording import counts
+from gritd.tools.importers.registry import importers
+from gritd.tools.importers.rigs import mgst
 
 RIG = "20210208-165209-trio-s20-p925.rig.csv"
 SENSOR = "1-g_20-165209.processed.csv"
@@ -53,7 +53,7 @@ def complaint(*arguments: object, code: int = 3) -> str:
 
 
 def test_every_module_of_the_folder_is_a_rig() -> None:
-    found = rigs()
+    found = importers()
     assert set(found) >= {"mgst", "cmu", "emps", "table"}
     for name, rig in found.items():
         assert re.fullmatch("[a-z]+", name)

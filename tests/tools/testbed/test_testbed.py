@@ -19,9 +19,9 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
-from gritd.tools.commands import simulate
 from gritd.tools.testbed import plant, rig_config
 from gritd.tools.testbed.schedule import motion_of
+from gritd.tools.testbed.simulation import soil_of
 from gritd.tools.testbed.testbed import experiment, in_transit
 from gritd.tools.testbed.wires import Rig, has_multicast
 from tests.drivers.rig import Ticking, wait_until
@@ -239,7 +239,7 @@ def test_a_drawn_soil_is_about_a_sigma_off_and_k_10_to_15_percent(seed):
 
 def test_the_linear_plant_carries_the_load_by_eq_21():
     settings = TESTBED.settings
-    soil = simulate.soil_of(settings)
+    soil = soil_of(settings)
     motion = motion_of(plant.schedule(20.0), settings.wheel.radius, 50.0)
     response = plant.linear_response(settings, soil, motion)
     for i in range(100, motion.time.size, 97):

@@ -21,10 +21,10 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
-from gritd.tools.commands.simulate import soil_of
 from gritd.tools.diagnose.noise.colour import Colour, coloured
 from gritd.tools.diagnose.rig.signals import Signals, block_mean, doubt, slope
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import soil_of
 
 RATE, GRID = 250.0, 10.0  # [Hz]
 SECONDS = 28.0  # a run

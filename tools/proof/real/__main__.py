@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
-from gritd.tools.cli.main import guarded
+from gritd.tools.cli.guard import guarded
 from gritd.tools.proof.real import cmu, ding, emps, figure, mgst
 from gritd.tools.proof.real.bench import ROOT, Bench
 from gritd.tools.proof.real.page import page, section

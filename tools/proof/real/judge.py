@@ -20,7 +20,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Known
 from gritd.tools.diagnose.rig.signals import read_all, signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.importers._segments import DURATION, PAUSE
+from gritd.tools.importers.segments import DURATION, PAUSE
 
 RATE = 10.0  # [Hz]
 RIG_STAGES = ("testbed", "drivetrain", "sensor")  # what stands between soil and reading

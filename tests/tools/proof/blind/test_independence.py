@@ -78,7 +78,7 @@ def test_the_walk_of_imports_sees_what_is_forbidden(tmp_path: Path) -> None:
     [
         "gritd.tools.proof.blind.plant.respond",
         "gritd.tools.proof.blind.plant.sensors",
-        "gritd.tools.proof.blind.command",
+        "gritd.tools.commands.prove",
     ],
 )
 def test_nothing_judged_is_loaded_by_way_of_others(module: str) -> None:

@@ -20,7 +20,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.mcapfile import reported
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.cli.command import USAGE
-from gritd.tools.importers._files import Array, RigFileError
+from gritd.tools.importers.files import Array, RigFileError
 
 NS = 1_000_000_000
 UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measure: no information

@@ -1,4 +1,4 @@
-"""`gritd bench`: what a tick, a replay, a force, a filter update and a message cost on this
+"""What a tick, a replay, a force, a filter update and a message cost on this
 machine.
 
 Everything is measured in one run on one seeded, simulated recording. Times are processor time, so
@@ -9,15 +9,11 @@ are what to compare between runs.
 from __future__ import annotations
 
 import gc
-import json
-import os
-import platform
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
 
 import numpy as np
@@ -38,10 +34,9 @@ from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.terramechanics import linear, original, scalar
 from gritd.tools.bench import forward as forward_bench
-from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.progress import Progress
-from gritd.tools.commands.simulate import Run, simulate_run, soil_of
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 
 SEED = 2005
 RIM_SPEED = 0.02  # [m/s]
@@ -110,8 +105,7 @@ def _subject(sizes: Sizes, folder: Path) -> Subject:
     return subject
 
 
-# ---- sections ------------------------------------------------------------------------------------
-# ------------------
+# --- the sections ---
 
 
 def tick(subject: Subject) -> Figures:
@@ -257,84 +251,3 @@ def _timed(run: Callable[[], object]) -> float:
     start = process_time()
     run()
     return process_time() - start
-
-
-# ---- command -------------------------------------------------------------------------------------
-# ------------------
-
-
-def main(argv: Sequence[str]) -> int:
-    """Measure and print. Exit 0."""
-    parser = Parser(
-        prog="gritd bench",
-        description="What everything costs on this machine; about half a minute.",
-    )
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
-    arguments = parser.parse_args(argv)
-    with TemporaryDirectory(prefix="gritd-bench-") as folder:
-        figures = measure(Sizes(), Path(folder))
-    if arguments.json:
-        print(json.dumps({"machine": machine(), **figures}, indent=2))
-    else:
-        print(report(figures))
-    return DONE
-
-
-def machine() -> dict[str, str | int | float]:
-    """What this was measured on, and how busy it was."""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count() or 0,
-        "load_average": round(os.getloadavg()[0], 2),
-        "system": f"{platform.system()} {platform.release()}",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
-
-
-def _processor() -> str:
-    """The model by /proc/cpuinfo; the architecture where there is none."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    return next(
-        (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
-        platform.machine(),
-    )
-
-
-def report(figures: dict[str, Figures]) -> str:
-    """One line a figure, in units for people."""
-    on, t, r, f = machine(), figures["tick"], figures["replay"], figures["forces"]
-    u, m, w = figures["update"], figures["recording"], figures["forward_model"]
-    return "\n".join(
-        [
-            f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, {on['system']}, "
-            f"Python {on['python']}, numpy {on['numpy']}",
-            f"tick       {_µs(t['median'])} at 50 %, {_µs(t['at_99_percent'])} at 99 %: "
-            f"{t['share_of_budget']:.1%} of its period",
-            *(
-                f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to estimates, "
-                f"best {r[f'{name}_best']:.0f}"
-                for name in ENGINES
-            ),
-            f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
-            f"ratio {f['ratio']:.1f}",
-            f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])}, "
-            f"quadrature {_µs(f['quadrature_in_batch'])}: "
-            f"ratio {f['ratio_in_batch']:.1f}",
-            f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: ratio {u['ratio']:.1f} "
-            f"({u['nuisances']:.0f} nuisances)",
-            f"recording  a message: write {_µs(m['write'])}, read as arrays {_µs(m['read_as_arrays'])}, "
-            f"one by one {_µs(m['read_one_by_one'])}, {m['bytes']:.0f} bytes",
-            f"simulator  {w['speed']:.0f} times real time, with six effects {w['speed_with_six_effects']:.0f}",
-            f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature {_µs(w['balance_by_brentq'])}: "
-            f"ratio {w['balance_ratio']:.0f}",
-            "processor time, medians where not said otherwise",
-        ]
-    )
-
-
-def _µs(seconds: float) -> str:
-    return f"{seconds * 1e6:.3g} µs"

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.io import loadmat
 
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.importers._files import LARGEST, Array, RigFileError, find, increasing
-from gritd.tools.importers._recording import Stream, configuration, stamps, write
-from gritd.tools.importers._segments import START
-from gritd.tools.importers.registry import Progress
+from gritd.tools.importers.files import LARGEST, Array, RigFileError, find, increasing
+from gritd.tools.importers.recording import Stream, configuration, stamps, write
+from gritd.tools.importers.registry import Tell
+from gritd.tools.importers.segments import START
 
 NAME = "emps"
 SUMMARY = "motor drive with friction, no soil: position and motor force at 1 kHz"
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """None beyond the common ones."""
 
 
-def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a file, one configuration. Raises RigFileError, RecordingError."""
     logs = {file: read_log(file) for file, _ in find(args.paths, FILE)}
     if not logs:
@@ -49,9 +49,7 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     written = [args.output / "emps.yaml"]
     for file, log in logs.items():
         name = file.stem.lower().replace("_", "-")
-        progress(
-            f"{name}: {len(log['t'])} samples, position {np.ptp(log['qm']):.4f} m peak to peak"
-        )
+        tell(f"{name}: {len(log['t'])} samples, position {np.ptp(log['qm']):.4f} m peak to peak")
         info = RunInfo(name=name, notes="drive without soil")
         written.append(write(args.output / f"{name}.mcap", _streams(log), configured, info))
     return written

@@ -9,12 +9,11 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from gritd import __version__
-from gritd.drivers.errors import DeviceError, DeviceSettingsError
-from gritd.estimator.config.yamltree import ConfigError
-from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError, Parser
+from gritd.tools.cli.command import Parser
+from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.terminal import shown
 
 # command -> (module, what it does)
@@ -53,11 +52,11 @@ COMMANDS = {
     "import": ("gritd.tools.commands.import_rig", "other rigs' public data to recordings"),
     "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
     "prove": (
-        "gritd.tools.proof.blind.command",
+        "gritd.tools.commands.prove",
         "blind trials of diagnose against an independent plant",
     ),
     "bench": (
-        "gritd.tools.bench.bench",
+        "gritd.tools.commands.bench",
         "what a tick, a replay, a force, an update and a message cost here",
     ),
 }
@@ -79,20 +78,6 @@ def _main(given: Sequence[str]) -> int:
     return guarded(
         lambda: importlib.import_module(COMMANDS[arguments.command][0]).main(arguments.arguments)
     )
-
-
-def guarded(command: Callable[[], int | None]) -> int:
-    """The exit code of a command, whatever it raises."""
-    try:
-        code = int(command() or DONE)
-        sys.stdout.flush()
-        return code
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:
-        return _leave_pipe()
-    except Exception as error:
-        return _fail(error)
 
 
 def _speak_as_the_terminal_does() -> None:
@@ -137,32 +122,6 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         print(f"gritd {__version__}")
         parser.exit()
-
-
-def _fail(error: Exception) -> int:
-    """One line for the user, and the exit code."""
-    if os.environ.get("GRITD_TRACEBACK"):
-        raise error
-    print(f"gritd: {_one_line(error)}", file=sys.stderr)
-    if isinstance(error, CommandError):
-        return error.code
-    return USAGE if isinstance(error, ConfigError | DeviceSettingsError) else FAILED
-
-
-def _one_line(error: Exception) -> str:
-    """The message of a known error; an unexpected one says so, and how to see more."""
-    text = " ".join(str(error).split())
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror.lower()}"
-    if isinstance(error, CommandError | ConfigError | DeviceError | DeviceSettingsError | OSError):
-        return text
-    return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
-
-
-def _leave_pipe() -> int:
-    """The reader of our output has gone: say nothing, not even when Python flushes at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return DONE
 
 
 if __name__ == "__main__":

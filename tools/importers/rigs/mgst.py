@@ -19,9 +19,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.importers._files import Array, RigFileError, find, increasing, numbers, read_table
-from gritd.tools.importers._recording import UNKNOWN, Stream, configuration, counts, stamps, write
-from gritd.tools.importers.registry import Progress, positive
+from gritd.tools.cli.command import number
+from gritd.tools.importers.files import Array, RigFileError, find, increasing, numbers, read_table
+from gritd.tools.importers.recording import UNKNOWN, Stream, configuration, counts, stamps, write
+from gritd.tools.importers.registry import Tell
 
 NAME = "mgst"
 SUMMARY = (
@@ -93,19 +94,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--begin",
-        type=positive,
+        type=number(above=0.0),
         metavar="SECONDS",
         help="leave out what comes before this time of the rig's log",
     )
     parser.add_argument(
         "--lag",
-        type=positive,
+        type=number(above=0.0),
         metavar="SECONDS",
         help="of the force/torque log behind the rig's; default: correlate",
     )
 
 
-def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a trial, one configuration for all. Raises RigFileError, RecordingError."""
     trials = [read_trial(*pair) for pair in _pairs(args.paths)]
     known = {"drawbar_pull": "2", "torque": "0.3"}
@@ -118,14 +119,14 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
         "rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas
     )
     written = [args.output / "mgst.yaml"]
-    progress(HEADER)
+    tell(HEADER)
     for trial in trials:
         lag, correlation = find_lag(trial) if args.lag is None else (args.lag, float("nan"))
         if lag + STEADY >= trial.rig.t[-1]:
             raise RigFileError(
                 f"{trial.name}: found a lag of {lag:g} s; expected less, the log has {trial.rig.t[-1]:.1f} s"
             )
-        progress(_row(trial, lag, correlation))
+        tell(_row(trial, lag, correlation))
         streams = _streams(trial, lag, args.begin or 0.0, args.drawbar_pull, set(args.conceal))
         info = _info(trial, lag, args.drawbar_pull, args.conceal)
         written.append(write(args.output / f"{trial.name}.mcap", streams, configured, info))

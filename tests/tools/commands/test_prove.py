@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from gritd.tools.cli.command import CommandError
-from gritd.tools.proof.blind import batch, command, trial
+from gritd.tools.commands import prove
+from gritd.tools.proof.blind import batch, trial
 
 ROOT = Path(__file__).resolve().parents[4]
 STUB = (sys.executable, "-m", "tests.tools.proof.blind.stub")
@@ -23,7 +24,7 @@ SMALL = ["--cases", "2", "--seed", "3", "--jobs", "1", "--strata", "none"]
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two cases, done."""
     output = tmp_path_factory.mktemp("proof") / "batch"
-    assert command.main([*SMALL, "--output", str(output)], STUB) == 0
+    assert prove.main([*SMALL, "--output", str(output)], STUB) == 0
     return output
 
 
@@ -62,7 +63,7 @@ def test_a_finished_batch_resumes_to_the_same_score(
         raise AssertionError("a finished case was run again")
 
     monkeypatch.setattr(trial, "diagnose", never)
-    assert command.main(["--resume", "--output", str(finished)], STUB) == 0
+    assert prove.main(["--resume", "--output", str(finished)], STUB) == 0
     assert (finished / "score.json").read_text(encoding="utf-8") == before
 
 
@@ -72,7 +73,7 @@ def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(tmp_path: Path) ->
     first, second = begun.specs(keep=True, diagnose=STUB)
     sealed = trial.prepare(first)
     assert not first.done and not second.folder.exists()
-    assert command.main(["--resume", "--keep", "--jobs", "1", "--output", str(tmp_path)], STUB) == 0
+    assert prove.main(["--resume", "--keep", "--jobs", "1", "--output", str(tmp_path)], STUB) == 0
     assert first.done and second.done
     assert first.seal.read_text(encoding="utf-8").strip() == sealed
     assert list(first.folder.glob("given/*.mcap"))
@@ -82,10 +83,10 @@ def test_cases_are_sealed_now_and_diagnosed_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     output = tmp_path / "batch"
-    assert command.main([*SMALL, "--seal-only", "--output", str(output)], STUB) == 0
+    assert prove.main([*SMALL, "--seal-only", "--output", str(output)], STUB) == 0
     sealed = (output / "seals.txt").read_text(encoding="utf-8")
     assert len(sealed.splitlines()) == 2 and not list(output.glob("cases/*/outcome.json"))
-    assert command.main(["--resume", "--jobs", "1", "--output", str(output)], STUB) == 0
+    assert prove.main(["--resume", "--jobs", "1", "--output", str(output)], STUB) == 0
     assert (output / "seals.txt").read_text(encoding="utf-8") == sealed
     assert len(list(output.glob("cases/*/outcome.json"))) == 2
 
@@ -94,8 +95,8 @@ def test_a_batch_that_is_stopped_leaves_nothing_running(tmp_path: Path) -> None:
     """SIGTERM while a diagnosis runs that would never end."""
     pid = tmp_path / "pid"
     endless = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
-    code = "import sys; from gritd.tools.proof.blind import command; "
-    code += f"command.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
+    code = "import sys; from gritd.tools.commands import prove; "
+    code += f"prove.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
     arguments = [*SMALL, "--output", str(tmp_path / "batch")]
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], cwd=ROOT, stdout=subprocess.DEVNULL
@@ -119,7 +120,7 @@ def test_a_changed_answer_is_noticed(finished: Path) -> None:
     answers.write_text(text.replace('"noise_factor": ', '"noise_factor": 1'), encoding="utf-8")
     try:
         with pytest.raises(CommandError, match="other answers than were sealed"):
-            command.main(["--resume", "--output", str(finished)], STUB)
+            prove.main(["--resume", "--output", str(finished)], STUB)
     finally:
         answers.write_text(text, encoding="utf-8")
 
@@ -140,18 +141,18 @@ def test_a_diagnosis_that_fails_counts_as_failed(
         "--output",
         str(tmp_path / "b"),
     ]
-    assert command.main(arguments, crash) == 1
+    assert prove.main(arguments, crash) == 1
     out = capsys.readouterr().out
     assert "none → (failed)" in out and "gritd: cannot" in out
 
 
 def test_mistakes_are_one_line(finished: Path, tmp_path: Path) -> None:
     with pytest.raises(CommandError, match="found a batch; expected a new folder, or --resume"):
-        command.main([*SMALL, "--output", str(finished)], STUB)
+        prove.main([*SMALL, "--output", str(finished)], STUB)
     with pytest.raises(CommandError, match="found no batch"):
-        command.main(["--resume", "--output", str(tmp_path / "new")], STUB)
+        prove.main(["--resume", "--output", str(tmp_path / "new")], STUB)
     with pytest.raises(CommandError, match="found 'nnoe'; expected some of none,"):
-        command.main(["--strata", "nnoe", "--output", str(tmp_path / "new")], STUB)
+        prove.main(["--strata", "nnoe", "--output", str(tmp_path / "new")], STUB)
     assert not (tmp_path / "new").exists()
 
 
@@ -177,7 +178,7 @@ def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
         address = cluster.scheduler_address
         assert address.startswith("tcp://127.0.0.1:")
         output = tmp_path / "batch"
-        assert command.main([*SMALL, "--output", str(output), "--scheduler", address], STUB) == 0
+        assert prove.main([*SMALL, "--output", str(output), "--scheduler", address], STUB) == 0
     here, there = (
         [
             json.loads((folder / "answers" / f"case-000{n}.json").read_text(encoding="utf-8"))[
@@ -197,6 +198,6 @@ def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
     with pytest.raises(CommandError, match="found no scheduler; expected one that answers"):
-        command.main(
+        prove.main(
             [*SMALL, "--output", str(tmp_path / "b"), "--scheduler", "tcp://127.0.0.1:9"], STUB
         )

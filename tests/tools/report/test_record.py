@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
-from gritd.tools.commands import diagnose_redo as redo
 from gritd.tools.commands.diagnose import main
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.rig.signals import sha256
-from gritd.tools.report import diagnosis
+from gritd.tools.report import diagnosis, record
 from tests.tools.report import cases
 
 
@@ -44,21 +43,21 @@ def saved(found: Diagnosis, folder: Path, form: str) -> Path:
 
 @pytest.mark.parametrize("form", ["json", "html"])
 def test_json_and_report_hold_all_it_takes(found: Diagnosis, tmp_path: Path, form: str) -> None:
-    record = redo.read(saved(found, tmp_path, form))
-    assert record == replace(redo.Record.of(found), folder=tmp_path)
-    assert record.configuration == "wheel: <r> & 'b'\n" and record.seed == 7
-    assert record.accepted == ("coulomb_friction",)
-    redo.check(record)
+    kept = record.read(saved(found, tmp_path, form))
+    assert kept == replace(record.Record.of(found), folder=tmp_path)
+    assert kept.configuration == "wheel: <r> & 'b'\n" and kept.seed == 7
+    assert kept.accepted == ("coulomb_friction",)
+    record.check(kept)
     assert any(
         line.startswith("numpy ") and line.endswith("then 0.1")
-        for line in redo.changed_versions(record)
+        for line in record.changed_versions(kept)
     )
 
 
 def test_the_files_may_have_moved_with_the_report(found: Diagnosis, tmp_path: Path) -> None:
     name = "run.mcap"
     moved = replace(found, redo={**found.redo, "files": {name: "0" * 64}})
-    assert list(redo.read(saved(moved, tmp_path, "json")).files) == [tmp_path / name]
+    assert list(record.read(saved(moved, tmp_path, "json")).files) == [tmp_path / name]
 
 
 @pytest.mark.parametrize("how", ["absolute", "relative", "link"])
@@ -82,13 +81,13 @@ def test_the_recordings_may_lie_elsewhere_if_the_user_says_so(
 ) -> None:
     folder = tmp_path / "reports"
     folder.mkdir()
-    record = redo.read(saved(found, folder, "json"), data=tmp_path)
-    redo.check(record)
+    kept = record.read(saved(found, folder, "json"), data=tmp_path)
+    record.check(kept)
 
 
 def test_another_file_is_refused_in_one_line(found: Diagnosis, tmp_path: Path) -> None:
     path = saved(found, tmp_path, "html")
-    next(iter(redo.read(path).files)).write_bytes(b"others")
+    next(iter(record.read(path).files)).write_bytes(b"others")
     with pytest.raises(CommandError) as error:
         main(["--redo", str(path)])
     assert "more.mcap: found another file" in str(error.value) and error.value.code == DAMAGED
@@ -102,20 +101,20 @@ def test_what_is_no_diagnosis_is_said(tmp_path: Path, text: str) -> None:
     with pytest.raises(
         CommandError, match="found no diagnosis; expected the JSON or the report"
     ) as error:
-        redo.read(path)
+        record.read(path)
     assert error.value.code == USAGE
 
 
 def test_differences_are_named(found: Diagnosis) -> None:
-    then = redo.Record.of(found)
-    assert not list(redo.differences(then, then))
+    then = record.Record.of(found)
+    assert not list(record.differences(then, then))
     now = replace(
         then,
         verdict="unlisted",
         accepted=(),
         probability={**then.probability, "coulomb_friction": 0.2},
     )
-    assert list(redo.differences(then, now)) == [
+    assert list(record.differences(then, now)) == [
         "verdict unlisted, then explained",
         "accepted no effect, then coulomb_friction",
         "coulomb_friction 0.20 probable, then 0.86",

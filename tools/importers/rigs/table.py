@@ -18,18 +18,19 @@ import numpy as np
 
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.importers._files import (
+from gritd.tools.cli.command import number
+from gritd.tools.importers.files import (
     RigFileError,
     Table,
     find,
-    number,
+    finite_number,
     numbers,
     read_table,
     read_text,
 )
-from gritd.tools.importers._recording import configuration, write
-from gritd.tools.importers._segments import Condition, Counting, scatter_of_mean, streams
-from gritd.tools.importers.registry import Progress, positive
+from gritd.tools.importers.recording import configuration, write
+from gritd.tools.importers.registry import Tell
+from gritd.tools.importers.segments import Condition, Counting, scatter_of_mean, streams
 
 NAME = "table"
 SUMMARY = (
@@ -55,7 +56,7 @@ NOT_TAKEN = "not taken from the tables but left to be found: dry sands in genera
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed",
-        type=positive,
+        type=number(above=0.0),
         default=0.01,
         metavar="M/S",
         help="of the faster of rim and carriage, default 0.01",
@@ -67,7 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         explained = f"standard deviation of a tabulated value [{unit}], default {default:g}"
         parser.add_argument(
-            f"--{name}-sigma", type=positive, default=default, metavar="SIGMA", help=explained
+            f"--{name}-sigma",
+            type=number(above=0.0),
+            default=default,
+            metavar="SIGMA",
+            help=explained,
         )
     parser.add_argument(
         "--soil-strength",
@@ -77,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording and one configuration a table. Raises RigFileError, RecordingError."""
     files = [file for file, _ in find(args.paths, CSV)]
     tables = [file for file in files if _has(file, "slip")]
@@ -88,7 +93,7 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     soils = [file for file in files if _has(file, SOIL[0])]
     written = []
     for path in tables:
-        written += _import(path, soils, args, progress)
+        written += _import(path, soils, args, tell)
     return written
 
 
@@ -96,9 +101,7 @@ def _has(path: Path, column: str) -> bool:
     return column in read_text(path).partition("\n")[0].strip().split(",")
 
 
-def _import(
-    path: Path, soils: list[Path], args: argparse.Namespace, progress: Progress
-) -> list[Path]:
+def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell) -> list[Path]:
     table = read_table(path, CONSTANTS + MEASURED)
     conditions = _conditions(path, table, args)
     stem = path.name.partition(".")[0]
@@ -111,7 +114,7 @@ def _import(
         nominal_load=round(load, 2),
         notes=f"{len(conditions)} steady states from a table",
     )
-    progress(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
+    tell(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
     recording = write(args.output / f"{stem}.mcap", streams(conditions, COUNTING), configured, info)
     return [args.output / f"{stem}.yaml", recording]
 
@@ -143,11 +146,11 @@ def _values(
     """What the configuration's template asks for."""
     constant = {name: _constant(path, table, name) for name in CONSTANTS}
     soil = _soil(path, soils, constant["soil_simulant"])
-    radius = number(path, "wheel_radius_m", constant["wheel_radius_m"])
-    shear = number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
+    radius = finite_number(path, "wheel_radius_m", constant["wheel_radius_m"])
+    shear = finite_number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
     values: dict[str, float] = {
         "radius": radius,
-        "width": number(path, "wheel_width_m", constant["wheel_width_m"]),
+        "width": finite_number(path, "wheel_width_m", constant["wheel_width_m"]),
         "wheel_count": 1e3 * COUNT / radius,
         "load": float(np.mean(numbers(path, table, "vertical_load_n"))),
         "shear_modulus": shear,
@@ -200,7 +203,7 @@ def _soil(path: Path, soils: Iterable[Path], name: str) -> dict[str, float]:
         table = read_table(file, SOIL)
         if name in table[SOIL[0]]:
             row = table[SOIL[0]].index(name)
-            return {key: number(file, f"{name}: {key}", table[key][row]) for key in SOIL[1:]}
+            return {key: finite_number(file, f"{name}: {key}", table[key][row]) for key in SOIL[1:]}
     raise RigFileError(
         f"{path}: soil_simulant: found {name!r} in no table of soils; expected one with {', '.join(SOIL)}"
     )

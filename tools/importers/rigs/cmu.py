@@ -18,21 +18,21 @@ import numpy as np
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.tools.cli.command import number as number_of
-from gritd.tools.importers._files import (
+from gritd.tools.cli.command import number
+from gritd.tools.importers.files import (
     Array,
     RigFileError,
     find,
+    finite_number,
     increasing,
     matrix,
-    number,
     numbers,
     read_table,
     read_text,
 )
-from gritd.tools.importers._recording import NS, Stream, configuration, counts, stamps, write
-from gritd.tools.importers._segments import Condition, Counting, scatter_of_mean, streams
-from gritd.tools.importers.registry import Progress
+from gritd.tools.importers.recording import NS, Stream, configuration, counts, stamps, write
+from gritd.tools.importers.registry import Tell
+from gritd.tools.importers.segments import Condition, Counting, scatter_of_mean, streams
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--rim-speed",
-        type=number_of(low=0.0),
+        type=number(low=0.0),
         action="append",
         default=[],
         metavar="MM/S",
@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
+def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """Recordings by wheel and kind, one configuration, penetration.csv. Raises RigFileError,
     RecordingError.
     """
@@ -106,9 +106,7 @@ def run(args: argparse.Namespace, progress: Progress) -> list[Path]:
     written = [args.output / "cmu.yaml"]
     for file, match in tables:
         if match[1] in wheels:
-            written += _import_table(
-                file, match[1], args.rim_speed, args.output, configured, progress
-            )
+            written += _import_table(file, match[1], args.rim_speed, args.output, configured, tell)
     loads = {
         name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()
     }
@@ -133,7 +131,7 @@ def _import_table(
     speeds: list[float],
     output: Path,
     configured: config.Configuration,
-    progress: Progress,
+    tell: Tell,
 ) -> list[Path]:
     """A recording of each row: it was a trial of its own, with a load of its own."""
     trials = _numbered([row for row in _straight(path) if not speeds or row[0] in speeds])
@@ -142,10 +140,10 @@ def _import_table(
             f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0"
         )
     written = []
-    progress("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
+    tell("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
     for speed, repeat, condition in trials:
         name = f"{wheel}-{speed:03.0f}-{repeat}"
-        progress(_row(name, condition))
+        tell(_row(name, condition))
         info = RunInfo(
             name=name,
             nominal_load=round(condition.load.value, 2),
@@ -209,11 +207,13 @@ def _loads(path: Path) -> dict[str, float]:
     """Load [N] by log, from the table row it is known to belong to."""
     table = read_table(path, ("file", "W_N", "match_resid"))
     return {
-        name: number(path, f"{name}: W_N", load)
+        name: finite_number(path, f"{name}: W_N", load)
         for name, load, residual in zip(
             table["file"], table["W_N"], table["match_resid"], strict=True
         )
-        if load and residual and number(path, f"{name}: match_resid", residual) < TRUSTED_MATCH
+        if load
+        and residual
+        and finite_number(path, f"{name}: match_resid", residual) < TRUSTED_MATCH
     }
 
 
@@ -308,7 +308,7 @@ def _forces(path: Path) -> tuple[float, Array]:
         raise RigFileError(
             f"{path}: row 1: found no zero offsets; expected '# zero offsets …: Fx,Fy,Fz,Tx,Ty,Tz'"
         )
-    return number(path, "row 1", found[1].split(",")[2]), matrix(path, 7, skip=2)
+    return finite_number(path, "row 1", found[1].split(",")[2]), matrix(path, 7, skip=2)
 
 
 def _body(series: str, which: str) -> str:

@@ -87,11 +87,14 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
 def numbers(path: Path, table: Table, name: str) -> Array:
     """One column as finite numbers, shape (n,). Raises RigFileError naming the row."""
     return np.array(
-        [number(path, f"row {row}: {name}", text) for row, text in enumerate(table[name], start=2)]
+        [
+            finite_number(path, f"row {row}: {name}", text)
+            for row, text in enumerate(table[name], start=2)
+        ]
     )
 
 
-def number(path: Path, where: str, text: str) -> float:
+def finite_number(path: Path, where: str, text: str) -> float:
     """A finite number, not beyond LARGEST. Raises RigFileError."""
     try:
         value = float(text)
@@ -120,7 +123,7 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
     except ValueError:
         values = np.array(
             [
-                [number(path, f"row {i}", text) for text in row]
+                [finite_number(path, f"row {i}", text) for text in row]
                 for i, row in enumerate(rows, skip + 1)
             ]
         )

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.importers._files import Array
-from gritd.tools.importers._recording import NS, Stream, stamps
+from gritd.tools.importers.files import Array
+from gritd.tools.importers.recording import NS, Stream, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
 RATE = 100  # [Hz]

@@ -1,0 +1,51 @@
+"""What ends a command: an exit code and one line on standard error, never a traceback."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+
+from gritd.drivers.errors import DeviceError, DeviceSettingsError
+from gritd.estimator.config.yamltree import ConfigError
+from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError
+
+
+def guarded(command: Callable[[], int | None]) -> int:
+    """The exit code of a command, whatever it raises."""
+    try:
+        code = int(command() or DONE)
+        sys.stdout.flush()
+        return code
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        return _leave_pipe()
+    except Exception as error:
+        return _fail(error)
+
+
+def _fail(error: Exception) -> int:
+    """One line for the user, and the exit code."""
+    if os.environ.get("GRITD_TRACEBACK"):
+        raise error
+    print(f"gritd: {_one_line(error)}", file=sys.stderr)
+    if isinstance(error, CommandError):
+        return error.code
+    return USAGE if isinstance(error, ConfigError | DeviceSettingsError) else FAILED
+
+
+def _one_line(error: Exception) -> str:
+    """The message of a known error; an unexpected one says so, and how to see more."""
+    text = " ".join(str(error).split())
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror.lower()}"
+    if isinstance(error, CommandError | ConfigError | DeviceError | DeviceSettingsError | OSError):
+        return text
+    return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
+
+
+def _leave_pipe() -> int:
+    """The reader of our output has gone: say nothing, not even when Python flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE

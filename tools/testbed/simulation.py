@@ -1,0 +1,48 @@
+"""A simulated run: the motion, what the forward model answers, and what the sensors send."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.messages.readings import Reading
+from gritd.estimator.model.forward import Response, simulate_arrays
+from gritd.estimator.stages.situation import Motion
+from gritd.estimator.terramechanics.soil import Soil
+from gritd.tools.testbed.sensors import readings
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated run: what the controller was told, what happened, and what the sensors sent."""
+
+    motion: Motion
+    response: Response
+    readings: list[Reading]
+
+
+def simulate_run(
+    settings: Settings, soil: Soil, motion: Motion, acting: Sequence[Effect], seed: int
+) -> Run:
+    """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
+    constant = settings.drive.torque_constant.value
+    response = simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
+    return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+
+
+def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> Soil:
+    """The configured soil, with some of its values replaced; modulus_factor multiplies K."""
+    prior, changed = settings.soil, dict(changed or {})
+    factor = changed.pop("modulus_factor", 1.0)
+    soil = Soil(
+        cohesion=prior.cohesion.value,
+        tan_phi=prior.tan_phi.value,
+        shear_modulus=prior.shear_modulus.value,
+        exponent=prior.exponent.value,
+        modulus=prior.pressure_sinkage.modulus(settings.wheel.width) * factor,
+    )
+    return replace(soil, **changed)

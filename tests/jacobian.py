@@ -39,7 +39,8 @@ def assert_jacobian(
     error = np.abs(analytic - numeric) * steps
     worst = np.unravel_index(np.argmax(error / (scale + np.finfo(float).tiny)), error.shape)
     assert np.all(error <= rtol * scale + atol * steps), (
-        f"d f[{worst[0]}] / d x[{worst[1]}]: analytic {analytic[worst]:.12g}, differences {numeric[worst]:.12g}"
+        f"d f[{worst[0]}] / d x[{worst[1]}]: analytic {analytic[worst]:.12g}, "
+        f"differences {numeric[worst]:.12g}"
     )
 
 

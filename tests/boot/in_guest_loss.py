@@ -11,5 +11,6 @@ recording = read(path, TOPICS)
 times = [message[1] for message in recording.messages()]
 lost = (killed - max(times)) * 1e-9
 print(
-    f"{path.name}: closed: {recording.closed}, {len(times)} messages readable, the last {lost:.3f} s before the kill"
+    f"{path.name}: closed: {recording.closed}, {len(times)} messages readable, "
+    f"the last {lost:.3f} s before the kill"
 )

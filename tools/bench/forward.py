@@ -129,10 +129,12 @@ def main() -> int:
     plain, six = simulated_seconds_per_second(), simulated_seconds_per_second(effects=ONE_OF_EACH)
     speed = balance_speed()
     print(
-        f"simulator at {RATE:g} Hz: {plain:.0f} simulated seconds a second; with six effects {six:.0f}"
+        f"simulator at {RATE:g} Hz: {plain:.0f} simulated seconds a second; "
+        f"with six effects {six:.0f}"
     )
     print(
-        f"balance: {1e6 * speed.vectorised:.2f} µs a sample; brentq on quad: {1e3 * speed.scalar:.2f} ms"
+        f"balance: {1e6 * speed.vectorised:.2f} µs a sample; brentq on quad: "
+        f"{1e3 * speed.scalar:.2f} ms"
     )
     print(f"ratio {speed.ratio:.0f}, largest relative difference of θ₁ {speed.difference:.1e}")
     return 0

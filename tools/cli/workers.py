@@ -60,7 +60,10 @@ def _cluster(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
-        message = "--scheduler needs dask.distributed; expected it installed: pip install 'gritd[cluster]'"
+        message = (
+            "--scheduler needs dask.distributed; expected it installed: "
+            "pip install 'gritd[cluster]'"
+        )
         raise CommandError(message, USAGE) from None
     try:
         client: Any = Client(address, timeout="5s")

@@ -63,27 +63,29 @@ def report(figures: dict[str, Figures]) -> str:
     u, m, w = figures["update"], figures["recording"], figures["forward_model"]
     return "\n".join(
         [
-            f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, {on['system']}, "
-            f"Python {on['python']}, numpy {on['numpy']}",
+            f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, "
+            f"{on['system']}, Python {on['python']}, numpy {on['numpy']}",
             f"tick       {_µs(t['median'])} at 50 %, {_µs(t['at_99_percent'])} at 99 %: "
             f"{t['share_of_budget']:.1%} of its period",
             *(
-                f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to estimates, "
-                f"best {r[f'{name}_best']:.0f}"
+                f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to "
+                f"estimates, best {r[f'{name}_best']:.0f}"
                 for name in ENGINES
             ),
-            f"forces     closed forms with gradients {_µs(f['closed_form'])}, quadrature {_µs(f['quadrature'])}: "
-            f"ratio {f['ratio']:.1f}",
+            f"forces     closed forms with gradients {_µs(f['closed_form'])}, "
+            f"quadrature {_µs(f['quadrature'])}: ratio {f['ratio']:.1f}",
             f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])}, "
             f"quadrature {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
-            f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: ratio {u['ratio']:.1f} "
-            f"({u['nuisances']:.0f} nuisances)",
-            f"recording  a message: write {_µs(m['write'])}, read as arrays {_µs(m['read_as_arrays'])}, "
+            f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: "
+            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} nuisances)",
+            f"recording  a message: write {_µs(m['write'])}, "
+            f"read as arrays {_µs(m['read_as_arrays'])}, "
             f"one by one {_µs(m['read_one_by_one'])}, {m['bytes']:.0f} bytes",
-            f"simulator  {w['speed']:.0f} times real time, with six effects {w['speed_with_six_effects']:.0f}",
-            f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature {_µs(w['balance_by_brentq'])}: "
-            f"ratio {w['balance_ratio']:.0f}",
+            f"simulator  {w['speed']:.0f} times real time, "
+            f"with six effects {w['speed_with_six_effects']:.0f}",
+            f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature "
+            f"{_µs(w['balance_by_brentq'])}: ratio {w['balance_ratio']:.0f}",
             "processor time, medians where not said otherwise",
         ]
     )

@@ -70,8 +70,7 @@ def check_devices(settings: Settings) -> None:
         build_link(device, build_decoder(settings, device).framing, time.monotonic_ns)
 
 
-# ---- the summary ---------------------------------------------------------------------------------
-# ------------------
+# --- the summary ---
 
 
 def summary(settings: Settings) -> str:
@@ -93,38 +92,46 @@ def _facts(settings: Settings) -> Rows:
         ("testbed", settings.testbed),
         (
             "wheel",
-            f"r {1e3 * wheel.radius:g} mm, b {1e3 * wheel.width:g} mm, θₘ = ({wheel.c1:g} + {wheel.c2:g} i) θ₁",
+            f"r {1e3 * wheel.radius:g} mm, b {1e3 * wheel.width:g} mm, "
+            f"θₘ = ({wheel.c1:g} + {wheel.c2:g} i) θ₁",
         ),
         ("pulley", f"r {1e3 * settings.pulley_radius:g} mm"),
         (
             "soil",
-            f"c {_pm(soil.cohesion)} Pa, tan φ {_pm(soil.tan_phi)} (φ {_degrees(soil.tan_phi.value):.1f}°)",
+            f"c {_pm(soil.cohesion)} Pa, tan φ {_pm(soil.tan_phi)} (φ "
+            f"{_degrees(soil.tan_phi.value):.1f}°)",
         ),
         ("", f"k {_pm(soil.shear_modulus, 1e3)} mm, n {_pm(soil.exponent)}"),
         (
             "",
-            f"K {modulus / 1e3:.4g} kPa/mⁿ ± {100 * soil.modulus_sigma:g} % ({soil.pressure_sinkage.form})",
+            f"K {modulus / 1e3:.4g} kPa/mⁿ ± {100 * soil.modulus_sigma:g} % "
+            f"({soil.pressure_sinkage.form})",
         ),
         (
             "load",
-            f"{_pm(settings.load.nominal)} N; under {settings.load.minimum:g} N the wheel is in the air",
+            f"{_pm(settings.load.nominal)} N; under {settings.load.minimum:g} N the wheel is in "
+            "the air",
         ),
         (
             "drive",
-            f"{_pm(settings.drive.torque_constant)} N·m/A at the axle; torque from {settings.drive.torque_source}",
+            f"{_pm(settings.drive.torque_constant)} N·m/A at the axle; "
+            f"torque from {settings.drive.torque_source}",
         ),
         (
             "rates",
-            f"{rates.tick:g} ticks/s, {rates.update:g} updates/s, horizon {1e3 * rates.horizon:g} ms",
+            f"{rates.tick:g} ticks/s, {rates.update:g} updates/s, "
+            f"horizon {1e3 * rates.horizon:g} ms",
         ),
         (
             "filter",
-            f"{settings.filter.engine}, gate {settings.filter.gate:g} σ, k estimated: {settings.filter.estimate_k}",
+            f"{settings.filter.engine}, gate {settings.filter.gate:g} σ, k estimated: "
+            f"{settings.filter.estimate_k}",
         ),
         ("effects", effects),
         (
             "logging",
-            f"{settings.logging.directory}, flushed every {1e3 * settings.logging.flush_interval:g} ms",
+            f"{settings.logging.directory}, flushed every "
+            f"{1e3 * settings.logging.flush_interval:g} ms",
         ),
         *((f"device {device.name}", _device(device)) for device in settings.devices.values()),
     ]
@@ -189,8 +196,10 @@ def _ms(channel: Channel | Wrench) -> str:
 def _implied_title(settings: Settings) -> str:
     ticks = window_readings(settings)
     return (
-        f"Resolution (one standard deviation, noise alone) of one reading and of a window of {ticks} readings,\n"
-        f"one reading a tick; slip at a rim speed of {1e3 * RIM_SPEED:g} mm/s and {100 * SLIP:g} % slip:"
+        "Resolution (one standard deviation, noise alone) of one reading and of a window of "
+        f"{ticks} readings,\n"
+        f"one reading a tick; slip at a rim speed of {1e3 * RIM_SPEED:g} mm/s and {100 * SLIP:g} "
+        "% slip:"
     )
 
 

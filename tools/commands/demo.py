@@ -75,8 +75,7 @@ def _parser() -> Parser:
     return parser
 
 
-# --- the run --------------------------------------------------------------------------------------
-# ------------------
+# --- the run ---
 
 
 def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
@@ -93,7 +92,8 @@ def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
     with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
         config = _after(testbed.wait_for("configuration ", READY))
         print(
-            f"{arguments.plant} plant, seed {arguments.seed}, {arguments.seconds:g} s; everything in {folder}"
+            f"{arguments.plant} plant, seed {arguments.seed}, {arguments.seconds:g} s; "
+            f"everything in {folder}"
         )
         with Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "demo") as daemon:
             _wait_for_devices(daemon)
@@ -148,8 +148,7 @@ def live_line() -> Iterator[Callable[[str], None]]:
     print()
 
 
-# --- the verdict ----------------------------------------------------------------------------------
-# ------------------
+# --- the verdict ---
 
 
 def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
@@ -187,7 +186,8 @@ def _counters(folder: Path, last_words: Sequence[str]) -> list[str]:
         lost = ", ".join(f"{name} {count}" for name, count in p["lost"].items())
         account.append(
             f"testbed: {p['readings']} readings sent, late by {p['late_half'] * 1e3:.2f} ms (50 %),"
-            f" {p['late_most'] * 1e3:.2f} ms (99 %), {p['late_worst'] * 1e3:.2f} ms (max); nobody took: {lost}"
+            f" {p['late_most'] * 1e3:.2f} ms (99 %), {p['late_worst'] * 1e3:.2f} ms (max); "
+            f"nobody took: {lost}"
         )
     return account
 

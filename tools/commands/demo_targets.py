@@ -120,7 +120,8 @@ def table(found: Sequence[Finding]) -> list[str]:
         estimate = f"{f.value * factor:.{digits}f} ± {f.sigma * factor:.{digits}f} {unit}"
         truth = f"{f.truth * factor:.{digits}f} {unit}"
         lines.append(
-            f"{symbol:6}{estimate:>22}{truth:>12}{f.relative:>+9.1%}{f.in_sigmas:>+8.2f}   {_target(f)}"
+            f"{symbol:6}{estimate:>22}{truth:>12}{f.relative:>+9.1%}{f.in_sigmas:>+8.2f}   "
+            f"{_target(f)}"
         )
     return lines
 

@@ -60,8 +60,7 @@ def main(argv: Sequence[str]) -> int:
     return DONE
 
 
-# --- the terminal ---------------------------------------------------------------------------------
-# --------------------
+# --- the terminal ---
 
 
 def redrawable() -> bool:
@@ -93,8 +92,7 @@ def _fitting(line: str, columns: int) -> str:
     return f"{BOLD}{cut}{PLAIN}" if line.startswith(TROUBLE) else cut
 
 
-# --- the picture ----------------------------------------------------------------------------------
-# --------------------
+# --- the picture ---
 
 
 def lines(report: Report) -> Iterator[str]:
@@ -104,7 +102,10 @@ def lines(report: Report) -> Iterator[str]:
     Without trouble it fits into a terminal of 80 by 24.
     """
     tick = report["tick"]
-    yield f"gritd {report['pid']}, up {_age(report['uptime'])}: {report['status']} {' '.join(report['flags'])}".rstrip()
+    yield (
+        f"gritd {report['pid']}, up {_age(report['uptime'])}: "
+        f"{report['status']} {' '.join(report['flags'])}"
+    ).rstrip()
     yield from _trouble(report)
     yield f"{report['configuration']}"
     yield ""
@@ -144,8 +145,8 @@ def _belief(tick: Report) -> Iterator[str]:
         f"  {tick['updates']} updates, {tick['resets']} resets"
     )
     yield (
-        f"readings      {tick['late']} late, {tick['duplicates']} duplicates, {tick['invalid']} invalid,"
-        f" {tick['jumps']} jumps"
+        f"readings      {tick['late']} late, {tick['duplicates']} duplicates, "
+        f"{tick['invalid']} invalid, {tick['jumps']} jumps"
     )
 
 
@@ -157,14 +158,17 @@ def _channels(channels: Report) -> Iterator[str]:
 
 def _device(name: str, stats: Report) -> str:
     return (
-        f"{name:13} {stats['state']}, {stats['rate']:.0f}/s, {stats['bad']} bad, {stats['lost']} lost,"
-        f" {stats['errors']} bus errors, {stats['reopened']} reopenings"
+        f"{name:13} {stats['state']}, {stats['rate']:.0f}/s, {stats['bad']} bad, "
+        f"{stats['lost']} lost, {stats['errors']} bus errors, {stats['reopened']} reopenings"
     )
 
 
 def _loop_and_log(report: Report) -> Iterator[str]:
     loop, log, queue = report["loop"], report["log"], report["queue"]
-    yield f"loop          {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: {report['real_time']}"
+    yield (
+        f"loop          {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
+        f"{report['real_time']}"
+    )
     yield f"late, ms      {_lateness(loop)}"
     yield (
         f"queue         {queue['queued']} waiting, {queue['dropped']} dropped"

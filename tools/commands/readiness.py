@@ -48,4 +48,7 @@ def _reason(settings: Settings, recording: Recording, name: str) -> str:
         return f"{name} has {rows.size} readings, never three over half a window of {window}"
     raw = rows[CHANNELS[name][0]]
     invalid = int(np.count_nonzero(~((channel.low <= raw) & (raw <= channel.high))))
-    return f"{invalid} of {rows.size} readings of {name} are invalid, outside {channel.low:g} … {channel.high:g} V"
+    return (
+        f"{invalid} of {rows.size} readings of {name} are invalid, "
+        f"outside {channel.low:g} … {channel.high:g} V"
+    )

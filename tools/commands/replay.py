@@ -83,8 +83,7 @@ def _configuration(recording: Recording, path: str | None) -> Configuration:
     return loads(recording.config_yaml, f"{recording.path}: gritd.config")
 
 
-# --- verification ---------------------------------------------------------------------------------
-# ------------------
+# --- verification ---
 
 
 def _verify(recordings: list[Recording], configuration: Configuration) -> int:
@@ -135,7 +134,8 @@ class Differences:
         if not same:
             self.ticks += 1
             self.lines.append(
-                f"checkpoint before the tick at {stamp}: not the state that the ticks before it lead to"
+                f"checkpoint before the tick at {stamp}: "
+                "not the state that the ticks before it lead to"
             )
 
     def compare(self, logged: TickRow, computed: TickRow) -> None:
@@ -157,8 +157,7 @@ class Differences:
         return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])
 
 
-# --- recomputation
-# --------------------------------------------------------------------------------------------------
+# --- recomputation ---
 
 
 def _recompute(

@@ -26,11 +26,14 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"  status     {_statuses(rows)}",
             f"  flags      {_flags(rows)}",
             f"  c          {last['cohesion']:.0f} ± {last['cohesion_sigma']:.0f} Pa",
-            f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with c "
-            f"{_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the prior's σ",
-            f"  k          {last['shear_modulus'] * 1e3:.1f} ± {last['shear_modulus_sigma'] * 1e3:.1f} mm",
+            f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with "
+            f"c {_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the "
+            "prior's σ",
+            f"  k          {last['shear_modulus'] * 1e3:.1f} ± "
+            f"{last['shear_modulus_sigma'] * 1e3:.1f} mm",
             *_side_by_side(rows),
-            f"  innovations squared over their variance, last 2 s: {last['consistency']:.2f} (1 when honest)",
+            "  innovations squared over their variance, last 2 s: "
+            f"{last['consistency']:.2f} (1 when honest)",
         ]
     )
 
@@ -71,6 +74,6 @@ def _side_by_side(rows: Rows) -> Iterator[str]:
             else ""
         )
         yield (
-            f"  {name.replace('_', ' '):13}measured {measured.mean():7.3f} {unit}, predicted {predicted.mean():7.3f}"
-            f"{sigma}, rms difference {difference:.3f}"
+            f"  {name.replace('_', ' '):13}measured {measured.mean():7.3f} {unit}, "
+            f"predicted {predicted.mean():7.3f}{sigma}, rms difference {difference:.3f}"
         )

@@ -97,17 +97,22 @@ def main(argv: Sequence[str]) -> int:
     return DONE
 
 
-# ---- closed forms against quadrature
-# --------------------------------------------------------------------------------
+# --- closed forms against quadrature ---
 
 
 def closed_forms(seed: int) -> Lines:
     """The closed forms (20)-(22) against quadrature of the integrals (15)-(17) they solve."""
-    yield f"Closed forms (20)-(22), corrected, against Gauss-Legendre quadrature of (15)-(17), {DRAWS} random draws"
+    yield (
+        "Closed forms (20)-(22), corrected, against Gauss-Legendre quadrature of (15)-(17), "
+        f"{DRAWS} random draws"
+    )
     differences = closed_form_differences(seed)
     for name, values in differences.items():
         yield f"  {name:<3} largest difference {values.max():.1e}   median {np.median(values):.1e}"
-    yield "  relative to W, and to r·W for T. Printed (6), (18) and (22) have misprints: docs/physics.md.\n"
+    yield (
+        "  relative to W, and to r·W for T. Printed (6), (18) and (22) have misprints: "
+        "docs/physics.md.\n"
+    )
 
 
 def closed_form_differences(seed: int) -> dict[str, Array]:
@@ -142,13 +147,15 @@ def triangular_contact(
     return nodes._replace(sigma=sigma, tau=(c + sigma * tan_phi) * janosi(f * nodes.points.turned))
 
 
-# ---- Fig. 3 --------------------------------------------------------------------------------------
-# -------------------
+# --- Fig. 3 ---
 
 
 def figure_3() -> Lines:
     """The exponent j/k of (7) against its linearisation f(θ₁ − θ)."""
-    yield "Fig. 3: exponent of the shear stress, j/k of (6) against f(θ₁ − θ) of (19); dry sand, r 72 mm, θ₁ 45°"
+    yield (
+        "Fig. 3: exponent of the shear stress, j/k of (6) against f(θ₁ − θ) of (19); dry sand, "
+        "r 72 mm, θ₁ 45°"
+    )
     yield "  (the paper shows a figure and prints no number)"
     yield (
         "  slip   θ/θ₁:  "
@@ -171,14 +178,19 @@ def exponents(slip: float, theta_1: float = np.pi / 4) -> tuple[Array, Array]:
     return exact, linear.shear_exponent(WHEEL, k, theta_1, slip).f * points.turned
 
 
-# ---- Table 3 and the simulations
-# ------------------------------------------------------------------------------------
+# --- Table 3 and the simulations ---
 
 
 def table_3() -> Lines:
     """Closed form against original over θ₁ and slip, for each soil."""
-    yield "Table 3: closed form against original, θ₁ 10-60°, θₘ = θ₁/2, slip 5-80 %. Paper: 2.0 % (DP), 2.6 % (T)"
-    yield "  The printed table could not be had. Soils of Table 1, and two stand-ins for its low-cohesion soils."
+    yield (
+        "Table 3: closed form against original, θ₁ 10-60°, θₘ = θ₁/2, slip 5-80 %. Paper: "
+        "2.0 % (DP), 2.6 % (T)"
+    )
+    yield (
+        "  The printed table could not be had. Soils of Table 1, "
+        "and two stand-ins for its low-cohesion soils."
+    )
     yield _header("soil")
     angles, slips = np.radians(np.linspace(10, 60, 51)), np.linspace(0.05, 0.8, 16)
     theta_1, slip = (grid.ravel() for grid in np.meshgrid(angles, slips))
@@ -193,8 +205,14 @@ def table_3() -> Lines:
 def simulations(count: int, seed: int) -> Lines:
     """Closed form against original over random soils."""
     soil, slip, theta_1, load = draw(count, seed)
-    yield f"{count} simulations. Paper: 9.34 % and 12.15 %; neither the percentage nor θ₁ is defined there"
-    yield "  Table 2 could not be had: soils uniform in the box around Table 1; slip 5-90 %, r 72 mm, b 71 mm."
+    yield (
+        f"{count} simulations. Paper: 9.34 % and 12.15 %; "
+        "neither the percentage nor θ₁ is defined there"
+    )
+    yield (
+        "  Table 2 could not be had: soils uniform in the box around Table 1; slip 5-90 %, "
+        "r 72 mm, b 71 mm."
+    )
     yield _header("θ₁")
     rows = compare("10-60°", soil, theta_1, slip)
     yield from map(_row, rows)
@@ -204,7 +222,10 @@ def simulations(count: int, seed: int) -> Lines:
     kept = Soil(**{name: values[carried] for name, values in vars(soil).items()})
     carrying = compare("of W 10-100 N", kept, solved.theta_1[carried], slip[carried])
     yield from map(_row, carrying)
-    yield f"  {count - np.count_nonzero(carried)} wheels sank to the axle and are left out of the last two rows."
+    yield (
+        f"  {count - np.count_nonzero(carried)} wheels sank to the axle and are left out of the "
+        "last two rows."
+    )
     yield f"  {nearest(rows + carrying, 9.34, 12.15)}\n"
 
 
@@ -259,7 +280,10 @@ def nearest(rows: list[Row], drawbar_pull: float, torque: float) -> str:
         key=lambda at: distance(at[0].percent[at[1]]),
     )
     ours = row.percent[name]
-    return f"Nearest: {ours[0]:.2f} % and {ours[1]:.2f} % ({row.label}, σₘ {row.source}, {name}); no match is claimed."
+    return (
+        f"Nearest: {ours[0]:.2f} % and {ours[1]:.2f} % ({row.label}, σₘ {row.source}, {name}); "
+        "no match is claimed."
+    )
 
 
 def _row(row: Row) -> str:
@@ -273,13 +297,15 @@ def _header(label: str) -> str:
     return f"  {label:<14}{'σₘ':<9}{names}\n  {'':<23}{units}"
 
 
-# ---- what the closed forms can and cannot tell
-# ------------------------------------------------------------------
+# --- what the closed forms can and cannot tell ---
 
 
 def separability() -> Lines:
     """c and tan φ act on T alike at every slip of one load, and differently at another load."""
-    yield "Beyond the paper. Dry sand: (∂T/∂c per 100 Pa) / (∂T/∂tan φ per 0.01) over slip 5-80 %, at one load"
+    yield (
+        "Beyond the paper. Dry sand: (∂T/∂c per 100 Pa) / (∂T/∂tan φ per 0.01) over slip 5-80 %, "
+        "at one load"
+    )
     slip = np.linspace(0.05, 0.8, 16)
     for load in (40.0, 70.0, 120.0):
         ratio = sensitivity_ratio(DRY_SAND, slip, load)
@@ -310,7 +336,9 @@ def fitted_soil() -> Lines:
     """c and tan φ that the closed forms find in forces of the original model, bare and with the
     true stresses.
     """
-    yield "(20)-(22) fitted to T and DP of the original model, loads 30-105 N, slips 5-60 %, no noise"
+    yield (
+        "(20)-(22) fitted to T and DP of the original model, loads 30-105 N, slips 5-60 %, no noise"
+    )
     columns = f"{'bare':>8}{'shifted':>9}{'prior off':>11}"
     yield f"  {'':<12}{'c [Pa]':>8}{columns}    {'tan φ':>6}{columns}"
     for named in LOW_COHESION:
@@ -325,9 +353,18 @@ def fitted_soil() -> Lines:
         tan_phi = "".join(
             f"{x:>{width}.4f}" for (_, x), width in zip(found, (8, 9, 11), strict=True)
         )
-        yield f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    {float(soil.tan_phi):>6.4f}{tan_phi}"
-    yield "  The linearisation alone moves c by a quarter or more. The effect stress_linearisation removes it, also if"
-    yield "  it was computed from a prior with c 25 % and tan φ 5 % wrong (estimator/filter/shift.py)."
+        yield (
+            f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    "
+            f"{float(soil.tan_phi):>6.4f}{tan_phi}"
+        )
+    yield (
+        "  The linearisation alone moves c by a quarter or more. "
+        "The effect stress_linearisation removes it, also if"
+    )
+    yield (
+        "  it was computed from a prior with c 25 % and tan φ 5 % wrong "
+        "(estimator/filter/shift.py)."
+    )
 
 
 def fit(soil: Soil, shift: IntegralShift | None = None) -> tuple[float, float]:

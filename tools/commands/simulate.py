@@ -177,7 +177,8 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
         if known is None or parameter not in known:
             options = ", ".join(effects.EFFECTS if known is None else known)
             raise CommandError(
-                f"--effect {text}: found '{name if known is None else parameter}'; expected one of {options}",
+                f"--effect {text}: found '{name if known is None else parameter}'; "
+                f"expected one of {options}",
                 USAGE,
             )
         values.setdefault(name, {})[parameter] = _quantity(
@@ -226,6 +227,7 @@ def _summary(path: Path, acting: Sequence[Effect], run: Run) -> str:
     ]
     if bogged:
         lines.append(
-            f"note: the load exceeds what the soil carries in {bogged} samples; the wheel is bogged there"
+            f"note: the load exceeds what the soil carries in {bogged} samples; "
+            "the wheel is bogged there"
         )
     return "\n".join(lines)

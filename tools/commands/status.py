@@ -76,8 +76,7 @@ def _text(arguments: Namespace, report: Report) -> str:
     return "\n".join(told(prometheus if arguments.prometheus else summary, report))
 
 
-# --- the forms ------------------------------------------------------------------------------------
-# ------------------
+# --- the forms ---
 
 
 def looked_up(report: Report, path: str) -> Any:
@@ -113,7 +112,10 @@ def _label(text: str) -> str:
 def disagreement(found: Mapping[str, Any]) -> str:
     """Channel, time and size of a disagreement between model and measurement, in words."""
     since = time.strftime("%H:%M:%S", time.gmtime(found["since"]))
-    return f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, {found['sigmas']:.1f} σ off"
+    return (
+        f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, "
+        f"{found['sigmas']:.1f} σ off"
+    )
 
 
 def summary(report: Report) -> Iterator[str]:
@@ -125,9 +127,17 @@ def summary(report: Report) -> Iterator[str]:
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
     if found := report.get("disagreement"):
         yield f"  model    {disagreement(found)}"
-    yield f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: {report['real_time']}"
+    yield (
+        f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
+        f"{report['real_time']}"
+    )
     for name, stats in report["devices"].items():
-        yield f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, {stats['lost']} lost"
-    yield f"  log      {log['state']}, {log['dropped']} dropped, {log['file']} {log['error']}".rstrip()
+        yield (
+            f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, "
+            f"{stats['lost']} lost"
+        )
+    yield (
+        f"  log      {log['state']}, {log['dropped']} dropped, {log['file']} {log['error']}"
+    ).rstrip()
     if report["hanging"]:
         yield f"  hanging  {report['hanging']}"

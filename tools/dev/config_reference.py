@@ -27,7 +27,10 @@ def reference() -> str:
 def _section(path: str, section: Section) -> Iterator[str]:
     """A table of the section's own keys, then the sections inside."""
     rows = "".join(_row(name, key) for name, key in section.keys.items())
-    yield f"\n### {path or 'Top level'}\n\n| key | expected | default | meaning |\n|---|---|---|---|\n{rows}"
+    yield (
+        f"\n### {path or 'Top level'}\n\n| key | expected | default | meaning "
+        f"|\n|---|---|---|---|\n{rows}"
+    )
     for name, key in section.keys.items():
         yield from _inside(f"{path}.{name}" if path else name, key.kind)
 

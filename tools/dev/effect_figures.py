@@ -61,8 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-# ---- pictures ------------------------------------------------------------------------------------
-# ------------------
+# --- pictures ---
 
 
 def draw(effect: type[Effect], path: Path) -> None:
@@ -180,8 +179,7 @@ def _driven(time: Array, load: Array, slip: Array, speed: Array, passes: Array) 
     )
 
 
-# ---- the page ------------------------------------------------------------------------------------
-# ------------------
+# --- the page ---
 
 
 def page() -> str:

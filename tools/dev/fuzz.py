@@ -127,8 +127,7 @@ def mutated(data: bytes, rng: random.Random, most: int = 8) -> bytes:
     return data
 
 
-# --- bytes of sensors
-# -------------------------------------------------------------------------------------------------
+# --- bytes of sensors ---
 
 
 def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], bytes]) -> Case:
@@ -197,8 +196,7 @@ def databases(folder: Path) -> Case:
     return case
 
 
-# --- configuration --------------------------------------------------------------------------------
-# --------------------
+# --- configuration ---
 
 
 def configurations(_: Path) -> Case:
@@ -216,8 +214,7 @@ def configurations(_: Path) -> Case:
     return case
 
 
-# --- recordings -----------------------------------------------------------------------------------
-# --------------------
+# --- recordings ---
 
 
 def small_recording(path: Path) -> list[str]:
@@ -268,8 +265,7 @@ def truncations(folder: Path) -> Case:
     return case
 
 
-# --- the filter -----------------------------------------------------------------------------------
-# --------------------
+# --- the filter ---
 
 WILD = (0.0, -0.0, 1e-300, 1e300, -1e300, math.inf, -math.inf, math.nan, 1e-9, 5.0, -5.0)
 

@@ -140,7 +140,8 @@ def page(figures: Sequence[Figure]) -> str:
 def _circumstances(figures: Sequence[Figure]) -> Iterator[str]:
     loads = [figure["load"] for figure in figures]
     yield (
-        f"Measured on {os.cpu_count()} cores with a load average of {statistics.median(loads):.1f} (median; largest"
+        f"Measured on {os.cpu_count()} cores with a load average of "
+        f"{statistics.median(loads):.1f} (median; largest"
         f" {max(loads):.1f}); what is above its limit stands in bold."
     )
 

@@ -109,8 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return FAILED if failures else DONE
 
 
-# --- the pipeline ---------------------------------------------------------------------------------
-# --------------------
+# --- the pipeline ---
 
 
 def simulated(arguments: Namespace) -> list[str]:
@@ -139,10 +138,12 @@ def simulated(arguments: Namespace) -> list[str]:
     slope = growth(memory)
     found = dict(zip(TICK_NAMES, record, strict=True))
     print(
-        f"pipeline ({arguments.engine}): {ticks} ticks of {arguments.tick:g} Hz, one reading in {arguments.thin},"
-        f" {number + 1} laps of {LAP / 60:g} min ({(number + 1) * LAP / 3600:.1f} h simulated), {len(pool)} noises,"
-        f" in {time.monotonic() - began:.0f} s, {unfit} ticks without a finite estimate, {found['updates']} updates,"
-        f" {found['resets']} resets, memory {memory[-1][1]:.1f} MB, {slope:+.3f} MB per simulated hour",
+        f"pipeline ({arguments.engine}): {ticks} ticks of {arguments.tick:g} Hz, "
+        f"one reading in {arguments.thin}, {number + 1} laps of {LAP / 60:g} min "
+        f"({(number + 1) * LAP / 3600:.1f} h simulated), {len(pool)} noises, "
+        f"in {time.monotonic() - began:.0f} s, {unfit} ticks without a finite estimate, "
+        f"{found['updates']} updates, {found['resets']} resets, memory {memory[-1][1]:.1f} MB, "
+        f"{slope:+.3f} MB per simulated hour",
         flush=True,
     )
     wrong = [f"{unfit} unfit ticks"] * bool(unfit) + leak(memory)
@@ -211,8 +212,7 @@ def leak(memory: Sequence[tuple[float, float]]) -> list[str]:
     return [f"memory grows by {slope:.2f} MB/h"] * (slope > SLOPE and grown > KEPT)
 
 
-# --- the daemon -----------------------------------------------------------------------------------
-# --------------------
+# --- the daemon ---
 
 
 def on_wires(arguments: Namespace) -> list[str]:
@@ -291,7 +291,8 @@ def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
         if int(10.0 * passed / seconds) > told:
             told = int(10.0 * passed / seconds)
             print(
-                f"after {passed / 60:.1f} min: {report['memory']:.2f} MB, load {report['load']:.1f}",
+                f"after {passed / 60:.1f} min: {report['memory']:.2f} MB, "
+                f"load {report['load']:.1f}",
                 flush=True,
             )
         time.sleep(min(5.0, seconds / 50))
@@ -317,7 +318,8 @@ def unreported(last: dict[str, Any], played: dict[str, Any]) -> list[str]:
     known = sum(device["lost"] + device["bad"] for device in devices) + sum(played["lost"].values())
     received = last["queue"]["received"]
     print(
-        f"testbed: {played['readings']} readings sent, {received} received, {known} messages known to be lost"
+        f"testbed: {played['readings']} readings sent, {received} received, "
+        f"{known} messages known to be lost"
     )
     missing = played["readings"] - received
     return [f"{missing} readings missing, {known} messages counted as lost"] * (missing > known)
@@ -333,11 +335,13 @@ def judged(
     print(
         f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
         f" {arguments.part:g} min a part, memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
-        f" {last['descriptors']} descriptors, {last['threads']} threads, real time: {last['real_time']},"
+        f" {last['descriptors']} descriptors, {last['threads']} threads, real time: "
+        f"{last['real_time']},"
         f" load average {np.median([look['load'] for look in looks]):.1f} (median)"
     )
     print(
-        f"lost on the wires: {json.dumps({name: device['lost'] for name, device in last['devices'].items()})}"
+        "lost on the wires: "
+        f"{json.dumps({name: device['lost'] for name, device in last['devices'].items()})}"
     )
     for name in ("late_50", "late_99", "late_999", "late_max"):
         worst = [1e3 * look["loop"][name] for look in looks]

@@ -32,7 +32,7 @@ SHOWN = 3  # keys that differ, of each campaign
 
 Edits = tuple[tuple[str, str], ...]
 
-# ---- what is simulated ---------------------------------------------------------------------------
+# --- what is simulated ---
 
 # All sensors on one serial port, so that no path of a CAN database comes into a recording.
 TESTBED = """\
@@ -225,7 +225,7 @@ SIMULATED = (
     Simulated("between-runs", BETWEEN),
 )
 
-# ---- what is imported ----------------------------------------------------------------------------
+# --- what is imported ---
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ REAL = (
     Real("cmu-smooth", "cmu", CMU, "smooth-table/*.mcap", "cmu.yaml"),
 )
 
-# ---- make ----------------------------------------------------------------------------------------
+# --- make ---
 
 
 def make(folder: Path, gritd: Path, real: Path | None) -> int:
@@ -343,7 +343,7 @@ def _environment() -> dict[str, str]:
     return {name: os.environ[name] for name in KEPT if name in os.environ} | ONE_THREAD
 
 
-# ---- diagnose ------------------------------------------------------------------------------------
+# --- diagnose ---
 
 
 @dataclass(frozen=True)
@@ -411,7 +411,7 @@ def _row(result: Path, took: Spent) -> str:
     return f"{said}{found['verdict']:13} {names}"
 
 
-# ---- compare -------------------------------------------------------------------------------------
+# --- compare ---
 
 
 def compare(one: Path, other: Path) -> int:
@@ -472,7 +472,7 @@ def _leaves(a: Any, b: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
         yield key, a, b
 
 
-# ---- command -------------------------------------------------------------------------------------
+# --- command ---
 
 
 def main(argv: Sequence[str]) -> int:

@@ -76,7 +76,8 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
         for name in columns:
             if row[name] is None:
                 raise RigFileError(
-                    f"{path}: row {number}: found no {name}; expected {len(reader.fieldnames or ())} fields"
+                    f"{path}: row {number}: found no {name}; "
+                    f"expected {len(reader.fieldnames or ())} fields"
                 )
             table[name].append(row[name])
     if not table[columns[0]]:
@@ -131,7 +132,8 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
     if not np.all(good):
         bad = int(np.argmin(good)) + skip + 1
         raise RigFileError(
-            f"{path}: row {bad}: found a number that is not finite; expected {columns} finite numbers"
+            f"{path}: row {bad}: found a number that is not finite; "
+            f"expected {columns} finite numbers"
         )
     return values
 

@@ -24,8 +24,9 @@ KEY = {
     "after": "simulated, soil fitted",
 }
 NOTE = (
-    "The original equations, driven by the recorded motion and the known load. Under a run: recorded less simulated, "
-    "with ± 2σ of the noise as a band. Grey stretches are not in the errors: standstill, lifted, unsteady."
+    "The original equations, driven by the recorded motion and the known load. Under a run: "
+    "recorded less simulated, with ± 2σ of the noise as a band. Grey stretches are not in the "
+    "errors: standstill, lifted, unsteady."
 )
 
 
@@ -151,7 +152,10 @@ def _soil(found: Comparison) -> Markup | None:
     if found.soil is None:
         return None
     key = figures.legend({"prior": "known before", "after": "fitted"})
-    caption = "Soil, fitted within what was known before; ± 1σ thick and ± 2σ thin, as if nothing were left out."
+    caption = (
+        "Soil, fitted within what was known before; ± 1σ thick and ± 2σ thin, "
+        "as if nothing were left out."
+    )
     return section(
         "The soil", figures.figure(caption, figures.soil(found.soil), legend=key, small=True)
     )

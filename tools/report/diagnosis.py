@@ -84,8 +84,7 @@ def paragraph(*content: Child) -> Markup:
     return tag("p", *content)
 
 
-# ---- verdict -------------------------------------------------------------------------------------
-# ------------------
+# --- verdict ---
 
 
 def _verdict(found: Diagnosis) -> Markup:
@@ -184,8 +183,7 @@ def _change(found: Diagnosis, channel: str) -> tuple[str, str]:
     return f"{change} {seen}".rstrip(), with_unit(found.fit.noise_floor.get(channel), unit, 2)
 
 
-# ---- pictures ------------------------------------------------------------------------------------
-# ------------------
+# --- pictures ---
 
 
 def _simulation(found: Diagnosis) -> Markup | None:
@@ -291,8 +289,7 @@ def _fitted(found: Diagnosis) -> dict[str, str]:
     }
 
 
-# ---- the end -------------------------------------------------------------------------------------
-# ------------------
+# --- the end ---
 
 
 def _caveats(found: Diagnosis) -> Markup | None:
@@ -310,7 +307,10 @@ def _next(found: Diagnosis) -> Markup | None:
         return None
     gain = f"expected gain {nats(following.expected_gain_nats)}"
     if math.isfinite(following.expected_probability):
-        gain += f", which takes what is true from 50 % to {percent(following.expected_probability)} against a rival"
+        gain += (
+            f", which takes what is true from 50 % to {percent(following.expected_probability)} "
+            "against a rival"
+        )
     if following.separates:
         gain = f"it would tell {listed([name_of(n) for n in following.separates])} apart; {gain}"
     return tag(
@@ -338,7 +338,10 @@ def _again(found: Diagnosis, name: str) -> list[Markup] | None:
     if not isinstance(found.redo.get("files"), Mapping):
         return None
     command = shlex.join(["gritd", "diagnose", "--redo", name])
-    said = "This page holds what it takes beside the recordings: they are checked by their hashes, and results compared."
+    said = (
+        "This page holds what it takes beside the recordings: they are checked by their hashes, "
+        "and results compared."
+    )
     embedded = tag("pre", record.as_json(found), id=record.EMBEDDED, hidden="hidden")
     return [paragraph(said), tag("pre", command, class_="command"), embedded]
 

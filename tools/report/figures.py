@@ -65,8 +65,7 @@ def legend(entries: Mapping[str, str]) -> Markup:
     )
 
 
-# ---- traces --------------------------------------------------------------------------------------
-# ------------------
+# --- traces ---
 
 
 def differs(trace: Trace | Scatter) -> bool:
@@ -131,7 +130,10 @@ def trace_picture(trace: Trace) -> Markup:
     low = plot.axes(
         span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual
     )
-    label = f"{name_of(trace.channel)} of run {trace.run}: recording and simulation over time, with the residual below"
+    label = (
+        f"{name_of(trace.channel)} of run {trace.run}: recording and simulation over time, "
+        "with the residual below"
+    )
     return plot.picture(
         ROWS.height,
         label,
@@ -153,8 +155,7 @@ def _known(sigma: float) -> float:
     return sigma if np.isfinite(sigma) else 0.0
 
 
-# ---- residual against a covariate
-# ----------------------------------------------------------------------------------
+# --- residual against a covariate ---
 
 
 def drawn_against(of: Scatter) -> str:
@@ -265,8 +266,7 @@ def running_mean(x: Array, y: Array) -> tuple[Array, Array]:
     return sums[0], sums[1]
 
 
-# ---- estimates -----------------------------------------------------------------------------------
-# ------------------
+# --- estimates ---
 
 
 def soil(of: SoilFit) -> Markup:

@@ -19,7 +19,8 @@ def introduction(found: Diagnosis) -> str:
     tried = counted(len(found.hypotheses), "effect")
     beside = "the soil" if found.soil else "what is known of the rig"
     return (
-        f"{tried} considered together with {beside} in all channels, scored on runs and conditions not fitted to. "
+        f"{tried} considered together with {beside} in all channels, "
+        "scored on runs and conditions not fitted to. "
         "A gain is in nats: 3 nats make an effect twenty times as probable."
     )
 

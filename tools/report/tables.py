@@ -14,8 +14,8 @@ from gritd.tools.report.html import Markup, section, table, tag
 from gritd.tools.report.words import name_of, probability, quantity, sentence, with_unit
 
 UNSEEN = (
-    "Root mean square errors on data the fit did not see: the noise, what is still left out, and what the soil's "
-    "remaining uncertainty makes of a run that was not fitted."
+    "Root mean square errors on data the fit did not see: the noise, what is still left out, "
+    "and what the soil's remaining uncertainty makes of a run that was not fitted."
 )
 STRAYED = 2.0  # [σ]
 DECADE = 10.0  # values from here on carry a third digit
@@ -54,8 +54,9 @@ def location(found: Diagnosis) -> Markup | None:
     ]
     head = ("channel", "against", "in words", "starts or stops at", "q")
     note = (
-        "Recorded against predicted, the value's own run held out. A channel's misfit is what soil and calibration "
-        "cannot take; shares overlap where covariates vary together. q: false-discovery rate over all pairs tried."
+        "Recorded against predicted, the value's own run held out. A channel's misfit is what "
+        "soil and calibration cannot take; shares overlap where covariates vary together. q: "
+        "false-discovery rate over all pairs tried."
     )
     return section("Where, in words", table(head, rows, numbers=4), tag("p", note, class_="note"))
 
@@ -107,7 +108,8 @@ def held_out(found: Diagnosis) -> Markup | None:
         notes.append(
             tag(
                 "p",
-                "Innovations: of the on-line filter, over their stated σ, without → with; 1 is honest.",
+                "Innovations: of the on-line filter, over their stated σ, without → with; "
+                "1 is honest.",
             )
         )
     if fit.innovation_note:
@@ -135,8 +137,8 @@ def law(found: Diagnosis) -> Markup | None:
         "An empirical law",
         tag(
             "p",
-            f"No listed effect stands behind it. It takes {percent(law.share)} of the explainable misfit of "
-            f"{name_of(law.channel)}, and holds only inside its domain.",
+            f"No listed effect stands behind it. It takes {percent(law.share)} of the explainable "
+            f"misfit of {name_of(law.channel)}, and holds only inside its domain.",
         ),
         tag("p", law.expression, class_="law"),
         table(("domain", "from … to"), domain, numbers=1) if domain else None,

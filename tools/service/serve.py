@@ -88,7 +88,7 @@ def _say_in_a_line(died: threading.ExceptHookArgs) -> None:
 def closing_line(status: WriterStatus) -> str:
     files = ", ".join(map(str, status.files))
     line = (
-        f"log {status.state}: accepted {status.accepted} = written {status.written} + dropped {status.dropped}"
-        f" + queued {status.queued}; {files}"
+        f"log {status.state}: accepted {status.accepted} = written {status.written} + dropped "
+        f"{status.dropped} + queued {status.queued}; {files}"
     )
     return f"{line}; {status.error}" if status.error else line

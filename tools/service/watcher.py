@@ -213,7 +213,10 @@ class Watcher:
             ):
                 self._tell(daemon, INFO, f"{path}: deleted, over logging.disk_cap")
         except OSError as error:
-            trouble = f"{error.filename or open_file.parent}: logging.disk_cap cannot be kept: {error.strerror}"
+            trouble = (
+                f"{error.filename or open_file.parent}: logging.disk_cap cannot be kept: "
+                f"{error.strerror}"
+            )
         if trouble and trouble != self._untidy:
             self._tell(daemon, WARNING, trouble)
         self._untidy = trouble
@@ -223,15 +226,16 @@ class Watcher:
         self._notifier.tell(notify.STOPPING)
         counts = self._queue.counts()
         say(
-            f"queue: received {counts.received} = processed {counts.processed} + dropped {counts.dropped}"
-            f" + queued {counts.queued}"
+            f"queue: received {counts.received} = processed {counts.processed} + dropped "
+            f"{counts.dropped} + queued {counts.queued}"
         )
         for reader in self._readers:
             s = reader.stats()
             say(
-                f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, {s.garbage} garbage bytes,"
-                f" {s.lost} lost, {s.duplicates} duplicates, {s.quarantined} quarantined, {s.incomplete} incomplete,"
-                f" {s.unknown} unknown, {s.errors} bus errors, reopened {s.reopened} times"
+                f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, "
+                f"{s.garbage} garbage bytes, {s.lost} lost, {s.duplicates} duplicates, "
+                f"{s.quarantined} quarantined, {s.incomplete} incomplete, {s.unknown} unknown, "
+                f"{s.errors} bus errors, reopened {s.reopened} times"
             )
         say(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")
 
@@ -267,10 +271,10 @@ def status_line(daemon: Daemon) -> str:
     tick, loop = daemon.loop.latest
     t = dict(zip(TICK_NAMES, tick, strict=True))
     line = (
-        f"{Status(int(t['status'])).name:10} slip {t['slip']:6.1%}  z {t['sinkage'] * 1e3:5.1f} mm"
-        f"  θ₁ {degrees(t['theta_1']):4.1f}°  W {t['load']:5.1f} N  T {t['torque']:5.2f} N·m"
-        f"  c {t['cohesion']:6.0f} ± {t['cohesion_sigma']:4.0f} Pa  tan φ {t['tan_phi']:.3f} ± {t['tan_phi_sigma']:.3f}"
-        f"  late {loop.lateness * 1e3:.2f} ms"
+        f"{Status(int(t['status'])).name:10} slip {t['slip']:6.1%}  z {t['sinkage'] * 1e3:5.1f} "
+        f"mm  θ₁ {degrees(t['theta_1']):4.1f}°  W {t['load']:5.1f} N  T {t['torque']:5.2f} N·m  c "
+        f"{t['cohesion']:6.0f} ± {t['cohesion_sigma']:4.0f} Pa  tan φ {t['tan_phi']:.3f} ± "
+        f"{t['tan_phi_sigma']:.3f}  late {loop.lateness * 1e3:.2f} ms"
     )
     flags = [flag.name or "" for flag in Flag if flag and int(t["flags"]) & flag]
     return f"{line}  {' '.join(flags)}".rstrip()

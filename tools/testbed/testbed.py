@@ -133,7 +133,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     write_truth(folder, prepared)
     with Rig(configuration.settings, arguments.can) as rig:
         print(
-            f"configuration {rig_config.write(configuration, rig.devices, arguments.plant, folder)}",
+            "configuration "
+            f"{rig_config.write(configuration, rig.devices, arguments.plant, folder)}",
             flush=True,
         )
         if not arguments.wait or sys.stdin.readline():

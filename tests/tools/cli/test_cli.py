@@ -51,7 +51,10 @@ def test_help_and_version() -> None:
 
 
 def test_who_is_refused_by_the_lock_does_not_wait_for_numpy() -> None:
-    code = "import sys, gritd.tools.main, gritd.tools.commands.run; print(sorted({'numpy', 'can', 'mcap'} & sys.modules.keys()))"
+    code = (
+        "import sys, gritd.tools.main, gritd.tools.commands.run; print(sorted({'numpy', 'can', "
+        "'mcap'} & sys.modules.keys()))"
+    )
     assert (
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
@@ -64,7 +67,10 @@ def test_digits_do_not_depend_on_the_number_of_cores() -> None:
     """Linear algebra on several threads adds in another order: one thread, unless the user says
     otherwise.
     """
-    script = "import os; from gritd.tools.main import main; main(['check-config']); print(os.environ['OPENBLAS_NUM_THREADS'])"
+    script = (
+        "import os; from gritd.tools.main import main; main(['check-config']); "
+        "print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
     bare = {name: value for name, value in os.environ.items() if "NUM_THREADS" not in name}
     for given, expected in ((bare, "1"), (bare | {"OPENBLAS_NUM_THREADS": "3"}, "3")):
         done = subprocess.run(

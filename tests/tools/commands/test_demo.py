@@ -106,8 +106,7 @@ def test_an_impossible_length_is_one_line():
     )
 
 
-# --- verdict --------------------------------------------------------------------------------------
-# ------------------
+# --- verdict ---
 
 
 def ticks_ending(seconds=60.0, n=200, **last):

@@ -207,6 +207,6 @@ def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, confi
     assert cli.main(["replay", str(tmp_path / "slow.mcap"), "--engine", "plain"]) == 0
     said = capsys.readouterr().err.splitlines()[-1]
     assert (
-        "wheel_encoder has 60 readings, never three over half a window of 100 ms; motor_shunt has no readings"
-        in said
+        "wheel_encoder has 60 readings, never three over half a window of 100 ms; "
+        "motor_shunt has no readings" in said
     )

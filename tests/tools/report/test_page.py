@@ -153,7 +153,8 @@ def test_explained_says_everything_it_was_given() -> None:
         "4.2 → 1.1",  # innovations
         "Torque rises late in the runs. 12.4 s",  # where it starts
         "Not told apart by these recordings; together 98 %",
-        "Stand still for some seconds with the drive powered. It would tell Coulomb friction and current offset apart",
+        "Stand still for some seconds with the drive powered. "
+        "It would tell Coulomb friction and current offset apart",
         "2 other effects tried, each below 1 %",
         "1" * 64,
         "gritd diagnose run1.mcap run2.mcap --config testbed.yaml",

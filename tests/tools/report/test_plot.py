@@ -102,8 +102,7 @@ def test_small_words() -> None:
     assert (listed([]), listed(["a"]), listed(["a", "b", "c"])) == ("", "a", "a, b and c")
 
 
-# ---- colours -------------------------------------------------------------------------------------
-# ------------------
+# --- colours ---
 
 
 def palettes() -> list[dict[str, str]]:

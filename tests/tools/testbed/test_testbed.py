@@ -150,7 +150,8 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
             wait_until(lambda: daemon.take() == daemon.take(), 1.0)
     if (pause := longest_silence(daemon.readings)) > HELD_UP:
         pytest.skip(
-            f"this computer was held up for {pause:.2f} s, which overflows the wires: nothing to learn from it"
+            f"this computer was held up for {pause:.2f} s, which overflows the wires: "
+            "nothing to learn from it"
         )
     prepared = experiment(TESTBED, 5.0, "linear", 3)
     assert elapsed >= prepared.run.motion.time[-1]

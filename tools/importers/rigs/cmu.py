@@ -121,8 +121,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     return written
 
 
-# ---- steady-state tables
-# -------------------------------------------------------------------------------------------
+# --- steady-state tables ---
 
 
 def _import_table(
@@ -137,7 +136,8 @@ def _import_table(
     trials = _numbered([row for row in _straight(path) if not speeds or row[0] in speeds])
     if not trials:
         raise RigFileError(
-            f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and beta 0"
+            f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and "
+            "beta 0"
         )
     written = []
     tell("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
@@ -199,8 +199,7 @@ def _row(name: str, condition: Condition) -> str:
     )
 
 
-# ---- raw logs ------------------------------------------------------------------------------------
-# ------------------
+# --- raw logs ---
 
 
 def _loads(path: Path) -> dict[str, float]:
@@ -246,8 +245,7 @@ def _import_log(
     return write(output / f"{wheel}-logs" / f"{name}.mcap", logged, configured, info)
 
 
-# ---- penetration tests
-# ---------------------------------------------------------------------------------------------
+# --- penetration tests ---
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,8 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         lag, correlation = find_lag(trial) if args.lag is None else (args.lag, float("nan"))
         if lag + STEADY >= trial.rig.t[-1]:
             raise RigFileError(
-                f"{trial.name}: found a lag of {lag:g} s; expected less, the log has {trial.rig.t[-1]:.1f} s"
+                f"{trial.name}: found a lag of {lag:g} s; expected less, "
+                f"the log has {trial.rig.t[-1]:.1f} s"
             )
         tell(_row(trial, lag, correlation))
         streams = _streams(trial, lag, args.begin or 0.0, args.drawbar_pull, set(args.conceal))
@@ -133,8 +134,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     return written
 
 
-# ---- reading -------------------------------------------------------------------------------------
-# ------------------
+# --- reading ---
 
 
 def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
@@ -143,7 +143,8 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
     sensors = {match[2]: file for file, match in find(paths, SENSOR_FILE)}
     if not rigs:
         raise RigFileError(
-            f"{paths[0]}: found no rig log; expected files like 20210208-165209-trio-s20-p925.rig.csv"
+            f"{paths[0]}: found no rig log; expected files like "
+            "20210208-165209-trio-s20-p925.rig.csv"
         )
     for file, match in rigs:
         if match[2] not in sensors:
@@ -208,8 +209,7 @@ def _midnight(path: Path, date: str) -> int:
         ) from None
 
 
-# ---- the two clocks
-# ------------------------------------------------------------------------------------------------
+# --- the two clocks ---
 
 
 def find_lag(trial: Trial) -> tuple[float, float]:
@@ -242,8 +242,7 @@ def _fluctuation(values: Array) -> Array:
     return smooth - trend
 
 
-# ---- writing -------------------------------------------------------------------------------------
-# ------------------
+# --- writing ---
 
 
 def _streams(
@@ -285,16 +284,21 @@ def _wrench(sensor: Sensor, pull: str, concealed: set[str]) -> Array:
 
 def _info(trial: Trial, lag: float, pull: str, concealed: list[str]) -> RunInfo:
     hidden = ", ".join(sorted(set(concealed))) or "nothing"
-    notes = f"slip {trial.slip} %; drawbar pull {pull}; sensor log lags {lag:.2f} s; concealed: {hidden}"
+    notes = (
+        f"slip {trial.slip} %; drawbar pull {pull}; sensor log lags {lag:.2f} s; concealed: "
+        f"{hidden}"
+    )
     return RunInfo(
         name=trial.name, nominal_load=round(float(np.mean(trial.sensor.load)), 1), notes=notes
     )
 
 
-# ---- what the table shows
-# ------------------------------------------------------------------------------------------
+# --- what the table shows ---
 
-HEADER = "means from 3 s on     slip   W [N]  DP [N]  DP raw  T axle  T motor  differ [N·m]  z - z0 [mm]  lag [s]     r"
+HEADER = (
+    "means from 3 s on     slip   W [N]  DP [N]  DP raw  T axle  T motor  differ [N·m]  z - z0 "
+    "[mm]  lag [s]     r"
+)
 
 
 def _row(trial: Trial, lag: float, correlation: float) -> str:
@@ -308,6 +312,7 @@ def _row(trial: Trial, lag: float, correlation: float) -> str:
     pull, raw = np.mean(sensor.drawbar_pull[sensed]), np.mean(sensor.drawbar_pull_raw[sensed])
     sinkage = np.mean(rig.sinkage[driving]) / COUNTS_PER_MM
     return (
-        f"{trial.name:<18} {slip:7.4f} {np.mean(sensor.load[sensed]):7.1f} {pull:7.1f} {raw:7.1f} {axle:7.2f} "
+        f"{trial.name:<18} {slip:7.4f} {np.mean(sensor.load[sensed]):7.1f} {pull:7.1f} {raw:7.1f} "
+        f"{axle:7.2f} "
         f"{motor:8.2f} {motor - axle:13.2f} {sinkage:12.2f} {lag:8.2f} {correlation:5.2f}"
     )

@@ -88,7 +88,8 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     tables = [file for file in files if _has(file, "slip")]
     if not tables:
         raise RigFileError(
-            f"{args.paths[0]}: found no table; expected a CSV file with {', '.join(CONSTANTS + MEASURED)}"
+            f"{args.paths[0]}: found no table; expected a CSV file with "
+            f"{', '.join(CONSTANTS + MEASURED)}"
         )
     soils = [file for file in files if _has(file, SOIL[0])]
     written = []
@@ -192,7 +193,8 @@ def _constant(path: Path, table: Table, name: str) -> str:
     values = sorted(set(table[name]))
     if len(values) > 1:
         raise RigFileError(
-            f"{path}: {name}: found {values[0]!r} and {values[1]!r}; expected one value for all rows"
+            f"{path}: {name}: found {values[0]!r} and {values[1]!r}; "
+            "expected one value for all rows"
         )
     return values[0]
 
@@ -205,5 +207,6 @@ def _soil(path: Path, soils: Iterable[Path], name: str) -> dict[str, float]:
             row = table[SOIL[0]].index(name)
             return {key: finite_number(file, f"{name}: {key}", table[key][row]) for key in SOIL[1:]}
     raise RigFileError(
-        f"{path}: soil_simulant: found {name!r} in no table of soils; expected one with {', '.join(SOIL)}"
+        f"{path}: soil_simulant: found {name!r} in no table of soils; "
+        f"expected one with {', '.join(SOIL)}"
     )

@@ -114,8 +114,7 @@ def truth(case: Case, number: int) -> dict[str, Array]:
     return told
 
 
-# ---- configuration
-# -------------------------------------------------------------------------------------------------
+# --- configuration ---
 
 
 def configuration(known: Knowledge, nominal: float) -> str:

@@ -41,7 +41,8 @@ def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
     """The whole page."""
     parts = [
         "<h1>Blind trials of <code>gritd diagnose</code></h1>",
-        f"<p>{score['cases']} cases, drawn and simulated by an independent plant. The answers were sealed before the "
+        f"<p>{score['cases']} cases, drawn and simulated by an independent plant. "
+        "The answers were sealed before the "
         f"first diagnosis; SHA-256 of the batch:<br><code>{escape(seal)}</code></p>",
         "<h2>Figures</h2>",
         _table(tables.headline(score)),
@@ -51,8 +52,8 @@ def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
         _table(tables.reliability(score), head=True),
         "<h2>Soil</h2>",
         _table(tables.soil(score), head=True),
-        "<h2>Confusion matrix</h2><p>Rows: what was concealed. Columns: what was named first. A filled cell on its "
-        "own name is a hit; shading is the share of the row.</p>",
+        "<h2>Confusion matrix</h2><p>Rows: what was concealed. Columns: what was named first. "
+        "A filled cell on its own name is a hit; shading is the share of the row.</p>",
         _matrix(score["confusion"]),
         "<h2>By effect</h2><p>Single effects at all strengths, whether detectable or not.</p>",
         _effects(score["effects"]),

@@ -33,7 +33,10 @@ def said(share: Mapping[str, Any]) -> str:
     if not share["n"]:
         return "–"
     value = share["k"] / share["n"]
-    return f"{share['k']}/{share['n']} {value:.0%} ({100 * share['low']:.0f}–{100 * share['high']:.0f})"
+    return (
+        f"{share['k']}/{share['n']} {value:.0%} "
+        f"({100 * share['low']:.0f}–{100 * share['high']:.0f})"
+    )
 
 
 def number(value: float | None, form: str = ".2f") -> str:

@@ -204,8 +204,7 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
     return found
 
 
-# ---- held-out error against the oracle
-# -----------------------------------------------------------------------------
+# --- held-out error against the oracle ---
 
 
 def _heldout(

@@ -42,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         missing = arguments.data / proof.rig
         if not missing.is_dir():
             print(
-                f"{proof.title}: skipped, found no {missing}; docs/importing.md says where the data are"
+                f"{proof.title}: skipped, found no {missing}; "
+                "docs/importing.md says where the data are"
             )
             continue
         try:
@@ -78,11 +79,13 @@ def _step(what: str, began: float) -> None:
 
 def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
     print(
-        f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, {seconds:.0f} s"
+        f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, "
+        f"{seconds:.0f} s"
     )
     for asked in finding.asked:
         print(
-            f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; found {asked.found}"
+            f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; "
+            f"found {asked.found}"
         )
 
 

@@ -85,7 +85,8 @@ class Bench:
         )  # fmt: skip
         if done.returncode:
             raise CommandError(
-                f"{self.commands[-1]}: exit {done.returncode}: {done.stderr.strip() or 'nothing said'}"
+                f"{self.commands[-1]}: exit {done.returncode}: "
+                f"{done.stderr.strip() or 'nothing said'}"
             )
         return done.stdout
 

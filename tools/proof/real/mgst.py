@@ -161,8 +161,7 @@ def _nearer(said: Said, held: Sequence[Held], unit: str) -> Asked:
     )
 
 
-# ---- the drivetrain
-# ------------------------------------------------------------------------------------------------
+# --- the drivetrain ---
 
 SPEED, TORQUE, CONSTANT = (
     0.462,
@@ -233,8 +232,7 @@ DRIVETRAIN = Proof(
     ),
 )
 
-# ---- the side wall
-# -------------------------------------------------------------------------------------------------
+# --- the side wall ---
 
 
 def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def needs(rig: str) -> pytest.MarkDecorator:
-    """Skip where a rig's files are absent; docs/importing.md says where the public ones come from."""
+    """Skip where a rig's files are absent; docs/importing.md says where public ones are from."""
     folder = REAL / rig
     return pytest.mark.skipif(
         not folder.is_dir(), reason=f"no real recordings in {folder}; see docs/importing.md"

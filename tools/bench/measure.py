@@ -226,7 +226,7 @@ def recording(subject: Subject) -> Figures:
 
 
 def forward_model(subject: Subject) -> Figures:
-    """The simulator, and its vertical balance against a scalar root finder on adaptive quadrature."""
+    """The simulator, and its vertical balance against brentq on adaptive quadrature."""
     simulated = subject.sizes.simulated
     balance = forward_bench.balance_speed(subject.sizes.samples, SEED)
     return {

@@ -71,5 +71,5 @@ def vacant(path: Path) -> Path:
 
 
 def unwritten(error: RecordingError) -> CommandError:
-    """What a command says where a file could not be written: 2 for its name, 1 for what came later."""
+    """What a command says of a file it could not write: code 2 for its name, 1 for the rest."""
     return CommandError(error, USAGE if error.errno in WRONG_NAME else FAILED)

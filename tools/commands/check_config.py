@@ -1,4 +1,4 @@
-"""`gritd check-config`: is the configuration right, and how well can the testbed measure with it?"""
+"""`gritd check-config`: is the configuration right, and how well can the testbed measure?"""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def slip_sigma(settings: Settings) -> float:
 
 
 def _slope_sigma(settings: Settings, encoder: Channel) -> float:
-    """[rad/s]: a line through N readings a tick apart has slope variance 12 σ² / (N (N² − 1) dt²)."""
+    """[rad/s]: a line through N readings a tick apart has variance 12 σ² / (N (N² − 1) dt²)."""
     count = window_readings(settings)
     sigma = max(encoder.noise, QUANTUM) * abs(encoder.calibration.scale.value)
     return sigma * settings.rates.tick * math.sqrt(12 / (count * (count**2 - 1)))

@@ -119,13 +119,19 @@ def _traces(
     before, after = (rig.predict(u, ()) for u in constants)
     return tuple(
         Trace(
-            names[at], channel, rig.units[channel], (run.time - run.time[0]).tolist(), run.measured[channel].tolist(),
-            before[at][channel].tolist(), after[at][channel].tolist(), run.used[channel].astype(int).tolist(),
+            names[at],
+            channel,
+            rig.units[channel],
+            (run.time - run.time[0]).tolist(),
+            run.measured[channel].tolist(),
+            before[at][channel].tolist(),
+            after[at][channel].tolist(),
+            run.used[channel].astype(int).tolist(),
             sigma[channel],
         )
         for channel in rig.channels
         for at, run in enumerate(rig.runs)
-    )  # fmt: skip
+    )
 
 
 def _soil(rig: WheelRig, fit: Fitted) -> SoilFit:

@@ -13,6 +13,7 @@ from gritd.estimator.offline.playback import played
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.rig_config import LINEARISATION
@@ -137,12 +138,15 @@ def punctuality(loop: Rows) -> list[str]:
     quantiles = np.quantile(loop["lateness"], (0.5, 0.99, 0.999, 1.0)) * 1e3
     took = np.quantile(loop["duration"], (0.5, 0.99)) * 1e3
     return [
-        "tick lateness {:.3f} ms (50 %), {:.3f} ms (99 %), {:.3f} ms (99.9 %), {:.3f} ms (max)".format(
-            *quantiles
-        ),
-        "tick cost {:.3f} ms (50 %), {:.3f} ms (99 %)".format(*took),
+        f"tick lateness {_listed(quantiles, ('50 %', '99 %', '99.9 %', 'max'))}",
+        f"tick cost {_listed(took, ('50 %', '99 %'))}",
         f"ticks {len(loop)}, missed {int(loop['missed'][-1])}",
     ]
+
+
+def _listed(times: Array, names: Sequence[str]) -> str:
+    """Times [ms], shape (n,), each with its name behind it."""
+    return ", ".join(f"{time:.3f} ms ({name})" for time, name in zip(times, names, strict=True))
 
 
 def headline(found: Sequence[Finding], plant: PlantKind, ticks: Rows) -> str:

@@ -1,4 +1,4 @@
-"""What the filter made of a recording, in a few lines: soil, status, and measured beside predicted."""
+"""What the filter made of a recording, in a few lines: soil, status, measured beside predicted."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
 
 
 def report(path: Path, rows: Rows, each: str) -> str:
-    """`each` says what a row is: "ticks" or "windows". Quantities that the rows lack are left out."""
+    """`each` says what a row is, "ticks" or "windows". What the rows lack is left out."""
     last = {name: rows[name][-1] for name in rows.dtype.names or ()}
     seconds = (int(last["evaluated"]) - int(rows["evaluated"][0])) * 1e-9
     return "\n".join(

@@ -85,7 +85,7 @@ def _run_info(run: RunInfo, arguments: object) -> RunInfo:
 def _parser() -> Parser:
     parser = Parser(
         prog="gritd run",
-        description="Run the daemon until SIGTERM or Ctrl-C; SIGHUP reads calibration, noise and soil again.",
+        description="Run the daemon until SIGTERM or Ctrl-C. SIGHUP reloads the configuration.",
     )
     parser.add_argument(
         "--config", required=True, metavar="F", help="configuration, see config/testbed.yaml"

@@ -189,18 +189,21 @@ def page() -> str:
     return "\n".join(part.rstrip() + "\n" for part in parts)
 
 
-INTRODUCTION = """<!-- made by `python -m gritd.tools.dev.effect_figures`; edit the effects' files instead -->
+INTRODUCTION = """\
+<!-- made by `python -m gritd.tools.dev.effect_figures`; edit the effects' files instead -->
 # The effects
 
-Physics that may be at work on a testbed and that Eqs. (1)-(10) leave out. Each is one file in `estimator/effects/`,
-shared by simulator, diagnosis and on-line filter; [adding an effect](adding-an-effect.md) shows how to write one.
+Physics that may be at work on a testbed and that Eqs. (1)-(10) leave out. Each is one file in
+`estimator/effects/`, shared by simulator, diagnosis and on-line filter; [adding an
+effect](adding-an-effect.md) shows how to write one.
 
-Pictures show the channel where the effect shows most, over the covariate it follows: grey without it, yellow at half
-and red at typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry sand (c = 1 kPa, tan φ = 0.577,
-k = 25 mm, n = 1.1), 65 N, slip 30 % and 0.25 rad/s where they are not swept; load is swept up and down again.
+Pictures show the channel where the effect shows most, over the covariate it follows: grey without
+it, yellow at half and red at typical strength, below the change. Wheel r = 72 mm, b = 71 mm, dry
+sand (c = 1 kPa, tan φ = 0.577, k = 25 mm, n = 1.1), 65 N, slip 30 % and 0.25 rad/s where they are
+not swept; load is swept up and down again.
 
-A parameter is a *strength*, which turns the effect off at the given value, or a *shape*. *Expected* is the prior: the
-typical size of a strength, mean ± standard deviation of a shape.
+A parameter is a *strength*, which turns the effect off at the given value, or a *shape*. *Expected*
+is the prior: the typical size of a strength, mean ± standard deviation of a shape.
 """
 
 
@@ -243,9 +246,9 @@ def _menu() -> str:
 
 MENU = """## Experiments that tell effects apart
 
-`python -m gritd.tools.dev.separation` prints what each of them gains, in standard deviations, for every pair named above: the
-soil within its prior and the other effect are fitted to what the effect changes, on a campaign without the experiment
-and on the same with it.
+`python -m gritd.tools.dev.separation` prints what each of them gains, in standard deviations, for
+every pair named above: the soil within its prior and the other effect are fitted to what the effect
+changes, on a campaign without the experiment and on the same with it.
 """
 
 

@@ -96,7 +96,7 @@ def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
 
 
 def _all(values: Sequence[Uncertain | None], *seed: int) -> Array:
-    """One array of mean ± standard deviation, segment by segment; zero where nothing was measured."""
+    """One array of mean ± standard deviation, segment by segment; 0 where nothing was measured."""
     order = np.random.default_rng(seed)
     scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
     scores /= scores.std()

@@ -159,7 +159,7 @@ def uprights(at: Axes, places: Sequence[float], class_: str) -> Markup:
 
 
 def thinned(x: Array, y: Array, most: int = MOST) -> tuple[Array, Array]:
-    """Of each stretch its least and greatest value, in order; all of it where there are few points."""
+    """Of each stretch its least and greatest value, in order; all where there are few points."""
     if len(x) <= most:
         return x, y
     kept = [

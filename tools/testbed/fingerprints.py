@@ -156,7 +156,7 @@ def _plain() -> list[Response]:
 
 
 def shares(change: Array, by: dict[str, Array]) -> dict[str, float]:
-    """Share of the change explained: `constant` by its mean, every other covariate beyond the mean."""
+    """Share of the change explained: `constant` by its mean, other covariates beyond the mean."""
     total = float(np.mean(change**2))
     if total == 0.0:
         return dict.fromkeys(("constant", *by), 0.0)

@@ -136,7 +136,7 @@ class SlcanBus:
 
 
 def connect(device: Device, bus: CanKind = "auto") -> FarEnd:
-    """The far end of a configured device, on a wire of this computer instead of the configured one."""
+    """The far end of a configured device, on a wire of this computer instead of its own."""
     if device.kind == "serial":
         return SerialDevice(device)
     if bus == "slcan" or (bus == "auto" and not has_multicast()):

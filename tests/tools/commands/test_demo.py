@@ -101,8 +101,8 @@ def test_an_impossible_length_is_one_line():
     done = subprocess.run([*GRITD, "demo", "--seconds", "1"], capture_output=True, text=True)
     assert done.returncode == 2
     assert (
-        done.stderr
-        == "gritd: argument --seconds: found '1'; expected a number from 5 (see gritd demo --help)\n"
+        done.stderr == "gritd: argument --seconds: found '1'; expected a number from 5 "
+        "(see gritd demo --help)\n"
     )
 
 

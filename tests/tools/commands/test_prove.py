@@ -34,7 +34,8 @@ def test_the_diagnosis_sees_recordings_and_configuration_only(finished: Path) ->
         runs = [name for name in said["seen"] if name.startswith("run-")]
         assert runs and set(said["seen"]) - set(runs) == {"testbed.yaml", "testbed.dbc"}
         assert set(said["environment"]) <= {
-            "PATH", "HOME", "LANG", "TMPDIR", "PYTHONPATH", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LC_CTYPE",
+            "PATH", "HOME", "LANG", "TMPDIR", "PYTHONPATH", "OMP_NUM_THREADS",
+            "OPENBLAS_NUM_THREADS", "LC_CTYPE",
         }  # fmt: skip
 
 

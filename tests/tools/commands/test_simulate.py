@@ -1,4 +1,4 @@
-"""`gritd simulate`: the recording holds what the sensors of the configured testbed would have sent."""
+"""`gritd simulate`: the recording holds what the configured sensors would have sent."""
 
 from __future__ import annotations
 

@@ -170,8 +170,8 @@ def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
     )
 
 
-TABLE = """source,wheel_radius_m,wheel_width_m,soil_simulant,soil_shear_modulus_k_m,vertical_load_n,slip,\
-meas_drawbar_pull_n,meas_sinkage_m,meas_torque_nm
+TABLE = """source,wheel_radius_m,wheel_width_m,soil_simulant,soil_shear_modulus_k_m,\
+vertical_load_n,slip,meas_drawbar_pull_n,meas_sinkage_m,meas_torque_nm
 made up,0.1,0.05,sand,0.01,50,0.2,5,0.01,1.5
 made up,0.1,0.05,sand,0.01,60,-0.3,-8,0.012,-0.5
 """.replace("\\\n", "")

@@ -29,6 +29,8 @@ SIGMA = {"torque": 0.012, "drawbar_pull": 0.18, "sinkage": 6e-5}
 UNITS = {"torque": "N·m", "drawbar_pull": "N", "sinkage": "m"}
 CONFIGURATION = "testbed: single-wheel testbed\nwheel:\n  radius: 72 mm\n  width: 71 mm\n"
 
+STANDSTILL = "stand still for some seconds with the drive powered"
+
 
 def traces(
     missing: Callable[[np.ndarray, np.ndarray], np.ndarray] | None,
@@ -57,10 +59,17 @@ def traces(
             noise = SIGMA[channel] * rng.standard_normal(time.size)
             found.append(
                 Trace(
-                    f"{load:g} N", channel, UNITS[channel], time.tolist(), (truth + noise).tolist(), before.tolist(),
-                    (truth if missing else before).tolist(), (~still).astype(int).tolist(), SIGMA[channel],
+                    f"{load:g} N",
+                    channel,
+                    UNITS[channel],
+                    time.tolist(),
+                    (truth + noise).tolist(),
+                    before.tolist(),
+                    (truth if missing else before).tolist(),
+                    (~still).astype(int).tolist(),
+                    SIGMA[channel],
                 )
-            )  # fmt: skip
+            )
     return tuple(found)
 
 
@@ -75,20 +84,33 @@ def scatter(of: tuple[Trace, ...]) -> Scatter:
         for kind in ("before", "after")
     }
     return Scatter(
-        "torque", "slip", "N·m", "-", np.tile(slip[used], len(chosen)).tolist(), residual["before"].tolist(),
-        residual["after"].tolist(), np.repeat(np.arange(len(chosen)), used.sum()).tolist(), SIGMA["torque"],
-    )  # fmt: skip
+        "torque",
+        "slip",
+        "N·m",
+        "-",
+        np.tile(slip[used], len(chosen)).tolist(),
+        residual["before"].tolist(),
+        residual["after"].tolist(),
+        np.repeat(np.arange(len(chosen)), used.sum()).tolist(),
+        SIGMA["torque"],
+    )
 
 
 def soil(after_c: float, sigma: float, moved: float) -> SoilFit:
     prior = {
-        "c": Quantity(1000.0, 300.0, "Pa"), "tan_phi": Quantity(0.577, 0.06, "-"), "k": Quantity(0.025, 0.0025, "m"),
-        "n": Quantity(1.1, 0.011, "-"), "K": Quantity(1.536e6, 7.68e4, "Pa/m^n"),
-    }  # fmt: skip
+        "c": Quantity(1000.0, 300.0, "Pa"),
+        "tan_phi": Quantity(0.577, 0.06, "-"),
+        "k": Quantity(0.025, 0.0025, "m"),
+        "n": Quantity(1.1, 0.011, "-"),
+        "K": Quantity(1.536e6, 7.68e4, "Pa/m^n"),
+    }
     after = {
-        "c": Quantity(after_c, sigma, "Pa"), "tan_phi": Quantity(0.571, 0.008, "-"), "k": Quantity(0.0246, 0.0004, "m"),
-        "n": Quantity(1.098, 0.006, "-"), "K": Quantity(1.55e6, 2.1e4, "Pa/m^n"),
-    }  # fmt: skip
+        "c": Quantity(after_c, sigma, "Pa"),
+        "tan_phi": Quantity(0.571, 0.008, "-"),
+        "k": Quantity(0.0246, 0.0004, "m"),
+        "n": Quantity(1.098, 0.006, "-"),
+        "K": Quantity(1.55e6, 2.1e4, "Pa/m^n"),
+    }
     before = after | {"c": Quantity(after_c + moved, sigma, "Pa")} if moved else after
     return SoilFit(
         prior, before, after, {"c": moved / 300.0, "tan_phi": 0.1, "k": -0.2, "n": 0.0, "K": 0.2}
@@ -114,8 +136,10 @@ def base(**changed: object) -> Diagnosis:
     plain = traces(None, LOADS, tuple(SIGMA))
     made = Diagnosis(
         verdict="consistent",
-        summary="The recordings agree with the model: the largest evidence of a mismatch is 0.8 nats, and noise alone "
-        "exceeds it in 41 % of cases.",
+        summary=(
+            "The recordings agree with the model: the largest evidence of a mismatch is 0.8 "
+            "nats, and noise alone exceeds it in 41 % of cases."
+        ),
         test=Test("omnibus", 0.8, 4.6, 0.41, 0.01, 400),
         location=(),
         hypotheses=(),
@@ -153,38 +177,64 @@ def explained() -> Diagnosis:
     drawn = traces(lambda time, slip: 0.13 + 0.1 * slip, LOADS, tuple(SIGMA))
     return base(
         verdict="explained",
-        summary="The motor consumes 0.13 N·m more than the soil takes, at every load (Coulomb friction, 86 %): the "
-        "torque error on held-out runs falls from 0.11 to 0.013 N·m, and c from 1710 to 1020 Pa.",
+        summary=(
+            "The motor consumes 0.13 N·m more than the soil takes, at every load (Coulomb "
+            "friction, 86 %): the torque error on held-out runs falls from 0.11 to 0.013 N·m, "
+            "and c from 1710 to 1020 Pa."
+        ),
         test=Test("coulomb_friction", 213.0, 4.8, 1.0 / 401.0, 0.01, 400),
         location=(
-            Location("torque", "constant", 0.81, 0.0025, 0.01, "torque is 0.13 N·m too large at every slip and load"),
-            Location("torque", "slip", 0.14, 0.004, 0.03, "torque grows by 0.06 N·m from 10 to 60 % slip"),
+            Location(
+                "torque",
+                "constant",
+                0.81,
+                0.0025,
+                0.01,
+                "torque is 0.13 N·m too large at every slip and load",
+            ),
+            Location(
+                "torque", "slip", 0.14, 0.004, 0.03, "torque grows by 0.06 N·m from 10 to 60 % slip"
+            ),
             Location("torque", "time", 0.02, 0.01, 0.05, "torque rises late in the runs", (12.4,)),
         ),
         hypotheses=(
             Hypothesis(
-                "coulomb_friction", 0.86, 208.0, {"loss": Quantity(0.131, 0.006, "N·m")}, ("current_offset",), True,
+                "coulomb_friction",
+                0.86,
+                208.0,
+                {"loss": Quantity(0.131, 0.006, "N·m")},
+                ("current_offset",),
+                True,
                 "Motor, gear and bearings consume a constant torque while the wheel turns.",
-                separated_by={"current_offset": "stand still for some seconds with the drive powered"},
+                separated_by={"current_offset": STANDSTILL},
             ),
             Hypothesis(
-                "current_offset", 0.12, 205.9, {"offset": Quantity(0.065, 0.003, "A")}, ("coulomb_friction",), False,
+                "current_offset",
+                0.12,
+                205.9,
+                {"offset": Quantity(0.065, 0.003, "A")},
+                ("coulomb_friction",),
+                False,
                 "The shunt amplifier reads a current where there is none.",
-                separated_by={"coulomb_friction": "stand still for some seconds with the drive powered"},
+                separated_by={"coulomb_friction": STANDSTILL},
             ),
-            Hypothesis("viscous_friction", 0.015, 190.0, {"damping": Quantity(0.4, 0.1, "N·m·s/rad")}),
+            Hypothesis(
+                "viscous_friction", 0.015, 190.0, {"damping": Quantity(0.4, 0.1, "N·m·s/rad")}
+            ),
             Hypothesis("rear_contact", 0.004, 40.0, {"ratio": Quantity(0.1, 0.05)}),
             Hypothesis("grousers", 0.001, 12.0, {"height": Quantity(0.002, 0.001, "m")}),
         ),
         soil=soil(1020.0, 60.0, 690.0),
         fit=fit(9.2, innovations=True),
         next_experiment=NextExperiment(
-            "standstill", "stand still for some seconds with the drive powered",
-            ("coulomb_friction", "current_offset"), 11.0,
+            "standstill",
+            STANDSTILL,
+            ("coulomb_friction", "current_offset"),
+            11.0,
         ),
         traces=drawn,
         scatters=(scatter(drawn),),
-    )  # fmt: skip
+    )
 
 
 def several() -> Diagnosis:
@@ -197,9 +247,14 @@ def several() -> Diagnosis:
     first, second, *rest = explained().hypotheses
     sizes = {"cohesion_change": Quantity(0.4, 0.05), "centre": Quantity(0.61, 0.02, "m")}
     patch = Hypothesis(
-        "soil_patch", 0.97, 31.0, sizes, (), True,
+        "soil_patch",
+        0.97,
+        31.0,
+        sizes,
+        (),
+        True,
         "On one stretch of the bed the soil has another cohesion or friction angle.",
-    )  # fmt: skip
+    )
     return replace(
         explained(),
         hypotheses=(first, patch, second, *rest),
@@ -216,21 +271,36 @@ def unlisted() -> Diagnosis:
     )
     return base(
         verdict="unlisted",
-        summary="Torque exceeds the model by up to 0.14 N·m at high slip; no listed effect explains it (best: Coulomb "
-        "friction, 20 %). A fitted law takes 88 % of it.",
+        summary=(
+            "Torque exceeds the model by up to 0.14 N·m at high slip; no listed effect explains "
+            "it (best: Coulomb friction, 20 %). A fitted law takes 88 % of it."
+        ),
         test=Test("torque~slip", 96.0, 4.8, 1.0 / 401.0, 0.01, 400),
-        location=(Location("torque", "slip", 0.9, 0.0025, 0.005, "torque exceeds the model by 0.14 N·m at 60 % slip"),),
+        location=(
+            Location(
+                "torque",
+                "slip",
+                0.9,
+                0.0025,
+                0.005,
+                "torque exceeds the model by 0.14 N·m at 60 % slip",
+            ),
+        ),
         hypotheses=hypotheses,
         soil=soil(1090.0, 90.0, 300.0),
         fit=fit(6.0),
         law=Law(
-            "torque", "0.40 N·m · i²", {"slip": (0.1, 0.6), "speed": (0.02, 0.02)}, 0.88,
+            "torque",
+            "0.40 N·m · i²",
+            {"slip": (0.1, 0.6), "speed": (0.02, 0.02)},
+            0.88,
             MappingProxyType({"torque_slip_squared": Quantity(0.4, 0.02, "N·m")}),
         ),
-        remaining="Replicates differ by less than the law leaves: 0.02 N·m remain above the noise floor",
+        remaining="Replicates differ by less than the law leaves: "
+        "0.02 N·m remain above the noise floor",
         traces=drawn,
         scatters=(scatter(drawn),),
-    )  # fmt: skip
+    )
 
 
 def insufficient() -> Diagnosis:
@@ -238,7 +308,10 @@ def insufficient() -> Diagnosis:
     one = traces(None, (70.0,), ("torque", "sinkage"))
     return base(
         verdict="insufficient",
-        summary="One run at one load cannot tell whether anything is missing: an effect of 0.1 N·m would not show.",
+        summary=(
+            "One run at one load cannot tell whether anything is missing: an effect of 0.1 N·m "
+            "would not show."
+        ),
         test=Test("strain", 3.9, 4.4, 0.02, 0.01, 400),
         soil=None,
         fit=Fit({}, {}, {}, {}),

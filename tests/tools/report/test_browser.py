@@ -19,14 +19,17 @@ CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 )
 OPTIONS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-sync",
     "--disable-background-networking", "--disable-component-update", "--virtual-time-budget=4000",
 )  # fmt: skip
 MEASURE = """<iframe id="f" style="width:{width}px;height:800px" srcdoc="{page}"></iframe>
 <script>document.getElementById('f').onload = e => {{
   const root = e.target.contentDocument.documentElement;
-  const wide = [...root.querySelectorAll('body *')].filter(x => x.getBoundingClientRect().right > {width} + 1);
-  document.title = root.scrollWidth + ' ' + wide.filter(x => !x.closest('svg, .panel-title, thead')).length;
+  const beyond = x => x.getBoundingClientRect().right > {width} + 1;
+  const wide = [...root.querySelectorAll('body *')].filter(beyond);
+  const loose = wide.filter(x => !x.closest('svg, .panel-title, thead'));
+  document.title = root.scrollWidth + ' ' + loose.length;
 }}</script>"""
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")]

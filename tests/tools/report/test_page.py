@@ -251,7 +251,7 @@ def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
 
 
 def test_change_points_are_drawn_and_named() -> None:
-    """A line where the misfit starts; of runs between the two, with the name of the first beyond."""
+    """A line where the misfit starts; between two runs, with the name of the one beyond."""
     found = cases.explained()
     place = replace(found.location[1], changes=(0.3,))
     page = parsed(diagnosis.render(replace(found, location=(place,))))

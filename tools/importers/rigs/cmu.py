@@ -89,7 +89,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="MM/S",
-        help="only steady states of this commanded rim speed (the carriage has 10); may be repeated; default: all",
+        help="only steady states of this commanded rim speed, the carriage having 10; "
+        "may be repeated; default: all",
     )
 
 
@@ -277,7 +278,7 @@ def _import_pressed(tests: list[tuple[Path, str, str]], output: Path) -> Path:
 
 
 def read_penetration(path: Path, series: str, which: str) -> Penetration:
-    """Force log (100 Hz) with the height of the rig's log at the same times. Raises RigFileError."""
+    """Force log (100 Hz) with the height in the rig's log at its times. Raises RigFileError."""
     zero, forces = _forces(path)
     rig = path.with_name(re.sub(r"\.ft\.csv(\.gz)?$", r".rig.txt\1", path.name))
     rows = matrix(rig, 7)

@@ -19,15 +19,19 @@ STYLE = """
     --hit: 90, 190, 150; --miss: 226, 120, 84; }
 }
 * { box-sizing: border-box; }
-body { margin: 2rem auto; max-width: 72rem; padding: 0 1rem; background: var(--paper); color: var(--ink);
-       font: 1rem/1.5 Georgia, "Times New Roman", serif; }
+body { margin: 2rem auto; max-width: 72rem; padding: 0 1rem; background: var(--paper);
+       color: var(--ink); font: 1rem/1.5 Georgia, "Times New Roman", serif; }
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-p, li { max-width: 44rem; } code { font-size: 0.88em; overflow-wrap: anywhere; } td.inset { padding-left: 1.8rem; }
+p, li { max-width: 44rem; } code { font-size: 0.88em; overflow-wrap: anywhere; }
+td.inset { padding-left: 1.8rem; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; font: 0.85rem/1.4 system-ui, sans-serif; font-variant-numeric: tabular-nums; }
-th, td { border-bottom: 1px solid var(--rule); padding: 0.25rem 0.6rem; text-align: left; white-space: nowrap; }
+table { border-collapse: collapse; font: 0.85rem/1.4 system-ui, sans-serif;
+        font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid var(--rule); padding: 0.25rem 0.6rem; text-align: left;
+         white-space: nowrap; }
 thead th { color: var(--faint); font-weight: 600; }
-.matrix td { text-align: center; padding: 0.1rem 0.3rem; min-width: 1.7rem; border: 1px solid var(--rule); }
+.matrix td { text-align: center; padding: 0.1rem 0.3rem; min-width: 1.7rem;
+             border: 1px solid var(--rule); }
 .matrix thead th { height: 11.5rem; vertical-align: bottom; padding: 0 0.2rem; border: 0; }
 .matrix thead th span { writing-mode: vertical-rl; transform: rotate(180deg); }
 .matrix tbody th { font-weight: 400; }
@@ -68,7 +72,8 @@ def _document(body: str) -> str:
         '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
     )
     return (
-        f'<!doctype html>\n<html lang="en"><head>{head}<title>gritd prove</title><style>{STYLE}</style></head>'
+        f'<!doctype html>\n<html lang="en"><head>{head}<title>gritd prove</title>'
+        f"<style>{STYLE}</style></head>"
         f"<body>{body}</body></html>\n"
     )
 
@@ -115,8 +120,8 @@ def _hit(truth: str, name: str) -> bool:
 def _cell(count: int, total: int, hit: bool) -> str:
     if not count:
         return "<td></td>"
-    colour = "--hit" if hit else "--miss"
-    return f'<td style="background: rgba(var({colour}), {0.15 + 0.6 * count / total:.2f})">{count}</td>'
+    colour, opacity = "--hit" if hit else "--miss", 0.15 + 0.6 * count / total
+    return f'<td style="background: rgba(var({colour}), {opacity:.2f})">{count}</td>'
 
 
 def _effects(effects: Mapping[str, Any]) -> str:
@@ -146,7 +151,8 @@ def _misses(rows: Sequence[Row]) -> str:
     if not wrong:
         return "<p>Nothing.</p>"
     items = "".join(
-        f'<tr><td class="faint">{row.number}</td><td>{row.stratum}</td><td>{escape(tables.explained(row))}</td></tr>'
+        f'<tr><td class="faint">{row.number}</td><td>{row.stratum}</td>'
+        f"<td>{escape(tables.explained(row))}</td></tr>"
         for row in wrong
     )
     return f'<div class="wide"><table><tbody>{items}</tbody></table></div>'

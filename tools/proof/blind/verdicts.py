@@ -104,7 +104,7 @@ class Row:
         )
 
     def excess(self, oracle: str) -> float:
-        """Held-out error over the oracle's, geometric mean over the channels. `fitted` or `truth`."""
+        """Held-out error over the oracle's (`fitted` or `truth`), geometric mean over channels."""
         ratios = []
         for channel, (_, after, truth) in self.heldout.items():
             best = math.sqrt(
@@ -116,7 +116,7 @@ class Row:
 
 
 def row(spec: Spec) -> Row:
-    """Open the answers, check them against their seal, and read what was said. Raises CommandError."""
+    """Open the answers, check their seal, and read the diagnosis. Raises CommandError."""
     answers = seal.opened(spec.answers, spec.seal.read_text(encoding="utf-8").strip())
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
     result, trouble = _result(spec.folder / "result.json", outcome)

@@ -63,15 +63,14 @@ class Bench:
         return self.folder / name
 
     def diagnosed(self, recordings: Sequence[Path], configuration: Path, name: str) -> Said:
-        """One diagnosis, in a process that is given nothing but these files. Raises CommandError."""
+        """One diagnosis, in a process that is given these files alone. Raises CommandError."""
         self.step(f"diagnosing {name}")
         result = self.folder / f"{name}.json"
         began = time.monotonic()
         given = [str(p.relative_to(self.folder)) for p in sorted(recordings)]
-        said = self._gritd(
-            "diagnose", *given, "--config", str(configuration.relative_to(self.folder)), "--json", result.name,
-            "--apply", f"{name}.yaml", "--jobs", "1",
-        )  # fmt: skip
+        given += ["--config", str(configuration.relative_to(self.folder))]
+        outputs = ("--json", result.name, "--apply", f"{name}.yaml")
+        said = self._gritd("diagnose", *given, *outputs, "--jobs", "1")
         found = json.loads(result.read_text(encoding="utf-8"))
         return Said(self.commands[-1], said.rstrip(), found, time.monotonic() - began)
 

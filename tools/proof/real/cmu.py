@@ -200,15 +200,16 @@ def _of_frame(*said: Said) -> Asked:
 
 
 REASON_MODULUS = """
-Steady states at one load tell one pressure, not a modulus: with slip-sinkage, exponent, datum and modulus trade against
-each other within what is known of them (modulus ± 50 %, exponent ± 0.2), and without torque the shear is not known
-either.
+Steady states at one load tell one pressure, not a modulus: with slip-sinkage, exponent, datum and
+modulus trade against each other within what is known of them (modulus ± 50 %, exponent ± 0.2), and
+without torque the shear is not known either.
 """
 
 REASON = """
-Steady means hold no ripple, the one thing that only grousers make. What is left is sinkage that grows with slip, as the
-lugs carry soil away, which another dependence on slip or speed describes as well; and 1 to 3 N more pull, half of which
-cohesion and friction angle take up within what was learnt of them on the smooth wheel.
+Steady means hold no ripple, the one thing that only grousers make. What is left is sinkage that
+grows with slip, as the lugs carry soil away, which another dependence on slip or speed describes as
+well; and 1 to 3 N more pull, half of which cohesion and friction angle take up within what was
+learnt of them on the smooth wheel.
 """
 
 GROUSERS = Proof(
@@ -216,16 +217,18 @@ GROUSERS = Proof(
     rig="cmu",
     title="CMU, grousers concealed",
     concealed=f"""
-        Two wheels in dry sand, one smooth, one with grousers of 5 mm (Pavlov and Johnson). That the second has grousers
-        is kept back. Of its steady states the diagnosis sees those at rim speeds of {listed(FIT)} mm/s (the carriage
-        has 10); those at {listed(HELD)} mm/s judge the prediction. The wheel pressed on a rigid stop judges what is
-        said of the frame, the plates whether the soil that is learnt is still theirs.
+        Two wheels in dry sand, one smooth, one with grousers of 5 mm (Pavlov and Johnson). That the
+        second has grousers is kept back. Of its steady states the diagnosis sees those at rim
+        speeds of {listed(FIT)} mm/s (the carriage has 10); those at {listed(HELD)} mm/s judge the
+        prediction. The wheel pressed on a rigid stop judges what is said of the frame, the plates
+        whether the soil that is learnt is still theirs.
     """,
     saw="""
-        First the smooth wheel's steady states at 0 to 90 % slip, three repeats: motion, sinkage, load, drawbar pull, no
-        torque. The configuration has the moduli of the plates pressed into the sand, as uncertain as plates of three
-        sizes disagree. What is found there, soil and effects, becomes the configuration (`--apply`, and the fitted soil
-        with its sigmas). Then the other wheel's states, as if they were of the same wheel.
+        First the smooth wheel's steady states at 0 to 90 % slip, three repeats: motion, sinkage,
+        load, drawbar pull, no torque. The configuration has the moduli of the plates pressed into
+        the sand, as uncertain as plates of three sizes disagree. What is found there, soil and
+        effects, becomes the configuration (`--apply`, and the fitted soil with its sigmas). Then
+        the other wheel's states, as if they were of the same wheel.
     """,
     run=_run,
 )

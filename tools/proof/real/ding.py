@@ -88,10 +88,11 @@ def _asked(said: Said) -> list[Asked]:
 
 
 REASON = """
-Eqs. (8)-(10) with all that was published of this soil give 2.6 N·m at 10 % slip and 6.0 at 60 %, where 3.0 and 5.3 were
-measured, and 23 N of drawbar pull at 60 % slip for 15: shear is mobilised sooner and ends lower than the shear tests
-say, so the fit takes a shear modulus of about a third of the published and a smaller angle. A smooth rim may slide on
-the soil at less than the soil's own angle of friction; no effect of the library stands for that.
+Eqs. (8)-(10) with all that was published of this soil give 2.6 N·m at 10 % slip and 6.0 at 60 %,
+where 3.0 and 5.3 were measured, and 23 N of drawbar pull at 60 % slip for 15: shear is mobilised
+sooner and ends lower than the shear tests say, so the fit takes a shear modulus of about a third of
+the published and a smaller angle. A smooth rim may slide on the soil at less than the soil's own
+angle of friction; no effect of the library stands for that.
 """
 
 STRENGTH = Proof(
@@ -99,13 +100,14 @@ STRENGTH = Proof(
     rig="ding",
     title="Ding 2011, strength of the soil concealed",
     concealed="""
-        Drawbar pull, sinkage and torque of a smooth wheel at 80 N and six slips, read off published figures (Ding et
-        al. 2011, digitised by others). Cohesion and friction angle of the soil, measured by shear tests, are kept back
-        and judge.
+        Drawbar pull, sinkage and torque of a smooth wheel at 80 N and six slips, read off published
+        figures (Ding et al. 2011, digitised by others). Cohesion and friction angle of the soil,
+        measured by shear tests, are kept back and judge.
     """,
     saw="""
-        The six points as segments, with the errors of reading a figure (0.5 N, 0.25 mm, 0.1 N·m); moduli, exponent and
-        shear modulus as published; cohesion 500 ± 500 Pa and tan φ 0.6 ± 0.15, dry sands in general.
+        The six points as segments, with the errors of reading a figure (0.5 N, 0.25 mm, 0.1 N·m);
+        moduli, exponent and shear modulus as published; cohesion 500 ± 500 Pa and tan φ 0.6 ± 0.15,
+        dry sands in general.
     """,
     run=_run,
 )

@@ -162,8 +162,9 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
 
 
 REASON = """
-What remains is friction that is no straight line in speed: without the lowest speeds the judge's own least squares
-moves from the published values by as much (see the table), so the weight that an estimator gives to reversals decides.
+What remains is friction that is no straight line in speed: without the lowest speeds the judge's
+own least squares moves from the published values by as much (see the table), so the weight that an
+estimator gives to reversals decides.
 """
 
 FRICTION = Proof(
@@ -171,11 +172,15 @@ FRICTION = Proof(
     rig="emps",
     title="EMPS, friction concealed",
     concealed="""
-        A linear drive with friction, a public identification benchmark (Janot, Gautier, Brunot 2019). The diagnosis
-        starts from inertia and viscous friction alone. Mass, viscous and Coulomb friction as published with the data
-        judge; so does DATA_EMPS_PULSES, which the diagnosis does not see, by a regression of the judge's own (another
-        filter, grid and derivative).
+        A linear drive with friction, a public identification benchmark (Janot, Gautier, Brunot
+        2019). The diagnosis starts from inertia and viscous friction alone. Mass, viscous and
+        Coulomb friction as published with the data judge; so does DATA_EMPS_PULSES, which the
+        diagnosis does not see, by a regression of the judge's own (another filter, grid and
+        derivative).
     """,
-    saw="Position and control voltage of DATA_EMPS, and the gain from voltage to force. Neither mass nor friction.",
+    saw="""
+        Position and control voltage of DATA_EMPS, and the gain from voltage to force. Neither mass
+        nor friction.
+    """,
     run=_run,
 )

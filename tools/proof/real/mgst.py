@@ -200,8 +200,8 @@ def _of_drivetrain(said: Said, held: Sequence[Held]) -> list[Asked]:
 
 
 REASON_LOSS = """
-At one speed and one load a loss and an error of the torque constant differ only by how they go with the torque itself,
-6.5 and 9.3 N·m, and strength of the soil takes up part of either.
+At one speed and one load a loss and an error of the torque constant differ only by how they go with
+the torque itself, 6.5 and 9.3 N·m, and strength of the soil takes up part of either.
 """
 
 DRIVETRAIN = Proof(
@@ -209,15 +209,17 @@ DRIVETRAIN = Proof(
     rig="mgst",
     title="MGST, drivetrain concealed",
     concealed="""
-        A smooth wheel in GRC-1 lunar simulant, three trials at 20 % and three at 70 % slip, all at one speed (Daca,
-        Tremblay, Skonieczny 2023). The torque of the force/torque sensor, between drivetrain and wheel, is kept back
-        and judges: in steady driving the motor's torque exceeds it by 1.7 to 2.2 N·m, which no soil equation contains.
+        A smooth wheel in GRC-1 lunar simulant, three trials at 20 % and three at 70 % slip, all at
+        one speed (Daca, Tremblay, Skonieczny 2023). The torque of the force/torque sensor, between
+        drivetrain and wheel, is kept back and judges: in steady driving the motor's torque exceeds
+        it by 1.7 to 2.2 N·m, which no soil equation contains.
     """,
     saw="""
-        Wheel and carriage speed, motor current, sinkage since rest, load, drawbar pull, from 3 s on, when speeds are
-        steady. Of soil and rig, what is published: GRC-1 as catalogued with wide sigmas, the torque constant to 5 %,
-        the static sinkage to 8 mm. For the table the diagnosis is made three times more, from four trials each; its
-        model then frees the other two trials' motor torque of what it found, the torque's calibration included.
+        Wheel and carriage speed, motor current, sinkage since rest, load, drawbar pull, from 3 s
+        on, when speeds are steady. Of soil and rig, what is published: GRC-1 as catalogued with
+        wide sigmas, the torque constant to 5 %, the static sinkage to 8 mm. For the table the
+        diagnosis is made three times more, from four trials each; its model then frees the other
+        two trials' motor torque of what it found, the torque's calibration included.
     """,
     run=partial(
         _run,
@@ -253,8 +255,9 @@ def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:
 
 
 REASON_WALL = """
-At one load a drag on the wall, a tilted bed and crosstalk of the load are one and the same constant force, and what a
-sinkage that nobody measured from the surface does to the compaction resistance is much the same.
+At one load a drag on the wall, a tilted bed and crosstalk of the load are one and the same constant
+force, and what a sinkage that nobody measured from the surface does to the compaction resistance is
+much the same.
 """
 
 SIDE_WALL = Proof(
@@ -262,13 +265,13 @@ SIDE_WALL = Proof(
     rig="mgst",
     title="MGST, side wall concealed",
     concealed="""
-        In the same trials the wheel rubs on the side wall of the bin, which takes about 33 N from the drawbar pull. The
-        authors correct for it by a quarter of the lateral force. Correction and lateral force are kept back; the
-        corrected drawbar pull judges.
+        In the same trials the wheel rubs on the side wall of the bin, which takes about 33 N from
+        the drawbar pull. The authors correct for it by a quarter of the lateral force. Correction
+        and lateral force are kept back; the corrected drawbar pull judges.
     """,
     saw="""
-        The drawbar pull as sensed and all other channels, the axle's torque among them, from 3 s on. Held-out trials as
-        above.
+        The drawbar pull as sensed and all other channels, the axle's torque among them, from 3 s
+        on. Held-out trials as above.
     """,
     run=partial(
         _run,

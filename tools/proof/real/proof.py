@@ -1,4 +1,4 @@
-"""What a proof hands back: who said what, what the judge asked, and the figures before and after."""
+"""What a proof hands back: diagnoses, the judge's questions, figures before and after."""
 
 from __future__ import annotations
 

@@ -30,7 +30,8 @@ def main(arguments: list[str]) -> int:
         "hypotheses": [
             {"effect": "coulomb_friction", "probability": 0.7, "accepted": True, "parameters": {},
              "indistinguishable_from": ["current_offset"]},
-            {"effect": "bed_slope", "probability": 0.2, "parameters": {}, "indistinguishable_from": []},
+            {"effect": "bed_slope", "probability": 0.2, "parameters": {},
+                "indistinguishable_from": []},
         ],
         "soil": {"before": soil, "after": soil},
     }  # fmt: skip

@@ -21,7 +21,8 @@ def said(name: str, probability: float = 0.8, *others: str, accepted: bool = Tru
 
 def single(name: str, *hypotheses: Said, verdict: str = "explained", strong: float = 60.0) -> Row:
     return replace(
-        NOBODY, stratum="single", level="strong", truth=(name,), detectability=strong, verdict=verdict,
+        NOBODY, stratum="single", level="strong", truth=(name,), detectability=strong,
+        verdict=verdict,
         hypotheses=hypotheses,
     )  # fmt: skip
 

@@ -87,7 +87,7 @@ def test_the_command_simulates_it(
 
 def test_the_configuration_takes_it(cable_drag: type[Effect]) -> None:
     text = packaged().read_text(encoding="utf-8")
-    text = re.sub(r"(?ms)^effects:.*?(?=^\w|\Z)", block("yaml"), text)
+    text = re.sub(r"(?ms)^effects:.*?(?=^\w|^\.\.\.)", block("yaml"), text)
     read = config.loads(text, "testbed.yaml")
     (effect,) = configured(read.settings.effects)
     assert effect == cable_drag(force=2.0)  # type: ignore[call-arg]

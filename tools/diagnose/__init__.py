@@ -1,1 +1,1 @@
-"""`gritd diagnose`: is there a mismatch, where is it, which physics was left out, what to do next."""
+"""`gritd diagnose`: is there a mismatch, where, which physics was left out, what to do next."""

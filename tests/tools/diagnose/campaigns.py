@@ -30,10 +30,17 @@ def settings() -> Settings:
 
 
 def plan(
-    loads: Sequence[float] = LOADS, seconds: float = 16.0, standstill: bool = True, wrench: bool = True,
-    slow: float = 0.0, slow_time: float = 1.0, noise: float = 1.0, seed: int = 1, reverse: bool = False,
+    loads: Sequence[float] = LOADS,
+    seconds: float = 16.0,
+    standstill: bool = True,
+    wrench: bool = True,
+    slow: float = 0.0,
+    slow_time: float = 1.0,
+    noise: float = 1.0,
+    seed: int = 1,
+    reverse: bool = False,
     stop: bool = False,
-) -> Plan:  # fmt: skip
+) -> Plan:
     """One run a load; three slips and speeds each, in another order each run."""
     motions = []
     for number, load in enumerate(loads):

@@ -16,16 +16,16 @@ from gritd.estimator.visible import visible
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity
 
 
-def applied(configuration: Configuration, found: Diagnosis) -> str:
+def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
     """YAML text; without an accepted effect or law it is the configuration as it was."""
     document: dict[str, Any] = yaml.safe_load(configuration.text)
     effects = dict(document.get("effects") or {})
-    for hypothesis in found.accepted:
+    for hypothesis in diagnosis.accepted:
         effects[hypothesis.effect] = _entry(hypothesis.effect, hypothesis.parameters)
-    if found.law is not None and found.law.parameters:
-        effects["empirical_law"] = _entry("empirical_law", found.law.parameters)
+    if diagnosis.law is not None and diagnosis.law.parameters:
+        effects["empirical_law"] = _entry("empirical_law", diagnosis.law.parameters)
     document["effects"] = effects
-    return f"# made by gritd diagnose: {visible(found.summary)}\n{dumped(document)}"
+    return f"# made by gritd diagnose: {visible(diagnosis.summary)}\n{dumped(document)}"
 
 
 def _entry(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, Any]:

@@ -105,14 +105,14 @@ def find_changes(screening: Screening, model: Model) -> Changes:
     nulls = np.max([largest for each in competitions for largest in _nulls(each)], axis=0)
     threshold = max(tail_quantile(nulls, LEVEL), LEAST)
 
-    found: Changes = {}
+    changes: Changes = {}
     for competition in competitions:
         runs = _between_runs(competition, threshold)
         for part in (*runs, *_taken_apart(competition, runs, threshold)):
             key = (competition.channel, part.steps.covariate)
             places = [float(part.steps.places[i]) for i in part.places]
-            found[key] = tuple(sorted({*found.get(key, ()), *places}))
-    return found
+            changes[key] = tuple(sorted({*changes.get(key, ()), *places}))
+    return changes
 
 
 # ---- what competes -----------------------------------------------------------------------------
@@ -311,15 +311,15 @@ def _between_runs(competition: Competition, threshold: float) -> list[Part]:
     if offsets < MOSTLY * _nats(whole, slice(0, len(whole.a))):
         return []
 
-    left, found = whole, list[Part]()
-    while len(found) < min(FEW_RUNS, len(runs[0].places) - 1):
+    left, parts = whole, list[Part]()
+    while len(parts) < min(FEW_RUNS, len(runs[0].places) - 1):
         part = max((_best(left, steps, windows=False) for steps in runs), key=lambda p: p.evidence)
         if part.evidence < threshold:
             return []
-        found.append(part)
-        taken = np.column_stack([p.direction(len(left.a)) for p in found])
-        if _nats(whole.combined(taken), slice(0, len(found))) >= NEARLY * offsets:
-            return found
+        parts.append(part)
+        taken = np.column_stack([p.direction(len(left.a)) for p in parts])
+        if _nats(whole.combined(taken), slice(0, len(parts))) >= NEARLY * offsets:
+            return parts
         left = left.without(part.direction(len(left.a)))
     return []
 
@@ -336,8 +336,8 @@ def _evidence(left: Projected, block: slice) -> float:
 
 
 def _best(left: Projected, steps: Steps, windows: bool = True) -> Part:
-    found = []
+    parts = []
     for evidence, places in islice(_weighed(left, steps, slice(0, 1)), None if windows else 1):
         at = int(np.argmax(evidence[:, 0]))
-        found.append(Part(float(evidence[at, 0]), steps, places[at]))
-    return max(found, key=lambda part: part.evidence)
+        parts.append(Part(float(evidence[at, 0]), steps, places[at]))
+    return max(parts, key=lambda part: part.evidence)

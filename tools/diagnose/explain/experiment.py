@@ -183,13 +183,13 @@ def _unseen_shown(search: Search) -> dict[str, float]:
 
 def _not_shown(search: Search) -> list[str]:
     """Effects whose signature, at their expected size, is below the alarm."""
-    projection, found = search.base.fitted.projection(), search.first
+    projection, screen = search.base.fitted.projection(), search.first
     size = {
         name: float(np.trace(projection.project(w.columns)[0]))
-        for name, w in found.best.items()
+        for name, w in screen.best.items()
         if isinstance(name, str)
     }
-    return [name for name, squared in size.items() if 0.5 * squared < found.threshold]
+    return [name for name, squared in size.items() if 0.5 * squared < screen.threshold]
 
 
 def _expected(effect: type[Effect]) -> Effect:
@@ -225,8 +225,8 @@ def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequenc
     rig = search.problem.stack.rig
     sigma = np.sqrt(np.diag(search.base.fitted.covariance()))
     slopes = []
-    for i, known in enumerate(rig.constants):
-        if known.soil:
+    for i, constant in enumerate(rig.constants):
+        if constant.soil:
             moved = u.copy()
             moved[i] += STEP
             change = _values(rig.foresee(key, moved, effects)) - _values(here)

@@ -9,7 +9,6 @@ import numpy as np
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
-from gritd.tools.diagnose.explain import traces
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.locate import locate, unmoved
@@ -22,8 +21,9 @@ from gritd.tools.diagnose.explain.result import (
     SoilFit,
     Test,
 )
+from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import label
-from gritd.tools.diagnose.fit.heldout import Held, condition_folds, held_out, rmse, run_folds
+from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
@@ -61,18 +61,18 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         nuisance=_constants(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
         baseline=tuple(e.name for e in rig.baseline),
-        traces=traces.traces(problem, before, after),
-        scatters=traces.scatters(problem, location, before, after),
+        traces=traces(problem, before, after),
+        scatters=scatters(problem, location, before, after),
         redo=redo,
     )
 
 
-def _test(found: Screen) -> Test:
-    first, surprise = found.largest
-    return Test(label(first), surprise, found.threshold, found.p, LEVEL, len(found.nulls))
+def _test(screen: Screen) -> Test:
+    first, surprise = screen.largest
+    return Test(label(first), surprise, screen.threshold, screen.p, LEVEL, len(screen.nulls))
 
 
-def _located(search: Search, accepted: Model, before: Held) -> tuple[Location, ...]:
+def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
     """Where the misfit was made: told of the base model held at what was found beside the accepted
     effects.
     """
@@ -125,7 +125,7 @@ def _alike(decision: Decision, name: str) -> tuple[str, ...]:
     return ()
 
 
-def _gain(before: list[Held], model: Model, every: Sequence[Sequence[Bools]]) -> float:
+def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]]) -> float:
     """The smaller of the gains on held-out runs and on held-out conditions [nats]."""
     gains = [
         float((held_out(model.fitted, folds).log_density - held.log_density).sum())
@@ -138,13 +138,13 @@ def _gain(before: list[Held], model: Model, every: Sequence[Sequence[Bools]]) ->
 def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
     """Fitted values of an effect, in what its units mean for the rig."""
     sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
-    return {
-        p.name: Quantity(
-            f.value(float(x)) * rig.stated(p.unit), float(s) * p.sigma * rig.stated(p.unit), p.unit
-        )
-        for f, x, s in zip(fitted.free, fitted.x, sigma, strict=False)
-        if f.name == name and (p := f.parameter)
-    }
+    quantities = {}
+    for free, x, s in zip(fitted.free, fitted.x, sigma, strict=False):
+        if free.name == name:
+            p, factor = free.parameter, rig.unit_factor(free.parameter.unit)
+            value, spread = free.value(float(x)) * factor, float(s) * p.sigma * factor
+            quantities[p.name] = Quantity(value, spread, p.unit)
+    return quantities
 
 
 # ---- constants, fit and noise ------------------------------------------------------------------
@@ -168,7 +168,7 @@ def _soil(rig: Rig, before: Fitted, after: Fitted) -> SoilFit | None:
     return SoilFit(prior, _constants(rig, before, True), _constants(rig, after, True), strain)
 
 
-def _fit(problem: Problem, before: Held, after: Held) -> Fit:
+def _fit(problem: Problem, before: HeldOut, after: HeldOut) -> Fit:
     stack, rig = problem.stack, problem.stack.rig
     floor = {c: k.sigma for c, k in zip(rig.channels, problem.noise.colours, strict=True)}
     unit = {c: rig.units[c] for c in rig.channels}

@@ -17,12 +17,15 @@ from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.result import Diagnosis
 
 NO_FILTER = "A drive without soil: no on-line filter runs over it."
-NO_UPDATE = "The on-line filter was offered no update: torque, load or motion are missing, or the wheel never settled."
+NO_UPDATE = (
+    "The on-line filter was offered no update: torque, load or motion are missing, or the wheel"
+    " never settled."
+)
 NOTHING_NEW = "Nothing was accepted, so the on-line filter stays as it is."
 
 
 def with_innovations(
-    found: Diagnosis,
+    diagnosis: Diagnosis,
     configuration: config.Configuration,
     recordings: Sequence[Recording],
     soil: bool = True,
@@ -33,27 +36,29 @@ def with_innovations(
     Where there are none, or no improved one, `innovation_note` says why.
     """
     if not soil:
-        return _noted(found, NO_FILTER)
+        return _noted(diagnosis, NO_FILTER)
     try:
         before = innovations(configuration.settings, recordings)
         if not before:
-            return _noted(found, NO_UPDATE)
-        if not found.accepted and found.law is None:
-            return _noted(found, NOTHING_NEW, before, before)
-        improved = config.loads(applied(configuration, found), "improved configuration")
-        return _noted(found, "", before, innovations(improved.settings, recordings))
+            return _noted(diagnosis, NO_UPDATE)
+        if not diagnosis.accepted and diagnosis.law is None:
+            return _noted(diagnosis, NOTHING_NEW, before, before)
+        improved = config.loads(applied(configuration, diagnosis), "improved configuration")
+        return _noted(diagnosis, "", before, innovations(improved.settings, recordings))
     except (RecordingError, config.ConfigError) as error:
-        return _noted(found, f"The on-line filter could not run: {error}.")
+        return _noted(diagnosis, f"The on-line filter could not run: {error}.")
 
 
 def _noted(
-    found: Diagnosis,
+    diagnosis: Diagnosis,
     note: str,
     before: dict[str, float] | None = None,
     after: dict[str, float] | None = None,
 ) -> Diagnosis:
-    fit = replace(found.fit, innovation_before=before, innovation_after=after, innovation_note=note)
-    return replace(found, fit=fit)
+    fit = replace(
+        diagnosis.fit, innovation_before=before, innovation_after=after, innovation_note=note
+    )
+    return replace(diagnosis, fit=fit)
 
 
 def innovations(settings: Settings, recordings: Sequence[Recording]) -> dict[str, float]:

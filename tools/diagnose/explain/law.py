@@ -21,9 +21,9 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain import wording
 from gritd.tools.diagnose.explain.result import Law, Location, Quantity
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
-from gritd.tools.diagnose.fit.heldout import Held, held_out, run_folds
+from gritd.tools.diagnose.fit.heldout import HeldOut, held_out, run_folds
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import WIDE, Fitted, Free, Maker, Problem
+from gritd.tools.diagnose.fit.problem import WIDE, Fitted, FreeParameter, Maker, Problem
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import LawForm, Stack
@@ -46,7 +46,7 @@ class FittedLaw:
 
     law: Law
     fitted: Fitted
-    held: Held
+    held: HeldOut
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,9 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
 # ---- terms -------------------------------------------------------------------------------------
 
 
-def _terms(start: Start, form: LawForm, names: list[str], domain: Domain) -> tuple[Free, ...]:
+def _terms(
+    start: Start, form: LawForm, names: list[str], domain: Domain
+) -> tuple[FreeParameter, ...]:
     """Terms of slip, sinkage and speed that pay."""
     fitted, parameters = start.fitted, {p.name: p for p in form.effect.parameters()}
     edges = _edges(form.effect, domain)
@@ -129,7 +131,7 @@ def _terms(start: Start, form: LawForm, names: list[str], domain: Domain) -> tup
     strengths = [p.name for p in parameters.values() if p.role == "strength"]
     columns = whiten(start.problem.noise, made.columns[:, [strengths.index(n) for n in names]])
     kept = _forward(fitted, columns)
-    return tuple(Free(form.effect, parameters[names[i]], form.effect.name) for i in kept)
+    return tuple(FreeParameter(form.effect, parameters[names[i]], form.effect.name) for i in kept)
 
 
 def _forward(fitted: Fitted, columns: Array) -> list[int]:
@@ -150,7 +152,9 @@ def _value(a: Array, b: Array, index: list[int]) -> float:
     return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
-def _with_terms(start: Start, free: tuple[Free, ...], form: LawForm, domain: Domain) -> Fitted:
+def _with_terms(
+    start: Start, free: tuple[FreeParameter, ...], form: LawForm, domain: Domain
+) -> Fitted:
     """Full fit of the chosen terms; the domain's edges stay."""
     effect, fitted = partial(form.effect, **_edges(form.effect, domain)), start.fitted
     free = tuple(replace(f, effect=effect) for f in free)
@@ -182,14 +186,16 @@ def _law(
     model: Model,
     start: Start,
     prefix: str,
-    free: tuple[Free, ...],
+    free: tuple[FreeParameter, ...],
     domain: Domain,
 ) -> Law:
     fitted, stack = start.fitted, search.problem.stack
     form = stack.rig.law
     assert form is not None
-    channel, found = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
-    terms = [f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in found.items()]
+    channel, quantities = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
+    terms = [
+        f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in quantities.items()
+    ]
     parts = [f"{channel} {' '.join(terms)}, {form.note}"] if terms else []
     parts += _words(stack, start)
 
@@ -199,17 +205,19 @@ def _law(
     along = sorted({f.shape.along[0] for f in start.functions})
     covariates = {n: stack.covariate(n) for n in along}
     ranges = {n: (float(np.min(x)), float(np.max(x))) for n, x in covariates.items()}
-    edges = _stated_edges(form.effect, domain) if found else {}
+    edges = _stated_edges(form.effect, domain) if quantities else {}
     return Law(
         channel,
         "; ".join(parts),
-        {**(domain if found else {}), **ranges},
+        {**(domain if quantities else {}), **ranges},
         gained / max(gained + left, 1e-9),
-        {**found, **edges},
+        {**quantities, **edges},
     )
 
 
-def _quantities(fitted: Fitted, before: int, free: tuple[Free, ...]) -> dict[str, Quantity]:
+def _quantities(
+    fitted: Fitted, before: int, free: tuple[FreeParameter, ...]
+) -> dict[str, Quantity]:
     first = len(fitted.u) + before
     sigma = np.sqrt(np.diag(fitted.covariance()))[first : first + len(free)]
     return {

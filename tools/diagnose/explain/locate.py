@@ -188,13 +188,15 @@ def _waves(screening: Screening, model: Model, projection: Projection) -> list[S
     """
     problem = screening.problem
     searched = [f for f in screening.families if f.shape.kind == "wave"]
-    found: dict[Shape, Signature] = {}
+    likeliest: dict[Shape, Signature] = {}
     for wave in candidates(searched, problem, model.fitted):
-        found.setdefault(wave.shape.family, wave)
-    turning = {c: _turning(screening, projection, c) for c in {shape.channel for shape in found}}
+        likeliest.setdefault(wave.shape.family, wave)
+    turning = {
+        c: _turning(screening, projection, c) for c in {shape.channel for shape in likeliest}
+    }
 
     kept = []
-    for wave in found.values():
+    for wave in likeliest.values():
         own = problem.stack.of(wave.shape.channel)
         ready = whiten_rows(problem.noise, wave.columns[own], own)
         alone = projection.project_rows(ready, own)
@@ -289,8 +291,8 @@ def _evidence(projected: Projected, families: list[Family]) -> float:
     if not families:
         return 0.0
     own = _joined(families)
-    found = log_bayes(projected.a[np.ix_(own, own)], projected.b[own, 0], (0,) * own.size)
-    return float(found) + sum(f.prior for f in families)
+    evidence = log_bayes(projected.a[np.ix_(own, own)], projected.b[own, 0], (0,) * own.size)
+    return float(evidence) + sum(f.prior for f in families)
 
 
 def _false_discovery(p: Array) -> Array:
@@ -371,10 +373,10 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
     nats = 0.5 * model.fitted.u**2
     places = []
     constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
-    for known, u, taken in constants:
-        channel, _, what = known.name.rpartition("_")
+    for constant, u, taken in constants:
+        channel, _, what = constant.name.rpartition("_")
         if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
-            words = wording.strain(channel, what, known.of(u), known.unit, u)
+            words = wording.strain(channel, what, constant.of(u), constant.unit, u)
             p, share = float(2.0 * norm.sf(abs(u))), taken / float(nats.sum())
             places.append(Place(taken, Location(channel, "constant", share, p, p, words)))
     return places

@@ -10,14 +10,14 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Location, Scatter, Trace
-from gritd.tools.diagnose.fit.heldout import Held
+from gritd.tools.diagnose.fit.heldout import HeldOut
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools
 
 PICTURES = 4  # scatters at most
 
 
-def traces(problem: Problem, before: Held, after: Held) -> tuple[Trace, ...]:
+def traces(problem: Problem, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
     """Values that the comparison used, predictions with the value's own run held out."""
     stack, rig = problem.stack, problem.stack.rig
     out = []
@@ -50,7 +50,7 @@ def _spread(values: Array, used: Bools) -> list[float]:
 
 
 def scatters(
-    problem: Problem, location: Sequence[Location], before: Held, after: Held
+    problem: Problem, location: Sequence[Location], before: HeldOut, after: HeldOut
 ) -> tuple[Scatter, ...]:
     stack, rig = problem.stack, problem.stack.rig
     out = []

@@ -1,5 +1,5 @@
-"""The words of a diagnosis: a misfit and its place as a testbed engineer reads them, with numbers in
-the units of the report.
+"""The words of a diagnosis: a misfit and its place as a testbed engineer reads them, with numbers
+in the units of the report.
 
 The residuals are those that the report draws: recorded less predicted with the value's own run held
 out.
@@ -88,9 +88,8 @@ def sentence(
 def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: float) -> str:
     """A ripple of so many times a turn and its amplitude in the channel's unit."""
     size = _amplitude(stack, channel, amplitude)
-    return _started(
-        f"{spelled(channel)}, ripples {_times(order)} a turn, {size}; {percent(share)} of its misfit"
-    )
+    words = f"ripples {_times(order)} a turn, {size}"
+    return _started(f"{spelled(channel)}, {words}; {percent(share)} of its misfit")
 
 
 def wave(stack: Stack, residual: Array, shape: Shape, share: float) -> str:
@@ -342,7 +341,7 @@ def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say
 
 
 def _within(x: Array, own: Bools, part: tuple[float, float]) -> Bools:
-    """The lower or the upper third of a covariate: of two together the outer ends may never meet."""
+    """The lower or the upper third of a covariate: the outer ends of two may never meet."""
     low, high = np.quantile(x[own], (0.0, 1.0 / 3.0) if part is LOW else (2.0 / 3.0, 1.0))
     inside: Bools = (x >= low) & (x <= high)
     return inside

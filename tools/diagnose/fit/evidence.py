@@ -25,11 +25,12 @@ SCALES = np.array([0.1, 0.3, 1.0, 3.0])  # sizes of a strength tried, in units o
 
 @dataclass(frozen=True)
 class Signature:
-    """What a candidate changes: derivative of all values by each strength, per expected size (N, p).
+    """What a candidate changes: derivative (N, p) of all values by each strength.
 
-    sign:   of each strength, 1 where it is bounded to one side.
-    fixed:  the values of an effect's other parameters for which this holds.
-    prior:  log share among all that were tried of the same candidate.
+    columns: the derivatives, per expected size of the strength.
+    sign:    of each strength, 1 where it is bounded to one side.
+    fixed:   the values of an effect's other parameters for which this holds.
+    prior:   log share among all that were tried of the same candidate.
     """
 
     of: Candidate
@@ -46,7 +47,7 @@ class Signature:
 
 
 def log_bayes(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
-    """ln B of one signature: A (p, p), b (p,) or (p, draws); the result has the shape of the draws."""
+    """ln B of one signature, () or (draws,): A (p, p), b (p,) or (p, draws)."""
     values, vectors = np.linalg.eigh(0.5 * (a + a.T))
     values = np.maximum(values, 0.0)
     turned = vectors.T @ b

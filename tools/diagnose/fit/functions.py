@@ -23,15 +23,13 @@ LEVELS = 1e-3  # relative spread below which a covariate does not vary
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
 LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
 BENDS = 2  # cosines by which a share of an effect may vary along time or place
-ORDERS = (
-    1.0,
-    2.0,
-)  # ripples a turn that a smooth term could not take; higher ones belong to listed effects
+# ripples a turn that a smooth term could not take; higher ones belong to listed effects
+ORDERS = (1.0, 2.0)
 
 
 def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
     """One for each channel and covariate (or product of two) that varies."""
-    found = []
+    signatures = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
         size = size_of(stack, channel)
@@ -39,9 +37,9 @@ def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
         for along, columns in _families(stack):
             kept = _scaled(np.where(own[:, None], columns, 0.0), own, size)
             if kept.shape[1]:
-                found.append(Signature(Shape(channel, along), kept, (0,) * kept.shape[1], {}))
+                signatures.append(Signature(Shape(channel, along), kept, (0,) * kept.shape[1], {}))
 
-    return tuple(found)
+    return tuple(signatures)
 
 
 def size_of(stack: Stack, channel: str) -> float:
@@ -59,8 +57,8 @@ def tolerance(stack: Stack, share: float) -> Array:
         own = stack.of(channel)
         size = share * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
         families = [f for along, f in _families(stack) if _tolerated(along)]
-        found = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
-        columns.append(found * size / np.sqrt(max(found.shape[1], 1)))
+        scaled = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
+        columns.append(scaled * size / np.sqrt(max(scaled.shape[1], 1)))
     return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
 
 

@@ -21,7 +21,7 @@ BANDS = 3  # slip and load bands
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldOut:
     """log_density: of each fold given the others [nats]; predicted: (N,) with the value's own fold
     held out.
     """
@@ -65,7 +65,7 @@ def _thirds(time: Array, run: Index) -> Index:
     return out
 
 
-def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> Held:
+def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> HeldOut:
     """Density and prediction of every fold by the model fitted to the others.
 
     beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the
@@ -79,17 +79,17 @@ def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None
         (fitted.u, fitted.x, np.zeros_like(fitted.slack))
     )  # r is the residual without tolerance
     penalty = fitted.penalty**2
-    gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
+    gram, slope = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
     density, predicted = [], fitted.predicted.copy()
     for fold in folds:
         inside = j[fold]
-        less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]
+        less, pulled = gram - inside.T @ inside, slope - inside.T @ r[fold]
         step = np.linalg.solve(less, pulled)
         predicted[fold] = (
             fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
         )
         density.append(_log_density(r[fold] - inside @ step, inside, less))
-    return Held(np.array(density), predicted)
+    return HeldOut(np.array(density), predicted)
 
 
 def _log_density(error: Array, jacobian: Array, gram: Array) -> float:

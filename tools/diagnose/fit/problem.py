@@ -29,7 +29,7 @@ WIDE = 3.0  # a strength's prior standard deviation, in units of the expected si
 
 
 @dataclass(frozen=True)
-class Free:
+class FreeParameter:
     """One parameter of an effect in the fit: its value is off + x · size, inside its bounds."""
 
     effect: Maker
@@ -53,7 +53,7 @@ class Fitted:
     """
 
     effects: tuple[Maker, ...]
-    free: tuple[Free, ...]
+    free: tuple[FreeParameter, ...]
     u: Array  # (q,)
     x: Array  # (p,)
     predicted: Array  # (N,), tolerance not included
@@ -119,8 +119,8 @@ class Fitted:
             sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))
         ]
         pull = b + a @ at  # seen from strengths of nought
-        found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
-        return float(logsumexp(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
+        evidence = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
+        return float(logsumexp(evidence) - np.log(len(evidence)) - b @ at - 0.5 * at @ a @ at)
 
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
@@ -134,7 +134,7 @@ def _choices(strengths: list[int]) -> list[list[int]]:
     return [strengths] if len(strengths) == 1 else [strengths, *([i] for i in strengths)]
 
 
-def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
+def build(effects: Sequence[Maker], free: Sequence[FreeParameter], x: Array) -> tuple[Effect, ...]:
     values: list[dict[str, float]] = [{} for _ in effects]
     for f, value in zip(free, x.tolist(), strict=True):
         values[effects.index(f.effect)][f.parameter.name] = f.value(value)
@@ -164,7 +164,7 @@ class Problem:
     def descend(
         self,
         effects: Sequence[Maker],
-        free: Sequence[Free],
+        free: Sequence[FreeParameter],
         u: Array,
         x: Array,
         rounds: int = ROUNDS,
@@ -181,12 +181,12 @@ class Problem:
     def refine(self, best: Fitted, rounds: int = ROUNDS) -> Fitted:
         """The nearest optimum from a fit that was not finished."""
         for _ in range(rounds):
-            found = self._search(
+            better = self._search(
                 best.effects, best.free, best, self._step(best), len(best.u), best.penalty
             )
-            if found is None:
+            if better is None:
                 break
-            gained, best = best.objective - found.objective, found
+            gained, best = best.objective - better.objective, better
             if gained < ENOUGH:
                 break
         return best
@@ -194,7 +194,7 @@ class Problem:
     def _search(
         self,
         effects: Sequence[Maker],
-        free: Sequence[Free],
+        free: Sequence[FreeParameter],
         best: Fitted,
         step: Array,
         q: int,
@@ -210,7 +210,7 @@ class Problem:
                 return self._state(effects, free, tried, q, (predicted, residual), penalty)
         return None
 
-    def _bounded(self, free: Sequence[Free], centre: Array, q: int) -> Array:
+    def _bounded(self, free: Sequence[FreeParameter], centre: Array, q: int) -> Array:
         out = centre.copy()
         for i, f in enumerate(free):
             p = f.parameter
@@ -221,7 +221,7 @@ class Problem:
         return out
 
     def _at(
-        self, effects: Sequence[Maker], free: Sequence[Free], centre: Array, q: int
+        self, effects: Sequence[Maker], free: Sequence[FreeParameter], centre: Array, q: int
     ) -> tuple[Array, Array]:
         predicted = self.stack.predict(centre[:q], build(effects, free, centre[q:]))
         return predicted, self.measured - whiten(self.noise, predicted)
@@ -239,7 +239,7 @@ class Problem:
     def _state(
         self,
         effects: Sequence[Maker],
-        free: Sequence[Free],
+        free: Sequence[FreeParameter],
         centre: Array,
         q: int,
         at: tuple[Array, Array],
@@ -262,7 +262,7 @@ class Problem:
     def _difference(
         self,
         effects: Sequence[Maker],
-        free: Sequence[Free],
+        free: Sequence[FreeParameter],
         centre: Array,
         q: int,
         i: int,
@@ -290,5 +290,5 @@ class Problem:
         return np.asarray(step[:count])
 
 
-def free_of(effects: Sequence[type[Effect]]) -> tuple[Free, ...]:
-    return tuple(Free(e, p, e.name) for e in effects for p in e.parameters())
+def free_of(effects: Sequence[type[Effect]]) -> tuple[FreeParameter, ...]:
+    return tuple(FreeParameter(e, p, e.name) for e in effects for p in e.parameters())

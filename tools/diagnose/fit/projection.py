@@ -1,10 +1,10 @@
 """What the constants and the accepted effects of a fitted model cannot absorb.
 
 Around its fit a model is linear in its unknowns: constants, effect parameters, tolerance. In units
-of their prior they have unit normal priors, so stacking [whitened J; I] under [whitened residual;
-−u] turns the fit with priors into plain least squares, in which the strain of an unknown against its
-prior is a residual like any other. For columns S of something more, the normal equations with the
-model's unknowns eliminated are
+of their prior they have unit normal priors. Stacking [whitened J; I] under [whitened residual; −u]
+therefore turns the fit with priors into plain least squares, in which the strain of an unknown
+against its prior is a residual like any other. For columns S of something more, the normal
+equations with the model's unknowns eliminated are
 
     A = SᵀMS,   b = SᵀMr,   M the projection off the model's directions,
 
@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Projected:
-    """A (m, m) and b (m, 1 + draws) of m columns: b of the recordings first, then of the surrogates."""
+    """A (m, m) and b (m, 1 + draws) of m columns: of the recordings first, then the surrogates."""
 
     a: Array
     b: Array

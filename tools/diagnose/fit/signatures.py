@@ -31,14 +31,14 @@ def strengths(effect: type[Effect]) -> list[Parameter]:
 def raw_signatures(
     stack: Stack, u: Array, base: Array, names: list[str] | None = None
 ) -> Iterator[Signature]:
-    """Unwhitened signatures of all candidate effects about the base prediction (N,) at constants u."""
+    """Unwhitened signatures of all candidates about the prediction (N,) at constants u (q,)."""
     for name, effect in stack.rig.effects.items():
         if names is None or name in names:
             shapes = list(shape_grid(stack.rig, effect))
             for shape in shapes:
-                found = signature(stack, u, base, effect, shape)
-                if found is not None:
-                    yield found
+                made = signature(stack, u, base, effect, shape)
+                if made is not None:
+                    yield made
 
 
 def signature(
@@ -50,8 +50,8 @@ def signature(
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
     """None where the effect changes nothing that is measured, or runs away however weak it is."""
-    found = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
-    columns = np.column_stack(found)
+    derivatives = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
+    columns = np.column_stack(derivatives)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))

@@ -51,7 +51,8 @@ def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Arra
     motion.
     """
     return np.hypot(
-        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, predicted, colours)), stack.unsure
+        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, predicted, colours)),
+        stack.motion_sigma,
     )
 
 
@@ -81,20 +82,20 @@ def estimate(
     before: a first guess of the noise.
     """
     residual, cells = stack.measured - predicted, replicates.cells(stack)
-    lines_found = standing(stack, residual, explainable, cells)
-    saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, lines_found)))
+    waves = standing(stack, residual, explainable, cells)
+    saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
 
-    found = [
+    posteriors = [
         _fit_channel(stack, channel, residual, saturated, cells, before, rng)
         for channel in stack.rig.channels
     ]
-    colours = tuple(f[0] for f in found)
+    colours = tuple(f[0] for f in posteriors)
     return Noise(
         stack,
         colours,
-        tuple(f[1:] for f in found),
+        tuple(f[1:] for f in posteriors),
         uncertain(stack, predicted, colours),
-        replicates.own_columns(stack, residual, colours, lines_found),
+        replicates.own_columns(stack, residual, colours, waves),
     )
 
 

@@ -35,14 +35,14 @@ SHARE = 8  # of a channel's values, those that lines may take
 def stretches(stack: Stack, channel: str) -> list[Index]:
     """Values of a channel in one run while the wheel moves, long runs cut into equal parts."""
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
-    found: list[Index] = []
+    parts: list[Index] = []
     for number in range(len(stack.rig.runs)):
         index = np.flatnonzero(own & (stack.run == number))
         if index.size:
             time = stack.time[index]
-            parts = int(np.ceil(max(float(np.ptp(time)), 1e-9) / STRETCH))
-            found += [index[part == k] for part in [_parts(time, parts)] for k in range(parts)]
-    return [index for index in found if index.size >= FEW]
+            count = int(np.ceil(max(float(np.ptp(time)), 1e-9) / STRETCH))
+            parts += [index[part == k] for part in [_parts(time, count)] for k in range(count)]
+    return [index for index in parts if index.size >= FEW]
 
 
 def _parts(time: Array, count: int) -> Index:
@@ -109,9 +109,9 @@ def _long(stack: Stack, channel: str) -> Array:
         return np.zeros((stack.size, 0))
     index, x = np.concatenate(parts), stack.covariate("position")
     longest = max(float(np.ptp(x[part])) for part in parts)
-    found = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
-    out = np.zeros((stack.size, 2 * found.shape[1]))
-    out[index] = found.reshape(index.size, -1)
+    shapes = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
+    out = np.zeros((stack.size, 2 * shapes.shape[1]))
+    out[index] = shapes.reshape(index.size, -1)
     return out
 
 

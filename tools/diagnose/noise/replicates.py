@@ -24,11 +24,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, covariance
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 
-WIDTHS = {
-    "slip": 0.04,
-    "speed": 0.08,
-    "load": 0.05,
-}  # of a cell; of speed and load relative to their largest
+# of a cell; of speed and load relative to their largest
+WIDTHS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
 FEW, MANY = 10, 60  # values a cell must hold; cells a channel may have
 PHASES = (0.5, 0.75, 0.0, 0.25)  # of the edges of cells
 EQUAL = 1e-3  # difference of pass or start at which two runs are no replicates
@@ -40,7 +37,7 @@ RARE = 0.01  # probability by which noise alone may make drifts differ as they d
 
 
 def cells(stack: Stack) -> Index:
-    """Number of the cell of each value (N,); −1 where the wheel rests or hardly anything was held."""
+    """Number of the cell of each value (N,); −1 where the wheel rests or little was held."""
     for coarser in (1.0, 2.0, 4.0):
         label = _labels(stack, coarser)
         if label.max(initial=-1) < MANY:
@@ -84,7 +81,7 @@ def _binned(values: Array) -> Index:
     )
 
 
-class Held(NamedTuple):
+class HeldCondition(NamedTuple):
     """What one run did while it held a condition."""
 
     run: int
@@ -121,7 +118,7 @@ def own_columns(
     return np.column_stack(used) if used else np.zeros((stack.size, 0))
 
 
-def between_runs(held: list[Held], terms: Array, count: int) -> Array:
+def between_runs(held: list[HeldCondition], terms: Array, count: int) -> Array:
     """Standard deviations between replicates beyond the noise inside a run (count,); 0 where
     nothing was repeated.
 
@@ -148,7 +145,7 @@ def _waves(stack: Stack, number: int, standing: Array) -> Array:
 
 def _held(
     stack: Stack, residual: Array, label: Index, number: int, colour: Colour, waves: Array
-) -> Iterator[Held]:
+) -> Iterator[HeldCondition]:
     """Every condition that every run held, in one channel, run after run."""
     conditions = _conditions(stack)
     for run in range(len(stack.rig.runs)):
@@ -163,13 +160,15 @@ def _held(
             shapes = _shapes(stack.time[mask], waves[mask])[:, : None if only else 1]
             inverse = np.linalg.pinv(shapes)
             noise = covariance(colour, stack.time[mask], stack.gaps[mask])
-            found = np.full((2, SHAPES + waves.shape[1]), np.nan)
-            found[:, : shapes.shape[1]] = (
+            coefficients = np.full((2, SHAPES + waves.shape[1]), np.nan)
+            coefficients[:, : shapes.shape[1]] = (
                 inverse @ residual[mask],
                 np.diag(inverse @ noise @ inverse.T),
             )
-            found[:, : shapes.shape[1]][:, ~shapes.any(axis=0)] = np.nan
-            yield Held(run, conditions[mask].mean(axis=0), found[0], found[1])
+            coefficients[:, : shapes.shape[1]][:, ~shapes.any(axis=0)] = np.nan
+            yield HeldCondition(
+                run, conditions[mask].mean(axis=0), coefficients[0], coefficients[1]
+            )
 
 
 def _driven(stack: Stack, number: int, run: int) -> Bools:
@@ -186,7 +185,7 @@ def _one_condition(own: Bools, label: Index) -> bool:
     return bool(most >= max(LONG, WHOLE * int(own.sum())))
 
 
-def _next(one: Held, held: list[Held], terms: Array) -> Held | None:
+def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCondition | None:
     """The next run that held the same condition on equal terms."""
     later = [
         two
@@ -213,7 +212,7 @@ def _shapes(time: Array, waves: Array) -> Array:
     return np.column_stack((drifts, np.where(kept, left, 0.0)))
 
 
-def _spread(found: list[tuple[Array, Array]], count: int) -> Array:
+def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
     """Standard deviations (count,), from differences and what variance noise alone gives them,
     (count,) each.
 
@@ -222,7 +221,7 @@ def _spread(found: list[tuple[Array, Array]], count: int) -> Array:
     """
     out = np.zeros(count)
     for order, (difference, chance) in enumerate(
-        np.array(found).reshape(-1, 2, count).transpose(2, 1, 0)
+        np.array(differences).reshape(-1, 2, count).transpose(2, 1, 0)
     ):
         known = np.isfinite(difference)
         squares, chance = difference[known] ** 2, chance[known]

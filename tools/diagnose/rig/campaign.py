@@ -39,7 +39,7 @@ class Campaign:
     def readings(
         self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
     ) -> Array:
-        """True readings (channels, N); weights (N,) and travel are factors on what the motions say."""
+        """True readings (channels, N); weights (N,) and travel are factors on the motions'."""
         if all(_at_once(e) for e in effects):
             return self._simulated(
                 soil, _scaled(self._joined, weights, travelled), effects, slice(None)
@@ -59,9 +59,14 @@ class Campaign:
         self, soil: Soil, motion: Motion, effects: Sequence[Effect], part: slice
     ) -> Array:
         response = simulate_arrays(
-            self._settings.wheel, soil, motion, effects, torque_constant=self._settings.drive.torque_constant.value,
-            theta_1=None if self._start is None else self._start[part], order=ORDER,
-        )  # fmt: skip
+            self._settings.wheel,
+            soil,
+            motion,
+            effects,
+            torque_constant=self._settings.drive.torque_constant.value,
+            theta_1=None if self._start is None else self._start[part],
+            order=ORDER,
+        )
         if part == slice(None):
             self._start = response.theta_1
         return np.stack([sensed_as(response.sensed, c, self._settings) for c in self._channels])
@@ -75,7 +80,7 @@ def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:
 
 
 def _at_once(effect: Effect) -> bool:
-    """Whether every sample stands for itself, so that runs may follow one another without touching."""
+    """Whether every sample stands for itself, so that runs may be joined."""
     listed = EFFECTS.get(effect.name) is type(effect)
     return listed and type(effect).remember is Effect.remember and effect.name not in LAGGING
 
@@ -94,8 +99,8 @@ def _filled(motion: Motion) -> Motion:
 
 def _joined(motions: Sequence[Motion]) -> Motion:
     names = (
-        "time", "wheel_angle", "wheel_speed", "carriage_position", "carriage_speed", "load", "pass_number",
-        "start_position", "wheel_acceleration",
+        "time", "wheel_angle", "wheel_speed", "carriage_position", "carriage_speed", "load",
+        "pass_number", "start_position", "wheel_acceleration",
     )  # fmt: skip
     return Motion(**{name: np.concatenate([getattr(m, name) for m in motions]) for name in names})
 

@@ -1,4 +1,4 @@
-"""What is known of a wheel's testbed and soil: the constants of the base model with their priors."""
+"""What is known of a wheel's testbed and soil: the constants of its model with their priors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.effects import EFFECTS
-from gritd.tools.diagnose.rig.interface import Known
+from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 
 TIMING = 5e-3  # [s] by which a channel's stamps may be off
@@ -32,7 +32,7 @@ def wheel_constants(
     sets: WeightSets,
     weights_stated: bool,
     caveats: list[str],
-) -> tuple[Known, ...]:
+) -> tuple[Constant, ...]:
     """Soil, calibration of every channel, weights, configured effects.
 
     weights_stated: whether all runs state their weights; else the load cell tells them.
@@ -47,26 +47,26 @@ def wheel_constants(
 
 def _calibrations(
     settings: Settings, channels: Sequence[str], sets: WeightSets, weights_stated: bool
-) -> list[Known]:
-    known = []
+) -> list[Constant]:
+    constants = []
     for channel in channels:
         scale, offset = calibration_sigmas(settings, channel)
-        known += [
-            Known(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
-            Known(f"{channel}_offset", 0.0, max(offset, 1e-9), UNITS[channel]),
-            Known(f"{channel}_delay", 0.0, TIMING, "s"),
-            Known(f"{channel}_blur", 0.0, BLUR),
+        constants += [
+            Constant(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
+            Constant(f"{channel}_offset", 0.0, max(offset, 1e-9), UNITS[channel]),
+            Constant(f"{channel}_delay", 0.0, TIMING, "s"),
+            Constant(f"{channel}_blur", 0.0, BLUR),
         ]
 
     nominal = settings.load.nominal
     common = max(nominal.sigma / max(nominal.value, 1e-9), LEAST_WEIGHTS)
-    known.append(Known("weights", 0.0, common))
+    constants.append(Constant("weights", 0.0, common))
     for name, load in zip(sets.names, sets.loads, strict=True):
-        known.append(Known(name, 0.0, _own_weight(settings, load, common, weights_stated)))
+        constants.append(Constant(name, 0.0, _own_weight(settings, load, common, weights_stated)))
 
     carriage = settings.channels["carriage_encoder"].calibration.scale
     scale = max(carriage.sigma / abs(carriage.value), SCALE_FLOOR)
-    return [*known, Known("carriage_scale", 0.0, scale)]
+    return [*constants, Constant("carriage_scale", 0.0, scale)]
 
 
 def _own_weight(settings: Settings, load: float, common: float, weights_stated: bool) -> float:
@@ -100,7 +100,7 @@ def _relative(known: Uncertain) -> float:
     return known.sigma / abs(known.value) if known.value else 0.0
 
 
-def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
+def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
     prior = settings.soil
     modulus = prior.pressure_sinkage.modulus(settings.wheel.width)
     stated = {
@@ -119,7 +119,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
         )
     low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
     return tuple(
-        Known(
+        Constant(
             name,
             value,
             max(sigma, FLOORS[name] * value, 1e-12),
@@ -132,17 +132,17 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Known, ...]:
     )
 
 
-def _configured(settings: Settings) -> tuple[Known, ...]:
+def _configured(settings: Settings) -> tuple[Constant, ...]:
     """Parameters of configured effects float within their own uncertainty, kept inside their
     bounds.
     """
-    known = []
+    constants = []
     for effect in settings.effects:
         for p in EFFECTS[effect.name].parameters():
             stated = effect.parameters.get(p.name)
             if stated is not None and stated.sigma > 0.0:
-                known.append(
-                    Known(
+                constants.append(
+                    Constant(
                         f"{effect.name}.{p.name}",
                         stated.value,
                         stated.sigma,
@@ -151,4 +151,4 @@ def _configured(settings: Settings) -> tuple[Known, ...]:
                         high=p.high,
                     )
                 )
-    return tuple(known)
+    return tuple(constants)

@@ -28,17 +28,15 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.diagnose.rig.interface import Bools, Known, Run, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
 
 RATE = 10.0  # [Hz] of the comparison, as for a wheel
 # [Hz] at most, on which position and current are averaged first and the model is evaluated
 FINE = 250.0
 ORDER = 4  # of the zero-phase low-passes
-SHARP, BAND = (
-    0.12,
-    0.4,
-)  # their cut-offs: of position and torque, of FINE; of the comparison, of RATE
+# their cut-offs: of position and torque, of FINE; of the comparison, of RATE
+SHARP, BAND = 0.12, 0.4
 # sampling intervals by which current and position may be apart: a held output, a bus, a mean
 STAMPS = 2.0
 SHORTEST = 2.0  # [s] of a log
@@ -48,12 +46,13 @@ USUAL = 2.0
 # share of the usual speed; a drive that stays below it rests, and friction holds whatever is asked
 STILL = 0.05
 EFFECTS_OF_A_DRIVE = (
-    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple", "motor_heating", "current_offset",
-    "sensor_latency",
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple",
+    "motor_heating", "current_offset", "sensor_latency",
 )  # fmt: skip
 UNITS = {
-    "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad", "wheel_angle": "rad", "time": "s",
-    "heat": "A²·s", "direction": "-", "run": "-", "constant": "-", "slip": "-", "load": "N", "sinkage": "m",
+    "torque": "N·m", "speed": "rad/s", "acceleration": "rad/s²", "position": "rad",
+    "wheel_angle": "rad", "time": "s", "heat": "A²·s", "direction": "-", "run": "-",
+    "constant": "-", "slip": "-", "load": "N", "sinkage": "m",
 }  # fmt: skip
 
 
@@ -89,12 +88,12 @@ class DriveRig:
         speed = np.abs(np.concatenate([m.velocity for m in self._motions]))
         self.usual = float(np.median(speed[speed > 0.05 * speed.max()]))  # [rad/s]
         self.constants = (
-            Known("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
-            Known("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
-            Known(
+            Constant("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
+            Constant("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
+            Constant(
                 "torque_delay", 0.0, apart := STAMPS * max(m.sampled for m in self._motions), "s"
             ),
-            Known("torque_blur", 0.0, apart**2, "s²"),
+            Constant("torque_blur", 0.0, apart**2, "s²"),
         )
         self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}
         self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
@@ -106,7 +105,7 @@ class DriveRig:
         return 10.0 * USUAL * self.unit / _size(values)
 
     @property
-    def unsure(self) -> Sequence[Mapping[str, Array]]:
+    def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
         """Nothing: both sides of the comparison go through one filter."""
         return [{"torque": np.zeros_like(run.time)} for run in self.runs]
 
@@ -122,15 +121,24 @@ class DriveRig:
         ]
 
     def _torque(
-        self, motion: Moving, inertia: float, damping: float, effects: Sequence[Effect]
+        self, motion: DriveMotion, inertia: float, damping: float, effects: Sequence[Effect]
     ) -> Array:
         """As the current tells it, on the fine grid [N·m]."""
         zero = np.zeros(motion.time.size)
         situation = Situation(
-            time=motion.time, wheel_angle=motion.angle, wheel_speed=motion.velocity / self.usual,
-            wheel_acceleration=motion.acceleration, carriage_speed=zero, position=motion.angle, pass_number=1.0,
-            radius=1.0, width=1.0, slip=zero, direction=np.sign(motion.velocity), load=zero,
-        )  # fmt: skip
+            time=motion.time,
+            wheel_angle=motion.angle,
+            wheel_speed=motion.velocity / self.usual,
+            wheel_acceleration=motion.acceleration,
+            carriage_speed=zero,
+            position=motion.angle,
+            pass_number=1.0,
+            radius=1.0,
+            width=1.0,
+            slip=zero,
+            direction=np.sign(motion.velocity),
+            load=zero,
+        )
         torque = inertia * motion.acceleration + damping * motion.velocity
         situation, _ = drive(replace(situation, torque=torque), effects, 1.0)
         sensed = Sensed(zero, situation.current, zero, zero, torque)
@@ -138,7 +146,7 @@ class DriveRig:
             sensed = effect.sensors(sensed, situation)
         return np.asarray(sensed.current) * self.unit
 
-    def stated(self, unit: str) -> float:
+    def unit_factor(self, unit: str) -> float:
         """Factor from a parameter of the library to what it means for this drive."""
         if unit == "rad/s":
             return self.usual
@@ -153,18 +161,23 @@ class DriveRig:
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:
         """The menu of experiments is a wheel's."""
 
-    def _run(self, motion: Moving, name: str) -> Run:
+    def _run(self, motion: DriveMotion, name: str) -> Run:
         velocity, torque, angle = (
             motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
         )
         still = STILL * self.usual
         fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
         covariates = {
-            "speed": np.abs(velocity), "velocity": velocity, "acceleration": motion.compared(motion.acceleration),
-            "wheel_angle": angle, "position": angle, "time": motion.time[motion.kept],
-            "heat": np.cumsum(torque**2) * motion.every * motion.step, "direction": np.tanh(velocity / still),
+            "speed": np.abs(velocity),
+            "velocity": velocity,
+            "acceleration": motion.compared(motion.acceleration),
+            "wheel_angle": angle,
+            "position": angle,
+            "time": motion.time[motion.kept],
+            "heat": np.cumsum(torque**2) * motion.every * motion.step,
+            "direction": np.tanh(velocity / still),
             "constant": np.ones(velocity.size),
-        }  # fmt: skip
+        }
         return Run(
             name,
             motion.time[motion.kept],
@@ -175,7 +188,7 @@ class DriveRig:
 
 
 @dataclass(frozen=True)
-class Moving:
+class DriveMotion:
     """A drive's motion and torque on the fine grid, arrays (n,), all through one low-pass: none
     lags another.
     """
@@ -203,7 +216,7 @@ class Moving:
         return np.asarray(_low_passed(values, BAND / self.every)[self.kept])
 
 
-def _motion(series: Mapping[str, Series], constant: float, name: str) -> Moving:
+def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMotion:
     """The fine grid, no finer than the log's own sampling. Raises CommandError where the log is too
     short.
     """
@@ -214,14 +227,17 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> Moving:
     begin, end = max(time[0], current_time[0]), min(time[-1], current_time[-1])
     if end - begin < SHORTEST:
         raise CommandError(
-            f"{name}: found {max(end - begin, 0.0):.2f} s of position and current; expected {SHORTEST:g} s",
+            f"{name}: found {max(end - begin, 0.0):.2f} s of position and current;"
+            f" expected {SHORTEST:g} s",
             DAMAGED,
         )
     fine = np.arange(begin + step, end - step, step)
     smooth = _low_passed(_averaged(fine, step, time, angle), SHARP)
     velocity = _rate(smooth, step)
     torque = constant * _low_passed(_averaged(fine, step, current_time, current), SHARP)
-    return Moving(step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque)
+    return DriveMotion(
+        step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque
+    )
 
 
 def _timed(torque: Array, step: float, delay: float, blur: float) -> Array:

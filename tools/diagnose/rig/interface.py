@@ -23,7 +23,7 @@ Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Known:
+class Constant:
     """A constant of the base model: its prior N(0, 1) is on `u`, and its value is what `of` makes
     of u.
 
@@ -109,7 +109,7 @@ class Rig(Protocol):
         """Of channels and covariates."""
 
     @property
-    def constants(self) -> tuple[Known, ...]: ...
+    def constants(self) -> tuple[Constant, ...]: ...
 
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
@@ -130,15 +130,17 @@ class Rig(Protocol):
         """Covariates, alone or multiplied, on which a smooth misfit may depend."""
 
     @property
-    def unsure(self) -> Sequence[Mapping[str, Array]]:
+    def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
         """Per run, standard deviation of every channel's prediction by what is left open of the
         motion.
         """
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
-        """Every channel of every run, for constants u (in prior σ) and effects beyond the baseline."""
+        """Every channel of every run, for constants u (q,) in prior σ and effects beyond the
+        baseline.
+        """
 
-    def stated(self, unit: str) -> float:
+    def unit_factor(self, unit: str) -> float:
         """Factor from a parameter of the library in this unit to what it means for this rig."""
 
     def blur(self, stack: Stack, predicted: Array) -> Array:
@@ -161,7 +163,7 @@ class Rig(Protocol):
 
 
 class Stack:
-    """The used values of all channels and runs as one vector (N,): by channel, then run, then time."""
+    """The used values of all channels and runs as one vector (N,): by channel, run, then time."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -190,8 +192,8 @@ class Stack:
         return self.joined([run.measured for run in self.rig.runs])
 
     @cached_property
-    def unsure(self) -> Array:
-        return self.joined(self.rig.unsure)
+    def motion_sigma(self) -> Array:
+        return self.joined(self.rig.motion_sigma)
 
     @cached_property
     def gaps(self) -> Array:

@@ -1,4 +1,4 @@
-"""The feasible menu of driven experiments, as motions about the middle of what was driven so far."""
+"""The menu of driven experiments, as motions about the middle of what was driven so far."""
 
 from __future__ import annotations
 

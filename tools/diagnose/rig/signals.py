@@ -69,16 +69,16 @@ def is_drive(recordings: Sequence[Recording]) -> bool:
 
 def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
     """Position and current of a drive, as read. Raises CommandError."""
-    found = {
+    series = {
         name: _series(recording, settings.channels[name])
         for name in ("wheel_encoder", "motor_shunt")
     }
-    for name, (time, _) in found.items():
+    for name, (time, _) in series.items():
         if time.size < 100:
             raise _too_little(
                 recording, f"{time.size or 'no'} readings of {name}", "some seconds of a run"
             )
-    return found
+    return series
 
 
 def _too_little(recording: Recording, found: str, expected: str) -> CommandError:
@@ -94,16 +94,16 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
     """SHA-256 of every file. Raises CommandError where two are the same: a run counted twice would
     prove nothing.
     """
-    found: dict[str, str] = {}
+    checksums: dict[str, str] = {}
     for path in paths:
         checksum = sha256(path)
-        if checksum in found.values():
-            first = next(name for name, value in found.items() if value == checksum)
+        if checksum in checksums.values():
+            first = next(name for name, value in checksums.items() if value == checksum)
             raise CommandError(
                 f"{path}: found the same recording as {first}; expected each run once", USAGE
             )
-        found[str(path)] = checksum
-    return found
+        checksums[str(path)] = checksum
+    return checksums
 
 
 def _read(path: Path) -> Recording:
@@ -163,26 +163,28 @@ def _analogue(
     recording: Recording, settings: Settings, series: dict[str, Series]
 ) -> dict[str, Series]:
     names = {"sinkage_pot": "sinkage", "motor_shunt": "current", "motor_temperature": "temperature"}
-    found = {names[name]: series[name] for name in names if name in series and series[name][0].size}
+    analogue = {
+        names[name]: series[name] for name in names if name in series and series[name][0].size
+    }
     wrench = settings.wrench
     if wrench is None:
-        return found
+        return analogue
     rows = recording.arrays("/raw/wrench")
     if not rows.size:
-        return found
+        return analogue
     time = rows["stamp"] * NS - wrench.latency
     axes = {
         "drawbar_pull": ("fx", wrench.drawbar_pull),
         "load": ("fz", wrench.load),
         "axle_torque": ("ty", wrench.torque),
     }
-    return found | {
+    return analogue | {
         name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()
     }
 
 
 def _series(recording: Recording, channel: Channel) -> Series:
-    """Times [s] and physical values of a channel in order of time, readings out of range left out."""
+    """Times [s] and physical values of a channel in order of time, less readings out of range."""
     rows = recording.arrays(f"/raw/{channel.name}")
     if not rows.size:
         return _NONE
@@ -298,8 +300,8 @@ def _line(time: Array, values: Array, edges: Array, reach: int) -> tuple[Turned,
         at = first + y0 / s0 + rate * (middle - s1 / s0)
         left = np.sqrt(np.maximum(y2 - y0 * y0 / s0 - rate * (y1 - s1 * y0 / s0), 0.0) / s0)
     enough = s0 >= LEAST * np.median(s0)
-    found = (np.where(enough, x, np.nan) for x in (at, rate, left / np.sqrt(spread)))
-    return Turned(*found), np.where(enough, left, 0.0)
+    columns = (np.where(enough, x, np.nan) for x in (at, rate, left / np.sqrt(spread)))
+    return Turned(*columns), np.where(enough, left, 0.0)
 
 
 def _spread(sums: Array, most: int) -> Array:

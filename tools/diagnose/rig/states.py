@@ -16,18 +16,14 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
 
 CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
-SETTLING, LONGEST = (
-    0.5,
-    5.0,
-)  # [s] after the wheel starts, before the comparison counts: at least, at most
+# [s] after the wheel starts, before the comparison counts: at least, at most
+SETTLING, LONGEST = 0.5, 5.0
 # [s] before the wheel stops, from which on it no longer counts: a slope's reach, and a servo's ramp
 STOPPING = 0.5
 # [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
 ANGLE = 0.7
-RESTING, RISING = (
-    0.4,
-    0.2,
-)  # [s] the wheel must have stood, and go on standing, for its current to be that at rest
+# [s] the wheel must have stood, and go on standing, for its current to be that at rest
+RESTING, RISING = 0.4, 0.2
 
 
 def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:

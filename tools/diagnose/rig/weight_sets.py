@@ -1,4 +1,4 @@
-"""Weights of their own: what hangs on the axle is a set of plates for each load, and each set errs
+"""Weights of their own: what hangs on the axle is a set for each load, and each set errs
 for itself.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
 
-# values at exactly one load that make a set of weights: in between, plates are being changed
+# values at exactly one load that make a set of weights: in between, weights are being changed
 HELD = 10
 SAME = 0.02  # relative distance at which weights are others
 MANY = 60  # sets at most
@@ -20,7 +20,7 @@ MANY = 60  # sets at most
 
 @dataclass(frozen=True)
 class WeightSets:
-    """Loads (m,) of the sets [N]; which of them each value of a run has, per run (n,), −1 for none."""
+    """Loads (m,) of the sets [N]; which of them each value has, per run (n,), −1 for none."""
 
     loads: tuple[float, ...]
     label: tuple[Index, ...]

@@ -12,9 +12,8 @@ from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import Signals
 
-CLOSE = (
-    0.15  # relative distance of the measured load from the stated one at which both mean the same
-)
+# relative distance of the measured load from the stated one at which both mean the same
+CLOSE = 0.15
 RAISED = 0.2  # share of the stated load below which the wheel is lifted
 PASSING = 0.1  # share of a run that may pass between lifted and loaded
 # [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
@@ -35,8 +34,8 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     A run that states nothing has the configuration's weights, if the measured load is theirs within
     the uncertainties.
     """
-    said = signals.info.nominal_load
-    stated = settings.load.nominal.value if said is None else said
+    nominal = signals.info.nominal_load
+    stated = settings.load.nominal.value if nominal is None else nominal
     constant = np.full(signals.time.size, float(stated))
     measured = signals.analogue.get("load")
     if measured is None or settings.wrench is None or settings.wrench.load.offset.sigma > 1e5:
@@ -44,13 +43,15 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     load = _bridged(measured)
     near, lifted = np.abs(load - stated) <= CLOSE * stated + 1.0, load <= RAISED * stated
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
-    known = said is not None or abs(held - stated) <= DOUBT * _sigma(
+    known = nominal is not None or abs(held - stated) <= DOUBT * _sigma(
         settings.load.nominal, settings.wrench.load
     )
     if known and np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
         return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
-    note = "Weights are taken from the measured load in runs that do not state theirs or that change them: "
-    note += "friction of the load axis cannot show there."
+    note = (
+        "Weights are taken from the measured load in runs that do not state theirs or that change"
+        " them: friction of the load axis cannot show there."
+    )
     if note not in caveats:
         caveats.append(note)
     return Weights(levels(signals.time, load), False)

@@ -93,7 +93,10 @@ class WheelRig:
     # ---- prediction ------------------------------------------------------------------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
-        value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
+        value = {
+            constant.name: constant.of(float(x))
+            for constant, x in zip(self.constants, u, strict=True)
+        }
         read = self._read(self._true(value, (*self._baseline(value), *effects)), value)
         return [
             dict(zip(self.channels, read[:, part], strict=True)) for part in self._campaign.parts
@@ -134,7 +137,7 @@ class WheelRig:
     def _constant(self) -> float:
         return self.settings.drive.torque_constant.value
 
-    def stated(self, unit: str) -> float:
+    def unit_factor(self, unit: str) -> float:
         return 1.0
 
     @property
@@ -148,11 +151,13 @@ class WheelRig:
         }
 
     @cached_property
-    def unsure(self) -> Sequence[Mapping[str, Array]]:
+    def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
         """By the encoders' counts: slip is uncertain by what a carriage would make of it that is
         off by as much.
         """
-        place = next(i for i, known in enumerate(self.constants) if known.name == "carriage_scale")
+        place = next(
+            i for i, constant in enumerate(self.constants) if constant.name == "carriage_scale"
+        )
         u = np.zeros(len(self.constants))
         before = self.predict(u, ())
         u[place] = 1.0
@@ -170,7 +175,10 @@ class WheelRig:
         """Channels under a proposed experiment (see proposals.py), for constants and effects as
         fitted.
         """
-        value = {known.name: known.of(float(x)) for known, x in zip(self.constants, u, strict=True)}
+        value = {
+            constant.name: constant.of(float(x))
+            for constant, x in zip(self.constants, u, strict=True)
+        }
         soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
         acting = (*self._baseline(value), *effects)
         motion = proposed(experiment, self._motions, self.settings.wheel.radius)
@@ -192,16 +200,16 @@ class WheelRig:
 
     @property
     def shortcomings(self) -> list[str]:
-        found = []
+        sentences = []
         loads = np.concatenate([run.covariates["load"] for run in self.runs])
         if np.ptp(loads) < ONE_LOAD * max(float(np.max(loads)), 1e-9):
-            found.append(
+            sentences.append(
                 "One load only: c and tan φ are nearly inseparable, and so are effects that differ"
                 " by load alone."
             )
         if "drawbar_pull" not in self.channels:
-            found.append("No force sensor: what acts on the drawbar pull alone cannot show.")
-        return found
+            sentences.append("No force sensor: what acts on the drawbar pull alone cannot show.")
+        return sentences
 
     # ---- what was recorded -----------------------------------------------------------------------
 
@@ -247,7 +255,10 @@ class WheelRig:
 
     def _depth(self, number: int) -> Array:
         """Sinkage predicted from the prior: the measured one carries the noise of its channel."""
-        motion, prior = self._motions[number], {known.name: known.value for known in self.constants}
+        motion, prior = (
+            self._motions[number],
+            {constant.name: constant.value for constant in self.constants},
+        )
         soil = Soil(prior["c"], prior["tan_phi"], prior["k"], prior["n"], prior["K"])
         return simulate_arrays(
             self.settings.wheel, soil, motion, self.baseline, order=ORDER
@@ -279,7 +290,7 @@ def _channels(
 ) -> tuple[str, ...]:
     """Those that some recording has and that carry information."""
     source = {"torque": "current"}
-    found = []
+    channels = []
     for channel in ("torque", "axle_torque", "drawbar_pull", "sinkage", "load"):
         there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
         if (
@@ -287,8 +298,8 @@ def _channels(
             and calibration_sigmas(settings, channel)[1] < UNKNOWN
             and (channel != "load" or all(weights_known))
         ):
-            found.append(channel)
-    return tuple(found)
+            channels.append(channel)
+    return tuple(channels)
 
 
 def _varies(values: Array | None) -> bool:

@@ -36,9 +36,8 @@ from gritd.tools.diagnose.noise.colour import Colour, whiten_unit
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Index
 
-SIZES = np.array(
-    [0.8, 0.9, 1.0, 1.1, 1.25, 1.5]
-)  # of the noise, beside what suits a channel for itself
+# of the noise, beside what suits a channel for itself
+SIZES = np.array([0.8, 0.9, 1.0, 1.1, 1.25, 1.5])
 NEAR = 10.0  # [nats] colours so far behind the best for a channel alone are not tried in it
 SWEEPS = 2
 AT_ONCE = 8_000_000  # numbers whitened at once
@@ -56,7 +55,7 @@ class Squares:
 
 
 @dataclass(frozen=True)
-class Suiting:
+class SuitableColours:
     """Colours that may suit a channel: products (k, p + 1, p + 1), what their size adds (k,),
     variance (k,), values.
     """
@@ -91,7 +90,7 @@ class OpenNoise:
         self._without = self._evidence(np.zeros(0, dtype=np.intp))
 
     def gain(self, number: int) -> float:
-        """Log Bayes factor of a signature [nats], its share among the shapes of its name counted."""
+        """Log Bayes factor of a signature [nats], its share among all that were tried counted."""
         return self._evidence(self._own[number]) - self._without + self._share[number]
 
     def _evidence(self, more: Index) -> float:
@@ -105,9 +104,9 @@ class OpenNoise:
             int(np.argmax(part.rest - 0.5 * part.count * np.log(part.variance))) for part in parts
         ]
         size = [1.0 for _ in parts]
-        found: list[tuple[float, float]] = []
+        peaks: list[tuple[float, float]] = []
         for _ in range(SWEEPS):
-            found = []
+            peaks = []
             for i, part in enumerate(parts):
                 others = [
                     _term(p, a, s)
@@ -117,10 +116,10 @@ class OpenNoise:
                 value = _averaged(part, prior, others)
                 best = np.unravel_index(int(np.argmax(value)), value.shape)
                 at[i], size[i] = int(best[0]), float(SIZES[best[1]])
-                found.append((float(value.max()), float(logsumexp(value))))
-        return found[-1][0] + sum(average - top for top, average in found)
+                peaks.append((float(value.max()), float(logsumexp(value))))
+        return peaks[-1][0] + sum(average - top for top, average in peaks)
 
-    def _suiting(self, squares: Squares, index: Index) -> Suiting:
+    def _suiting(self, squares: Squares, index: Index) -> SuitableColours:
         gram = squares.gram[:, index[:, None], index]
         acting = np.flatnonzero(np.diagonal(gram[0]) > 0.0)
         alone, variance = restricted(
@@ -128,7 +127,7 @@ class OpenNoise:
         )
         near = np.flatnonzero(alone + self._prior > (alone + self._prior).max() - NEAR)
         rest = self._prior[near] - 0.5 * squares.log_det[near]
-        return Suiting(gram[near], rest, variance[near], squares.count)
+        return SuitableColours(gram[near], rest, variance[near], squares.count)
 
 
 def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour]) -> Squares:
@@ -140,13 +139,13 @@ def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour])
     return Squares(np.concatenate(grams), np.concatenate(dets), len(columns))
 
 
-def _term(part: Suiting, at: int, size: float) -> tuple[Array, float]:
+def _term(part: SuitableColours, at: int, size: float) -> tuple[Array, float]:
     """What a channel of known colour adds to the products and to the log evidence."""
     variance = part.variance[at] * size**2
     return part.gram[at] / variance, float(part.rest[at] - 0.5 * part.count * np.log(variance))
 
 
-def _averaged(part: Suiting, prior: Array, others: Sequence[tuple[Array, float]]) -> Array:
+def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array, float]]) -> Array:
     """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors
     (s, p).
     """

@@ -86,18 +86,18 @@ class Family:
 
 
 def _weighed(
-    found: Sequence[tuple[Array, Array, Array]], count: int, shared: bool, near: Array | None
+    projected: Sequence[tuple[Array, Array, Array]], count: int, shared: bool, near: Array | None
 ) -> Array:
     """Log Bayes factor (count, draws) from squares, coordinates and scores of every block."""
     if shared:
-        squares, inside, score = (np.sum([f[i] for f in found], axis=0) for i in range(3))
-        found = [(squares, inside, score)]
-    width = found[0][0].size // count
+        squares, inside, b = (np.sum([f[i] for f in projected], axis=0) for i in range(3))
+        projected = [(squares, inside, b)]
+    width = projected[0][0].size // count
     sizes = [
         np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)[:, None]
-        for s, i, _ in found
+        for s, i, _ in projected
     ]
-    powers = [np.sum(score.reshape(count, width, -1) ** 2, axis=1) for _, _, score in found]
+    powers = [np.sum(b.reshape(count, width, -1) ** 2, axis=1) for _, _, b in projected]
     level = 1.0 if near is None else _level(sizes, powers, near)
     parts = np.zeros((len(SCALES), *powers[0].shape))
     for size, power in zip(sizes, powers, strict=True):
@@ -109,7 +109,7 @@ def _weighed(
 
 
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
-    """Geometric mean (f, draws) of the neighbours' power, in that of the noise assumed; 1 at least."""
+    """Geometric mean (f, draws) of the neighbours' power, in that of the noise; 1 at least."""
     ratio = np.sum(
         [power / np.maximum(size, TINY) for size, power in zip(sizes, powers, strict=True)], axis=0
     )
@@ -123,14 +123,14 @@ def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
 
 def families(stack: Stack, noise: Noise, surrogates: Surrogates) -> tuple[Family, ...]:
     """Of every channel."""
-    found = []
+    searched = []
     for channel in stack.rig.channels:
         for axis in lines.AXES:
             every = lines.frequencies(stack, channel, axis)
-            found.append(waves(stack, noise, surrogates.residuals, channel, axis, every))
+            searched.append(waves(stack, noise, surrogates.residuals, channel, axis, every))
             at = places(stack, channel, axis)
-            found.append(steps(stack, noise, surrogates.residuals, channel, axis, at))
-    return tuple(family for family in found if family.blocks and family.at.size)
+            searched.append(steps(stack, noise, surrogates.residuals, channel, axis, at))
+    return tuple(family for family in searched if family.blocks and family.at.size)
 
 
 def waves(
@@ -199,7 +199,7 @@ def candidates(search: Sequence[Family], problem: Problem, fitted: Fitted) -> li
     were tried.
     """
     beside = without_harmonics(problem, fitted)
-    return [found for family in search for found in _peaks(family, problem, beside)]
+    return [peak for family in search for peak in _peaks(family, problem, beside)]
 
 
 def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Signature]:
@@ -229,15 +229,15 @@ def _refined(
 
 
 def in_step(
-    search: Sequence[Family], problem: Problem, fitted: Fitted, found: Signature
+    search: Sequence[Family], problem: Problem, fitted: Fitted, wave: Signature
 ) -> Signature:
     """A wave in time with one phase for all runs, where that is likelier than one for each; else as
     it was found.
     """
-    shape = found.shape
+    shape = wave.shape
     family = next(f for f in search if f.shape == shape.family)
     if shape.kind != "wave" or family.axis != "time" or shape.shared or shape.at is None:
-        return found
+        return wave
     stack, beside = problem.stack, without_harmonics(problem, fitted)
 
     x = stack.covariate("time")[stack.of(shape.channel)]
@@ -250,8 +250,8 @@ def in_step(
     value = finer.in_phase(beside, True)[:, 0] - np.log(count)
     best = int(np.argmax(value))
     if value[best] < finer.in_phase(beside, False)[:, 0].max():
-        return found
-    return _signature(stack, replace(shape, at=float(tried[best]), shared=True), found.prior)
+        return wave
+    return _signature(stack, replace(shape, at=float(tried[best]), shared=True), wave.prior)
 
 
 def _signature(stack: Stack, shape: Shape, prior: float) -> Signature:

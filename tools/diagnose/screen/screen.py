@@ -32,7 +32,7 @@ TENTH = 0.9  # quantile from which evidence is counted
 
 
 @dataclass(frozen=True)
-class Whitened:
+class WhitenedSignature:
     """A signature in units of independent noise; its columns may have been left out where they
     vanish.
     """
@@ -56,7 +56,7 @@ class Screen:
 
     evidence: dict[Candidate, float]
     usual: dict[Candidate, tuple[float, float]]
-    best: dict[Candidate, Whitened]
+    best: dict[Candidate, WhitenedSignature]
     fixed: dict[Candidate, list[dict[str, float]]]
     nulls: Array
     chance: dict[Candidate, float] = field(default_factory=dict)
@@ -138,21 +138,21 @@ def tail_chance(values: Array, value: float) -> float:
     return min(counted, max(fitted, 0.1 * least))
 
 
-def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[Whitened]:
+def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[WhitenedSignature]:
     """All columns whitened in one pass."""
     if not signatures:
         return []
     columns = whiten(noise, np.column_stack([s.columns for s in signatures]))
     ends = np.cumsum([len(s.sign) for s in signatures])
     return [
-        Whitened(s, columns[:, end - len(s.sign) : end])
+        WhitenedSignature(s, columns[:, end - len(s.sign) : end])
         for s, end in zip(signatures, ends, strict=True)
     ]
 
 
-def screen(
+def screen_signatures(
     projection: Projection,
-    signatures: Sequence[Whitened],
+    signatures: Sequence[WhitenedSignature],
     searched: Mapping[Shape, Array] | None = None,
 ) -> Screen:
     """Evidence of each candidate (averaged over its signatures) and its largest in every surrogate.
@@ -164,22 +164,22 @@ def screen(
     projected = projection.project_all(np.column_stack([s.columns for s in signatures]))
     ends = np.cumsum([s.columns.shape[1] for s in signatures])
 
-    found: dict[Candidate, list[tuple[Array, Whitened]]] = {}
+    weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]] = {}
     for s, end in zip(signatures, ends, strict=True):
         own = slice(end - s.columns.shape[1], end)
         value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
-        found.setdefault(s.signature.of, []).append((value, s))
-    return _ranked(found, searched or {})
+        weighed.setdefault(s.signature.of, []).append((value, s))
+    return _ranked(weighed, searched or {})
 
 
 def _ranked(
-    found: dict[Candidate, list[tuple[Array, Whitened]]], searched: Mapping[Shape, Array]
+    weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]], searched: Mapping[Shape, Array]
 ) -> Screen:
     """From the log Bayes factors of every signature (1 + draws,), the recordings' first."""
-    best: dict[Candidate, Whitened] = {}
+    best: dict[Candidate, WhitenedSignature] = {}
     fixed: dict[Candidate, list[dict[str, float]]] = {}
     means: dict[Candidate, Array] = {shape: mean for shape, mean in searched.items()}
-    for candidate, tried in found.items():
+    for candidate, tried in weighed.items():
         tried.sort(key=lambda item: -item[0][0])
         fixed[candidate] = [s.signature.fixed for _, s in tried]
         best[candidate] = tried[0][1]

@@ -20,7 +20,13 @@ from gritd.tools.diagnose.noise.colour import surrogates, whiten
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.ripples import LOUDEST, loudest, order_of
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
-from gritd.tools.diagnose.screen.screen import SURE, Screen, screen, tail_chance, whitened
+from gritd.tools.diagnose.screen.screen import (
+    SURE,
+    Screen,
+    screen_signatures,
+    tail_chance,
+    whitened,
+)
 
 NULLS = 300  # surrogates
 WEIGHED = 6  # candidates that stand out whose evidence is weighed with the noise's colour open
@@ -67,10 +73,11 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     signatures = [*_signatures(problem, model, first), *screening.functions]
     beside = without_harmonics(problem, model.fitted, drawn)
     searched = {family.shape: family.average(beside) for family in screening.families}
-    found = screen(model.fitted.projection(drawn), whitened(problem.noise, signatures), searched)
+    projection = model.fitted.projection(drawn)
+    screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
 
     # whether there is a mismatch at all; beside an effect, explanations compete on even terms
-    return found if model.names else replace(found, open=_open(screening, model, found))
+    return screen if model.names else replace(screen, open=_open(screening, model, screen))
 
 
 def chance_of(
@@ -115,20 +122,20 @@ def _worth(
     return [fixed for fixed in tried if fixed[order] in loud]
 
 
-def _open(screening: Screening, model: Model, found: Screen) -> float:
+def _open(screening: Screening, model: Model, screen: Screen) -> float:
     """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
     the search.
     """
-    standing = found.stands_out[:WEIGHED]
+    standing = screen.stands_out[:WEIGHED]
     searched = [family for family in screening.families if family.shape in standing]
     peaks: dict[Candidate, Signature] = {
         s.shape.family: s for s in reversed(candidates(searched, screening.problem, model.fitted))
     }
 
     chosen = [
-        found.best[of].signature if of in found.best else peaks[of]
+        screen.best[of].signature if of in screen.best else peaks[of]
         for of in standing
-        if of in found.best or of in peaks
+        if of in screen.best or of in peaks
     ]
     if not chosen:
         return np.inf

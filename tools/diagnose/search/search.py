@@ -12,9 +12,9 @@ import numpy as np
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem, free_of
+from gritd.tools.diagnose.fit.problem import Fitted, FreeParameter, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import strengths
-from gritd.tools.diagnose.screen.screen import Screen, Whitened
+from gritd.tools.diagnose.screen.screen import Screen, WhitenedSignature
 from gritd.tools.diagnose.screen.screening import Screening, screen_beside
 from gritd.tools.diagnose.search.parallel import each
 
@@ -115,26 +115,26 @@ def _starts(search: Search, size: int) -> list[Model]:
     return [m for m in sized[:PAIRS] if m.evidence > best - _hopeless(search, best)]
 
 
-def likely(found: Screen, names: Sequence[str], most: int) -> list[str]:
+def likely(screen: Screen, names: Sequence[str], most: int) -> list[str]:
     """Listed effects within reach of the best, most likely first."""
-    listed = sorted((n for n in found.listed if n in names), key=lambda n: -found.evidence[n])
+    listed = sorted((n for n in screen.listed if n in names), key=lambda n: -screen.evidence[n])
     if not listed:
         return []
-    top = max(found.evidence[listed[0]], 0.0)
-    return [n for n in listed if found.evidence[n] >= min(REACH * top, top - 6.0)][:most]
+    top = max(screen.evidence[listed[0]], 0.0)
+    return [n for n in listed if screen.evidence[n] >= min(REACH * top, top - 6.0)][:most]
 
 
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
     """With fits of the model and one more effect each; those that may win are fitted to the end."""
-    effects, found = search.problem.stack.rig.effects, search.screens[model]
-    names = [n for n in likely(found, list(effects), most) if not search.has((*model.names, n))]
-    made = each(jobs, lambda name: _fitted(search, model, effects[name], found.best[name]), names)
+    effects, screen = search.problem.stack.rig.effects, search.screens[model]
+    names = [n for n in likely(screen, list(effects), most) if not search.has((*model.names, n))]
+    made = each(jobs, lambda name: _fitted(search, model, effects[name], screen.best[name]), names)
     if made:
         top = max(max(m.evidence for m in made), search.best().evidence)
         behind = _hopeless(search, top)
-        foreseen = max(found.evidence[m.names[-1]] for m in made) - behind
+        foreseen = max(screen.evidence[m.names[-1]] for m in made) - behind
         close = [
-            m for m in made if m.evidence > top - behind or found.evidence[m.names[-1]] > foreseen
+            m for m in made if m.evidence > top - behind or screen.evidence[m.names[-1]] > foreseen
         ]
         done = iter(each(jobs, lambda m: _finished(search.problem, m), close))
         made = [next(done) if m in close else m for m in made]
@@ -152,7 +152,7 @@ def _finished(problem: Problem, model: Model) -> Model:
     return replace(model, fitted=problem.refine(model.fitted, THOROUGH))
 
 
-def _fitted(search: Search, model: Model, effect: type[Effect], best: Whitened) -> Model:
+def _fitted(search: Search, model: Model, effect: type[Effect], best: WhitenedSignature) -> Model:
     """One more effect, started at its linear estimate."""
     a, b = model.fitted.projection().project(best.columns)
     amplitude = np.asarray(np.linalg.solve(a + 0.1 * np.eye(len(b)), b))
@@ -178,7 +178,10 @@ def form(gained: float) -> float:
 
 
 def _start(
-    free: Sequence[Free], effect: type[Effect], amplitude: Array, fixed: Mapping[str, float]
+    free: Sequence[FreeParameter],
+    effect: type[Effect],
+    amplitude: Array,
+    fixed: Mapping[str, float],
 ) -> Array:
     """Where the fit of an effect's parameters begins, in their units."""
     size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
@@ -204,5 +207,5 @@ def _retested(search: Search) -> Search:
     return search
 
 
-def _at(fitted: Fitted, wanted: Free) -> float:
+def _at(fitted: Fitted, wanted: FreeParameter) -> float:
     return float(next(x for f, x in zip(fitted.free, fitted.x, strict=True) if f == wanted))

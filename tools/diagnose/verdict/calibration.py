@@ -33,7 +33,7 @@ class Calibration:
     )
 
     def listed(self, evidence: Array, count: int) -> float:
-        """Log weight of `count` effects, from their evidence (FORMS,), the base model's taken off."""
+        """Log weight of `count` effects, from their evidence (FORMS,) above the base model's."""
         return float(
             logsumexp(evidence / self.temperature + np.array(self.forms))
             + self.more * max(count - 1, 0)
@@ -47,5 +47,5 @@ class Calibration:
 @cache
 def learnt() -> Calibration:
     table: Mapping[str, object] = json.loads(TABLE.read_text(encoding="utf-8"))
-    found = {name: table[name] for name in Calibration.__dataclass_fields__}
-    return Calibration(**{n: tuple(v) if isinstance(v, list) else v for n, v in found.items()})  # type: ignore[arg-type]
+    values = {name: table[name] for name in Calibration.__dataclass_fields__}
+    return Calibration(**{n: tuple(v) if isinstance(v, list) else v for n, v in values.items()})  # type: ignore[arg-type]

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.verdict import forms
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
-from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
+from gritd.tools.diagnose.verdict.decision import Decision, Verdict, WeighedModel
 from gritd.tools.diagnose.verdict.nameless import nameless_evidence, remaining
 
 ALIKE = 2.0  # log odds: effects that are less apart cannot be told apart
@@ -34,15 +34,15 @@ QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
 def decide(search: Search) -> Decision:
     """The verdict on a search."""
-    base, found = search.base, search.first
-    if not found.alarmed:
-        verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
-        return Decision(verdict, base, 1.0, 0.0, False, _quiet(found), 0.0, {})
+    base, screen = search.base, search.first
+    if not screen.alarmed:
+        verdict: Verdict = "consistent" if power(search, screen) >= POWER else "insufficient"
+        return Decision(verdict, base, 1.0, 0.0, False, _quiet(screen), 0.0, {})
     return judged(search, weigh(search), nameless_evidence(search.screening, base), learnt())
 
 
 def judged(
-    search: Search, weighed: Sequence[Weighed], nameless: float, calibration: Calibration
+    search: Search, weighed: Sequence[WeighedModel], nameless: float, calibration: Calibration
 ) -> Decision:
     """The decision from the evidence of all explanations [nats above the base model]."""
     weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
@@ -72,12 +72,12 @@ def judged(
     )
 
 
-def _bending(weighed: Weighed) -> float:
+def _bending(weighed: WeighedModel) -> float:
     """Nats that another published form of the same effects takes of what they leave."""
     return float(weighed.evidence.max() - weighed.evidence[0])
 
 
-def _best(weighed: Sequence[Weighed], weights: Array) -> Model:
+def _best(weighed: Sequence[WeighedModel], weights: Array) -> Model:
     """The likeliest model of the likeliest number of effects: many alike sets of two weigh together
     against one.
     """
@@ -86,7 +86,7 @@ def _best(weighed: Sequence[Weighed], weights: Array) -> Model:
     return weighed[int(np.argmax(np.where(sizes == size, weights, -np.inf)))].model
 
 
-def weigh(search: Search) -> list[Weighed]:
+def weigh(search: Search) -> list[WeighedModel]:
     """The models that may count, the most evident first."""
     base = search.base
     gains = {m: m.fitted.log_evidence - base.fitted.log_evidence for m in search.models if m.names}
@@ -99,11 +99,12 @@ def weigh(search: Search) -> list[Weighed]:
         [m for m in near if (len(m.names) == 1) == single][:WEIGHED] for single in (True, False)
     )
     return [
-        Weighed(m, forms.evidence(search.problem, m.fitted, base.fitted)) for m in (*one, *more)
+        WeighedModel(m, forms.evidence(search.problem, m.fitted, base.fitted))
+        for m in (*one, *more)
     ]
 
 
-def _probabilities(weighed: Sequence[Weighed], log_share: Array) -> dict[str, float]:
+def _probabilities(weighed: Sequence[WeighedModel], log_share: Array) -> dict[str, float]:
     """Weight of all models that hold an effect."""
     out: dict[str, float] = {}
     for w, share in zip(weighed, np.exp(log_share).tolist(), strict=True):
@@ -112,9 +113,9 @@ def _probabilities(weighed: Sequence[Weighed], log_share: Array) -> dict[str, fl
     return out
 
 
-def _quiet(found: Screen) -> dict[str, float]:
+def _quiet(screen: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
-    listed = found.listed
+    listed = screen.listed
     weight = {
         n: float(np.exp(min(e, 20.0) / QUIET)) / max(len(listed), 1) for n, e in listed.items()
     }
@@ -122,31 +123,34 @@ def _quiet(found: Screen) -> dict[str, float]:
     return {n: w / total for n, w in weight.items()}
 
 
-def _groups(weighed: Sequence[Weighed], weights: Array, best: Model) -> dict[str, tuple[str, ...]]:
+def _groups(
+    weighed: Sequence[WeighedModel], weights: Array, best: Model
+) -> dict[str, tuple[str, ...]]:
     """For each effect of the best model, those that could stand in its place."""
-    out: dict[str, tuple[str, ...]] = {}
-    order = np.argsort(-weights)
-    top = max(
-        (w for m, w in zip(weighed, weights.tolist(), strict=True) if m.model is best), default=0.0
-    )
+    pairs = list(zip(weighed, weights.tolist(), strict=True))
+    top = max((weight for m, weight in pairs if m.model is best), default=0.0)
+    close = [
+        weighed[i].model
+        for i in np.argsort(-weights)
+        if weighed[i].model is not best and top - weights[i] < ALIKE
+    ]
+    same = [m for m in close if len(m.names) == len(best.names)]
+
+    groups: dict[str, tuple[str, ...]] = {}
     for name in best.names:
         rest = set(best.names) - {name}
-        rivals = [
-            weighed[i].model for i in order
-            if len(weighed[i].model.names) == len(best.names) and rest <= set(weighed[i].model.names)
-            and weighed[i].model is not best and top - weights[i] < ALIKE
-        ]  # fmt: skip
-        out[name] = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in rest))
-    return out
+        rivals = [m for m in same if rest <= set(m.names)]
+        groups[name] = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in rest))
+    return groups
 
 
-def power(search: Search, found: Screen) -> float:
+def power(search: Search, screen: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size."""
     projection = search.base.fitted.projection()
     seen = []
-    for name, ready in found.best.items():
+    for name, ready in screen.best.items():
         if isinstance(name, str):
             a, _ = projection.project(ready.columns)
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(found.surprise(name, float(gain)) > found.threshold)
+            seen.append(screen.surprise(name, float(gain)) > screen.threshold)
     return float(np.mean(seen)) if seen else 0.0

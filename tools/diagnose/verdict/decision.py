@@ -14,7 +14,7 @@ Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 
 
 @dataclass(frozen=True)
-class Weighed:
+class WeighedModel:
     """A model and its log evidence above the base model's for each degree of difference
     (forms.FORMS,).
     """
@@ -33,5 +33,5 @@ class Decision:
     probability: dict[str, float]
     unlisted: float
     groups: dict[str, tuple[str, ...]]
-    weighed: tuple[Weighed, ...] = ()
+    weighed: tuple[WeighedModel, ...] = ()
     nameless: float = -np.inf  # evidence of functions without a name [nats above the base model]

@@ -32,10 +32,8 @@ from gritd.tools.diagnose.screen.ripples import order_of
 
 WHOLE = (0.05, 0.15, 0.4)  # how far another form may differ, as a share of what the effect does
 NET = (0.1, 0.3, 1.0)  # the same of what the base model cannot absorb of it
-BENDING, ALWAYS = (
-    0.3,
-    2.0,
-)  # share of what an effect explains by itself that its bending may add, and these few nats
+# share of what an effect explains by itself that its bending may add, and these few nats
+BENDING, ALWAYS = 0.3, 2.0
 FORMS = 1 + len(WHOLE) + len(NET)  # degrees of difference, none first
 
 
@@ -53,7 +51,7 @@ def evidence(problem: Problem, fitted: Fitted, base: Fitted) -> Array:
 
 
 def _gains(problem: Problem, fitted: Fitted, added: list[Array], sizes: Sequence[float]) -> Array:
-    """What a discrepancy of each size adds to the log evidence, where the effects add `added` (N,)."""
+    """What a discrepancy of each size adds to the log evidence; the effects add `added` (N,)."""
     columns = _bent(problem.stack, fitted, added)
     if not columns.shape[1]:
         return np.zeros(len(sizes))
@@ -67,7 +65,7 @@ def _gains(problem: Problem, fitted: Fitted, added: list[Array], sizes: Sequence
 
 
 def _bent(stack: Stack, fitted: Fitted, added: list[Array]) -> Array:
-    """What each effect adds, times every smooth function in every channel (N, m), each for ρ = 1."""
+    """What each effect adds, times every smooth function in every channel (N, m), for ρ = 1."""
     columns = []
     for number, whole in enumerate(added):
         turns = _harmonics(stack, fitted, number)

@@ -26,8 +26,8 @@ def remaining(search: Search, model: Model) -> tuple[float, bool]:
     """Nats that functions without a name would still gain; whether any of them stands out of the
     noise.
     """
-    found = search.screen_of(model)
-    standing = found.alarmed and any(isinstance(of, Shape) for of in found.stands_out)
+    screen = search.screen_of(model)
+    standing = screen.alarmed and any(isinstance(of, Shape) for of in screen.stands_out)
     return (_chosen(search.screening, model)[0] if standing else 0.0), standing
 
 
@@ -50,13 +50,13 @@ def nameless_functions(screening: Screening, model: Model) -> list[Signature]:
 
 def _refitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> float:
     """Evidence of functions with everything else fitted anew beside them [nats]."""
-    problem, found = screening.problem, model.fitted
+    problem, start = screening.problem, model.fitted
     columns, prior = np.column_stack([s.columns for s in chosen]), sum(s.prior for s in chosen)
     gains = []
     for scale in SIZES:
         beside = problem.beside(columns * scale)
-        fitted = beside.descend(found.effects, found.free, found.u, found.x)
-        gain = fitted.log_evidence - found.log_evidence + prior
+        fitted = beside.descend(start.effects, start.free, start.u, start.x)
+        gain = fitted.log_evidence - start.log_evidence + prior
         gains.append(gain - (PAIR + _form(gain)) * (len(chosen) - 1))
     return max(gains)
 

@@ -6,8 +6,8 @@ weights of how far forms may
 differ, and the odds are those that give the truth of every case the largest probability, on
 average: the logarithmic score, which only stated probabilities that are true maximise (Good 1952).
 A prior (START, PRIOR) keeps what few cases do not tell. The truth of a case is any set of effects
-that holds a true one, weighted by how many of its effects are true; of a stranger, functions
-without a name.
+that holds a true one, weighted by how many of its effects are true; of an effect not in the list,
+functions without a name.
 """
 
 from __future__ import annotations
@@ -33,13 +33,9 @@ START = np.array(
 )  # ln T, forms after the first, odds, lapse
 PRIOR = np.array([0.2, *([1.0] * (FORMS - 1)), 1.0, 1.0, 0.2])  # standard deviations about START
 # The lapse is nearly what it starts at: our own cases tell little of a plant that is not ours. On
-# the independent plant
-# 5 of 96 first names that were stated with 0.93 were wrong, in a sealed batch that had been opened.
-LEARNT_FROM = (
-    "cousin",
-    "pair",
-    "unlisted",
-)  # where the formula is the diagnosis' own, names come too easily
+# the independent plant 5 of 96 first names that were stated with 0.93 were wrong, in a sealed batch
+# that had been opened. Where the formula is the diagnosis' own, names come too easily.
+LEARNT_FROM = ("cousin", "pair", "unlisted")
 OTHERS = 30  # names among which a lapse spreads
 NEVER = -1e9
 
@@ -52,7 +48,7 @@ class Table:
     more: Array  # (n, k) effects beyond the first
     right: Array  # (n, k) how much of the explanation is true
     nameless: Array  # (n,) evidence of functions without a name
-    strange: Array  # (n,) 1 where functions without a name are the truth
+    unlisted: Array  # (n,) 1 where functions without a name are the truth
 
 
 def tabled(cases: Sequence[dict[str, Any]]) -> Table:
@@ -63,8 +59,8 @@ def tabled(cases: Sequence[dict[str, Any]]) -> Table:
         for j, (names, values) in enumerate(case["weighed"]):
             evidence[i, j], more[i, j] = values, len(names) - 1
             right[i, j] = _true(names, case["truth"])
-    strange = np.array([float(c["stratum"] == "unlisted") for c in cases])
-    return Table(evidence, more, right, np.array([c["nameless"] for c in cases]), strange)
+    unlisted = np.array([float(c["stratum"] == "unlisted") for c in cases])
+    return Table(evidence, more, right, np.array([c["nameless"] for c in cases]), unlisted)
 
 
 def _true(names: Sequence[str], truth: Sequence[str]) -> float:
@@ -81,8 +77,8 @@ def log_truth(table: Table, by: Calibration) -> Array:
     unnamed = table.nameless / by.temperature + by.nameless
     total = np.logaddexp(logsumexp(listed, axis=1), unnamed)
     right = np.sum(np.exp(listed - total[:, None]) * table.right, axis=1)
-    found = np.where(table.strange > 0.0, np.exp(unnamed - total), right)
-    return np.asarray(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * found))
+    share = np.where(table.unlisted > 0.0, np.exp(unnamed - total), right)
+    return np.asarray(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * share))
 
 
 def calibration(x: Array) -> Calibration:
@@ -103,8 +99,8 @@ def learn(cases: Sequence[dict[str, Any]]) -> tuple[Calibration, float]:
             0.5 * np.sum(((x - START) / PRIOR) ** 2) - log_truth(table, calibration(x)).sum()
         )
 
-    found = minimize(loss, START, method="L-BFGS-B")
-    by = calibration(found.x)
+    optimum = minimize(loss, START, method="L-BFGS-B")
+    by = calibration(optimum.x)
     return by, float(log_truth(table, by).mean())
 
 
@@ -129,8 +125,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         line for path in arguments.files for line in path.read_text(encoding="utf-8").splitlines()
     ]
     cases = usable([json.loads(line) for line in lines])
-    by, score = learn(cases)
-    table = {**by.__dict__, "cases": len(cases), "score": score, "trials": arguments.trials}
+    by, log_score = learn(cases)
+    table = {**by.__dict__, "cases": len(cases), "score": log_score, "trials": arguments.trials}
     text = json.dumps(table, indent=1) + "\n"
     if arguments.out is not None:
         arguments.out.write_text(text, encoding="utf-8")

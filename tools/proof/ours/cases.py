@@ -60,7 +60,7 @@ class Plan:
     errors: dict[
         str, tuple[float, float]
     ]  # of calibration, by channel: relative error of the scale, zero error
-    plates: tuple[float, ...]  # relative error of each run's weights
+    weight_errors: tuple[float, ...]  # relative, of each run's weights
     seed: int
 
 
@@ -92,7 +92,7 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
         bool(rng.random() < 0.8) and lack != "force",
         _errors(settings, rng),
         tuple(
-            (rng.standard_normal() + _plates(loads, rng))
+            (rng.standard_normal() + _set_errors(loads, rng))
             * np.sqrt(0.5)
             * _relative(settings.load.nominal)
         ),
@@ -100,9 +100,9 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
     )
 
 
-def _plates(loads: Array, rng: np.random.Generator) -> Array:
-    """What the plates of each run are off by for themselves, in σ; the same load hangs on the same
-    plates.
+def _set_errors(loads: Array, rng: np.random.Generator) -> Array:
+    """What the weights of each run are off by for themselves, in σ; one load is one set of
+    weights.
     """
     drawn = rng.standard_normal(loads.size)
     return drawn if np.ptp(loads) > 0.0 else np.full(loads.size, drawn[0])
@@ -193,7 +193,9 @@ def _recorded(
     plan: Plan, number: int, acting: Sequence[Effect], rng: np.random.Generator, noisy: bool
 ) -> Signals:
     motion, settings = plan.motions[number], plan.settings
-    servo = replace(_servo(motion, rng), load=np.asarray(motion.load) * (1.0 + plan.plates[number]))
+    servo = replace(
+        _servo(motion, rng), load=np.asarray(motion.load) * (1.0 + plan.weight_errors[number])
+    )
     response = simulate_arrays(
         settings.wheel,
         plan.soil,
@@ -226,9 +228,17 @@ def _recorded(
     )
     middle = 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     return Signals(
-        info.name, Path(f"{info.name}.mcap"), info, float(edges[0]), middle, *wheel[:2], *carriage[:2],
-        doubt(wheel, carriage), analogue, (),
-    )  # fmt: skip
+        info.name,
+        Path(f"{info.name}.mcap"),
+        info,
+        float(edges[0]),
+        middle,
+        *wheel[:2],
+        *carriage[:2],
+        doubt(wheel, carriage),
+        analogue,
+        (),
+    )
 
 
 def _servo(motion: Motion, rng: np.random.Generator) -> Motion:

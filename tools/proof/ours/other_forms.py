@@ -209,6 +209,7 @@ class LevellingPeakShift(Cousin):
 
 
 COUSINS: tuple[type[Cousin], ...] = (
-    ReeceSlipSinkage, LorentzStribeck, PowerViscous, PowerRateShear, LinearDrying, LogMultipass, PlainBulldozing,
-    QuadraticHeating, HumpedShear, SlippingRearContact, StiffeningFrame, SaturatingRateSinkage, LevellingPeakShift,
+    ReeceSlipSinkage, LorentzStribeck, PowerViscous, PowerRateShear, LinearDrying, LogMultipass,
+    PlainBulldozing, QuadraticHeating, HumpedShear, SlippingRearContact, StiffeningFrame,
+    SaturatingRateSinkage, LevellingPeakShift,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The table of the trials: names, false alarms, soil, held-out error, calibration, strangers."""
+"""The table of the trials: names, false alarms, soil, held-out error, calibration."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ def table(results: Results) -> str:
     """Markdown, a line a figure, with 95 % bounds after Clopper and Pearson (1934)."""
     done = [r for r in results if "verdict" in r]
     none, one = ([r for r in done if r["stratum"] == s] for s in ("none", "effect"))
-    cousin, pair, strange = (
+    cousin, pair, unlisted = (
         [r for r in done if r["stratum"] == s] for s in ("cousin", "pair", "unlisted")
     )
     lines = ["| figure | value |", "|---|---|"]
-    lines += [f"| {name} | {value} |" for name, value in _rows(none, one, cousin, pair, strange)]
+    lines += [f"| {name} | {value} |" for name, value in _rows(none, one, cousin, pair, unlisted)]
     failed = [r for r in results if "error" in r]
     unseen = sum("skipped" in r for r in results)
-    lines += [
-        f"| cases | {len(done)}, {unseen} undetectable in any campaign drawn, {len(failed)} errors |"
-    ]
+    unusable = f"{unseen} undetectable in any campaign drawn, {len(failed)} errors"
+    lines.append(f"| cases | {len(done)}, {unusable} |")
     lines += (
         [f"| seconds a case, median | {np.median([r['seconds'] for r in done]):.0f} |"]
         if done
@@ -35,15 +34,15 @@ def table(results: Results) -> str:
         [
             *lines,
             "",
-            *_reliability(one + none + cousin + strange),
+            *_reliability(one + none + cousin + unlisted),
             "",
-            *_misses(one + cousin + strange),
+            *_misses(one + cousin + unlisted),
         ]
     )
 
 
 def _rows(
-    none: Results, one: Results, cousin: Results, pair: Results, strange: Results
+    none: Results, one: Results, cousin: Results, pair: Results, unlisted: Results
 ) -> list[tuple[str, str]]:
     alarmed = [r for r in one if r["verdict"] in ("explained", "unlisted")]
     absorbed = [r for r in one if _error(r, 1) > 2.0]
@@ -65,10 +64,13 @@ def _rows(
         ),
         ("both of a pair accepted, by group", _rate(sum(_both(r) for r in pair), len(pair))),
         (
-            "strangers called unlisted",
-            _rate(sum(r["verdict"] == "unlisted" for r in strange), len(strange)),
+            "unlisted effects called unlisted",
+            _rate(sum(r["verdict"] == "unlisted" for r in unlisted), len(unlisted)),
         ),
-        ("strangers given a name above 0.5", _rate(sum(_named(r) for r in strange), len(strange))),
+        (
+            "unlisted effects given a name above 0.5",
+            _rate(sum(_named(r) for r in unlisted), len(unlisted)),
+        ),
         ("c or tan φ off by more than 2σ before", _rate(len(absorbed), len(one))),
         (
             "of those within 2σ after",

@@ -1,12 +1,11 @@
 """`python -m gritd.tools.proof.ours.trials`: the diagnosis on fresh cases of our own simulator,
 scored against their truth.
 
-Strengths are three to five times the detection limit (strangers, which a listed effect must not be
-able to mimic, eight
-to fifteen times): the strength whose whitened signature, soil and calibration projected out, has a
-squared length of 16 (four standard deviations) in the drawn campaign. An effect whose limit lies
-beyond three times its expected size cannot be seen in that campaign; another campaign is drawn for
-it.
+Strengths are three to five times the detection limit (what is not listed, and must not be mimicked
+by what is, eight to fifteen times): the strength whose whitened signature, soil and calibration
+projected out, has a squared length of 16 (four standard deviations) in the drawn campaign. An
+effect whose limit lies beyond three times its expected size cannot be seen in that campaign;
+another campaign is drawn for it.
 """
 
 from __future__ import annotations
@@ -44,13 +43,11 @@ from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import LACKS, Plan, draw, record, scaled
 from gritd.tools.proof.ours.other_forms import COUSINS
 from gritd.tools.proof.ours.score_table import table
-from gritd.tools.proof.ours.unlisted import STRANGERS
+from gritd.tools.proof.ours.unlisted import UNLISTED
 
 LIMIT = 16.0  # squared length of a signature at the detection limit
-STRONG, STRANGE = (
-    (3.0, 5.0),
-    (8.0, 15.0),
-)  # times the limit; a stranger that a listed effect mimics must show as well
+# times the limit; what is not listed must show although a listed effect mimics it
+STRONG, STRONGER = (3.0, 5.0), (8.0, 15.0)
 LARGEST = 3.0  # expected sizes
 DRAWS = 6  # campaigns tried for an effect
 PAIRS = (
@@ -81,7 +78,7 @@ def cases(
     strength: tuple[float, float] | None = None,
     lack: str = "",
 ) -> Iterator[Case]:
-    """Strata in turn: a sixth without effect, single effects, other forms, pairs, strangers."""
+    """Strata in turn: a sixth without effect, effects, other forms, pairs, unlisted effects."""
     rng = np.random.default_rng(seed)
     for number in range(count):
         stratum = ORDER[number % len(ORDER)]
@@ -89,7 +86,7 @@ def cases(
         if stratum == "effect":
             truth = (LISTED[int(rng.integers(len(LISTED)))],)
         elif stratum == "unlisted":
-            truth = (STRANGERS[int(rng.integers(len(STRANGERS)))].__name__,)
+            truth = (UNLISTED[int(rng.integers(len(UNLISTED)))].__name__,)
         elif stratum == "cousin":
             truth = (COUSINS[int(rng.integers(len(COUSINS)))].__name__,)
         elif stratum == "pair":
@@ -121,7 +118,7 @@ def trial(case: Case) -> dict[str, Any]:
 def _trial(case: Case) -> dict[str, Any]:
     rng = np.random.default_rng(case.seed)
     settings = config.load(packaged()).settings
-    own: dict[str, type[Effect]] = {t.__name__: t for t in (*STRANGERS, *COUSINS)}
+    own: dict[str, type[Effect]] = {t.__name__: t for t in (*UNLISTED, *COUSINS)}
     types = [EFFECTS.get(n) or own[n] for n in case.truth]
     drawn = _drawn(settings, types, case, rng)
     if drawn is None:
@@ -131,10 +128,10 @@ def _trial(case: Case) -> dict[str, Any]:
     noise = np.random.default_rng(0)
     search = search_models(prepare_screening(fit_base(rig, noise), noise))
     decision = decide(search)
-    found = explain(search, decision, {"seed": 0})
+    diagnosis = explain(search, decision, {"seed": 0})
     return (
-        _scored(case, plan, acting, found)
-        | _oracle(case, types, acting, search, found)
+        _scored(case, plan, acting, diagnosis)
+        | _oracle(case, types, acting, search, diagnosis)
         | work(search, decision)
     )
 
@@ -163,7 +160,7 @@ def _drawn(
         if not types:
             return plan, []
         base = fit_base(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
-        span = case.strength or (STRANGE if types[0] in STRANGERS else STRONG)
+        span = case.strength or (STRONGER if types[0] in UNLISTED else STRONG)
         acting = [_strong(base, t, span, rng) for t in types]
         if all(a is not None for a in acting):
             return plan, [a for a in acting if a is not None]
@@ -190,7 +187,7 @@ def _strong(
 
 
 def _limit(base: BaseFit, at: Effect) -> float | None:
-    """Size, in expected strengths, at which the projected signature has a squared length of LIMIT."""
+    """Size, in expected strengths, of which the projected signature has squared length LIMIT."""
     stack, fitted = base.problem.stack, base.fitted
     change = stack.predict(fitted.u, (at,)) - fitted.predicted
     if not np.isfinite(change).all() or not np.abs(change).any():
@@ -200,22 +197,24 @@ def _limit(base: BaseFit, at: Effect) -> float | None:
     return 0.5 * float(np.sqrt(LIMIT / squared)) if squared > 1e-9 else None
 
 
-def _scored(case: Case, plan: Plan, acting: Sequence[Effect], found: Diagnosis) -> dict[str, Any]:
+def _scored(
+    case: Case, plan: Plan, acting: Sequence[Effect], diagnosis: Diagnosis
+) -> dict[str, Any]:
     true = {"c": float(np.mean(plan.soil.cohesion)), "tan_phi": float(np.mean(plan.soil.tan_phi))}
-    soil = found.soil
+    soil = diagnosis.soil
     assert soil is not None
     return {
         "acting": [str(a) for a in acting],
-        "verdict": found.verdict,
-        "first": found.hypotheses[0].effect if found.hypotheses else None,
-        "accepted": [h.effect for h in found.accepted],
-        "groups": {h.effect: list(h.indistinguishable_from) for h in found.hypotheses},
-        "ranking": [h.effect for h in found.hypotheses],
-        "probability": {h.effect: h.probability for h in found.hypotheses},
-        "p": found.test.p,
-        "alarm": found.test.name,
-        "statistic": found.test.statistic,
-        "threshold": found.test.threshold,
+        "verdict": diagnosis.verdict,
+        "first": diagnosis.hypotheses[0].effect if diagnosis.hypotheses else None,
+        "accepted": [h.effect for h in diagnosis.accepted],
+        "groups": {h.effect: list(h.indistinguishable_from) for h in diagnosis.hypotheses},
+        "ranking": [h.effect for h in diagnosis.hypotheses],
+        "probability": {h.effect: h.probability for h in diagnosis.hypotheses},
+        "p": diagnosis.test.p,
+        "alarm": diagnosis.test.name,
+        "statistic": diagnosis.test.statistic,
+        "threshold": diagnosis.test.threshold,
         "soil": {
             n: [
                 true[n],
@@ -227,11 +226,11 @@ def _scored(case: Case, plan: Plan, acting: Sequence[Effect], found: Diagnosis) 
             for n in true
         },
         "prior_sigma": {n: soil.prior[n].sigma for n in true},
-        "channels": list(found.fit.unit),
+        "channels": list(diagnosis.fit.unit),
         "slow": [plan.slow, plan.slow_time],
-        "summary": found.summary,
-        "remaining": found.remaining,
-        "law": found.law.expression if found.law else None,
+        "summary": diagnosis.summary,
+        "remaining": diagnosis.remaining,
+        "law": diagnosis.law.expression if diagnosis.law else None,
     }
 
 
@@ -240,9 +239,9 @@ def _oracle(
     types: list[type[Effect]],
     acting: Sequence[Effect],
     search: Search,
-    found: Diagnosis,
+    diagnosis: Diagnosis,
 ) -> dict[str, Any]:
-    """Held-out error over that of a fit that knows which effects are at work, mean over channels."""
+    """Held-out error over that of a fit that knows the effects at work, mean over channels."""
     if case.stratum not in ("effect", "pair"):
         return {}
     free = free_of(types)
@@ -256,8 +255,8 @@ def _oracle(
     best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
     gained = search.base.fitted.log_evidence
     return {
-        "oracle": float(np.mean([found.fit.after[c] / best[c] for c in best])),
-        "before": float(np.mean([found.fit.before[c] / best[c] for c in best])),
+        "oracle": float(np.mean([diagnosis.fit.after[c] / best[c] for c in best])),
+        "before": float(np.mean([diagnosis.fit.before[c] / best[c] for c in best])),
         "truth_gain": fitted.log_evidence - gained,
         "best_gain": search.best().fitted.log_evidence - gained,
     }
@@ -303,9 +302,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _line(result: dict[str, Any]) -> str:
     if "verdict" not in result:
         return f"{result['stratum']} {result['truth']}: {result.get('error', 'cannot be seen')}"
+    first = [round(v, 2) for v in list(result["probability"].values())[:3]]
     return (
-        f"{result['stratum']} {'+'.join(result['truth'])}: {result['verdict']} {result['accepted'] or result['first']}"
-        f" {[round(v, 2) for v in list(result['probability'].values())[:3]]} p {result['p']:.3f}"
+        f"{result['stratum']} {'+'.join(result['truth'])}: {result['verdict']}"
+        f" {result['accepted'] or result['first']} {first} p {result['p']:.3f}"
         f" {result['seconds']:.0f} s"
     )
 

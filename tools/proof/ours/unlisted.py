@@ -135,7 +135,7 @@ class SlippedBracket(Effect):
         )
 
 
-STRANGERS: tuple[type[Effect], ...] = (
+UNLISTED: tuple[type[Effect], ...] = (
     BearingFriction, HungryPull, BentRail, CableDrag, SpeedBump, StickySinkage,
     NextDoor, RailJoint, SlippedBracket,
 )  # fmt: skip

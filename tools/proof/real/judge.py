@@ -17,7 +17,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Known
+from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.signals import read_all, signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.importers.segments import DURATION, PAUSE
@@ -110,7 +110,7 @@ def effects(found: dict[str, Any]) -> tuple[Effect, ...]:
     )
 
 
-def _strain(known: Known, value: float) -> float:
+def _strain(known: Constant, value: float) -> float:
     if known.log:
         return float(np.log(value / known.value) * known.value / known.sigma)
     return (value - known.value) / known.sigma

@@ -50,9 +50,15 @@ def stack_of(slip: float = 0.2) -> Any:
     ]
     rig = SimpleNamespace(channels=("sinkage",), runs=runs)
     return SimpleNamespace(
-        rig=rig, size=time.size, time=time, run=run, gaps=gaps, channel=np.zeros(time.size, dtype=int),
-        covariate=held.__getitem__, of=lambda _: np.ones(time.size, bool),
-    )  # fmt: skip
+        rig=rig,
+        size=time.size,
+        time=time,
+        run=run,
+        gaps=gaps,
+        channel=np.zeros(time.size, dtype=int),
+        covariate=held.__getitem__,
+        of=lambda _: np.ones(time.size, bool),
+    )
 
 
 def wandering(stack: Any, mean: float, drift: float, seed: int = 0) -> Array:
@@ -86,8 +92,11 @@ def own(stack: Any, residual: Array, waves: Array | None = None) -> Array:
 
 def test_noise_alone_makes_no_drift() -> None:
     stack = stack_of()
-    found = [replicates.own_columns(stack, wandering(stack, 0.0, 0.0, s), (NOISE,), np.zeros((stack.size, 0)))
-             for s in range(40)]  # fmt: skip
+    none = np.zeros((stack.size, 0))
+    found = [
+        replicates.own_columns(stack, wandering(stack, 0.0, 0.0, seed), (NOISE,), none)
+        for seed in range(40)
+    ]
     assert np.mean([columns.shape[1] > RUNS for columns in found]) < 0.15
     assert max(float(np.abs(columns).max(initial=0.0)) for columns in found) < 2.0 * NOISE.sigma
 
@@ -145,7 +154,9 @@ def repeated(slow: float = 0.0, seed: int = 1) -> Plan:
         held = Schedule((Segment(2.0, load, slip, 0.0), Segment(16.0, load, slip, 0.02)), 0.5)
         motion = motion_of(held, settings().wheel.radius, RATE)
         motions.append(replace(motion, time=np.asarray(motion.time) + 40.0 * number))
-    return replace(drawn, motions=tuple(motions), weights=(60.0,) * RUNS, plates=(0.0,) * RUNS)
+    return replace(
+        drawn, motions=tuple(motions), weights=(60.0,) * RUNS, weight_errors=(0.0,) * RUNS
+    )
 
 
 def drifting(signals: list[Signals], size: float) -> list[Signals]:

@@ -72,7 +72,7 @@ def fitted(made: DriveRig) -> dict[str, float]:
     constants = {k.name: k.of(float(u)) for k, u in zip(made.constants, found.u, strict=True)}
     values = zip(found.free, found.x, strict=True)
     return constants | {
-        f.parameter.name: f.value(float(x)) * made.stated(f.parameter.unit) for f, x in values
+        f.parameter.name: f.value(float(x)) * made.unit_factor(f.parameter.unit) for f, x in values
     }
 
 

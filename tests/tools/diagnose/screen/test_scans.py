@@ -46,9 +46,14 @@ def stack() -> Any:
     known = {"speed": np.full(run.size, 0.02), "time": own + 61.7 * run, "position": 0.02 * own}
     rig = SimpleNamespace(channels=("pull",), runs=[None] * RUNS)
     return SimpleNamespace(
-        rig=rig, run=run, time=known["time"], size=run.size, gaps=np.where(own == 0.0, np.inf, STEP),
-        covariate=known.__getitem__, of=lambda channel: np.ones(run.size, bool),
-    )  # fmt: skip
+        rig=rig,
+        run=run,
+        time=known["time"],
+        size=run.size,
+        gaps=np.where(own == 0.0, np.inf, STEP),
+        covariate=known.__getitem__,
+        of=lambda channel: np.ones(run.size, bool),
+    )
 
 
 def standing(made: Any, values: Array) -> Array:
@@ -61,7 +66,7 @@ def standing(made: Any, values: Array) -> Array:
 
 
 def test_noise_of_any_colour_holds_no_line() -> None:
-    """One channel in a hundred at each axis may; slow noise must not lose its slow part to lines."""
+    """One channel in a hundred at each axis may; slow noise must not lose its slow part."""
     made, rng = stack(), np.random.default_rng(1)
     for colour in (Colour(1.0, 1.0, 0.0), Colour(1.0, 0.5, 0.7, 0.2), Colour(1.0, 4.0, 0.95, 0.04)):
         noise = coloured(made.gaps, 25, colour, rng)
@@ -110,7 +115,7 @@ def test_a_machine_next_door_is_heard_with_its_period() -> None:
 
 
 def test_a_joint_of_the_rails_is_found_where_it_is() -> None:
-    """And the law holds it, so that held-out runs are predicted and the soil need not bend to it."""
+    """And the law holds it, so that held-out runs are predicted and the soil need not bend."""
     search = begun(RailJoint, 2.0)
     evidence = search.first.evidence
     assert search.first.alarmed

@@ -45,7 +45,7 @@ def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:
 
 
 def _evidence(acting: Sequence[Effect], name: str) -> Any:
-    """Evidence of a listed effect above the base model, for each degree to which forms may differ."""
+    """Evidence of a listed effect above the base model, for each degree of difference of forms."""
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig, np.random.default_rng(0))
     effect = EFFECTS[name]
@@ -98,7 +98,7 @@ def test_an_explanation_that_leaves_much_is_none(
         for n, o in (((), 1000.0), (("a",), 0.0))
     )
     search: Any = SimpleNamespace(base=base)
-    weighed: Any = [decide.Weighed(best, np.full(forms.FORMS, 480.0))]
+    weighed: Any = [decide.WeighedModel(best, np.full(forms.FORMS, 480.0))]
     found = decide.judged(search, weighed, 200.0, learnt())
     assert found.verdict == verdict
     assert found.probability["a"] + found.unlisted == pytest.approx(1.0 - learnt().lapse)

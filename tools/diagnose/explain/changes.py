@@ -262,8 +262,10 @@ def _weighed(
     count = len(a)
     # of the choice of step or window, form, covariate and width
     price = np.log(4.0 * len(ALONG) * len(WIDTHS))
+
     single = log_evidence_singly(np.diag(a), b)
     yield single - np.log(count) - price, [(i,) for i in range(count)]
+
     if count > 1:
         i, j = np.triu_indices(count, 1)
         inside = np.diag(a)[i] + np.diag(a)[j] - 2.0 * a[i, j]

@@ -64,6 +64,7 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
         return _most_shown(_unseen_shown(search))
     if decision.verdict == "unlisted":
         return _shape_of_misfit(search)
+
     rivals = _rivals(search, decision)
     return _between(search, rivals) if len(rivals) > 1 else None
 
@@ -169,6 +170,7 @@ def _unseen_shown(search: Search) -> dict[str, float]:
     """
     rig, base = search.problem.stack.rig, search.base
     unseen = [_expected(rig.effects[name]) for name in _not_shown(search)]
+
     out = {}
     for key in DRIVEN if unseen else ():
         here = rig.foresee(key, base.fitted.u, ())
@@ -225,6 +227,7 @@ def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequenc
     rig = search.problem.stack.rig
     sigma = np.sqrt(np.diag(search.base.fitted.covariance()))
     slopes = []
+
     for i, constant in enumerate(rig.constants):
         if constant.soil:
             moved = u.copy()

@@ -89,6 +89,7 @@ def _hypotheses(
 ) -> tuple[Hypothesis, ...]:
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
+
     ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
     out = []
     for name, probability in ranked[:SHOWN]:

@@ -74,4 +74,5 @@ def innovations(settings: Settings, recordings: Sequence[Recording]) -> dict[str
             variance, innovation = table[f"{name}_s"], table[f"{name}_innovation"]
             offered = (variance > 0.0) & np.isfinite(innovation)
             squares[name] += (innovation[offered] ** 2 / variance[offered]).tolist()
+
     return {name: float(np.sqrt(np.mean(values))) for name, values in squares.items() if values}

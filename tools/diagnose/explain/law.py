@@ -103,6 +103,7 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
     """Every step and wave, with its size in the channel's unit."""
     taken = start.fitted.slack[len(start.fitted.slack) - start.columns.shape[1] :]
     ends = np.cumsum([0, *(s.columns.shape[1] for s in start.functions)])
+
     for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
         added = start.columns[:, first:last] @ taken[first:last]
         acting = added[added != 0.0]
@@ -139,6 +140,7 @@ def _forward(fitted: Fitted, columns: Array) -> list[int]:
     a, b = fitted.projection().project(columns)
     kept: list[int] = []
     best = 0.0
+
     while len(kept) < len(b):
         tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
         i = max(tried, key=lambda k: tried[k])

@@ -72,6 +72,7 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
     """
     fit = accepted.fitted
     alone = screening.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
+
     held = replace(
         alone,
         u=np.zeros_like(fit.u),
@@ -372,6 +373,7 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
     """
     nats = 0.5 * model.fitted.u**2
     places = []
+
     constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
     for constant, u, taken in constants:
         channel, _, what = constant.name.rpartition("_")

@@ -25,6 +25,7 @@ def traces(problem: Problem, before: HeldOut, after: HeldOut) -> tuple[Trace, ..
         own = stack.of(channel) & (stack.run == number)
         run = rig.runs[number]
         used = run.used[channel]
+
         sigma = problem.noise.colours[rig.channels.index(channel)].sigma
         out.append(
             Trace(
@@ -58,6 +59,7 @@ def scatters(
         name = place.covariate
         own = stack.of(place.channel)
         x = stack.run.astype(float) if name == "run" else stack.covariate(name)
+
         measured = stack.measured[own]
         sigma = problem.noise.colours[rig.channels.index(place.channel)].sigma
         out.append(

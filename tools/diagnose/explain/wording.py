@@ -218,9 +218,11 @@ def _between(
     x = changes.values(stack, covariate)
     assert x is not None
     low, high, inside = _stretch(x, residual, own, places)
+
     if len(places) == WINDOW:
         low, high = sorted(places)
         inside = own & (x > low) & (x <= high)
+
     rest = own & ~inside
     here, elsewhere = float(residual[inside].mean()), float(residual[rest].mean())
     return f"{_span(stack, covariate, low, high)} {say(here)}, elsewhere {_brief(say(elsewhere))}"
@@ -245,8 +247,10 @@ def shows(stack: Stack, residual: Array, channel: str, places: Sequence[float]) 
         stack.of(channel) & (stack.covariate("speed") > 0.0),
     )
     assert number_of is not None
+
     numbers = np.unique(number_of[own])
     means = np.array([residual[own & (number_of == n)].mean() for n in numbers])
+
     side = np.searchsorted(sorted(places), numbers)
     level = np.array([means[side == k].mean() for k in side])
     return bool(np.sum((level - means.mean()) ** 2) >= SHOWS * np.sum((means - means.mean()) ** 2))
@@ -276,6 +280,7 @@ def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], sa
     numbers = np.unique(number_of[own])
     names = {float(n): stack.rig.runs[int(stack.run[number_of == n][0])].name for n in numbers}
     means = {float(n): float(residual[own & (number_of == n)].mean()) for n in numbers}
+
     if places:
         low, high, inside = _stretch(number_of, residual, own, places)
         within = [names[n] for n in names if low < n <= high]
@@ -284,6 +289,7 @@ def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], sa
         return (
             f"{span} {say(float(residual[inside].mean()))}, in the other runs {_brief(say(rest))}"
         )
+
     told = list(names)
     if len(told) > NAMED:
         told = sorted(sorted(told, key=lambda n: -abs(means[n]))[:MOST])
@@ -331,9 +337,11 @@ def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say
             inside = own & _within(x, own, first) & _within(y, own, second)
             if inside.any():
                 corners.append((float(residual[inside].mean()), inside))
+
     if not corners:
         return _along(stack, residual, own, names[0], say)
     mean, inside = max(corners, key=lambda c: abs(c[0]))
+
     place = " and ".join(
         value_of(stack, n, float(v[inside].mean())) for n, v in zip(names, (x, y), strict=True)
     )

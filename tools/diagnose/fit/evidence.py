@@ -51,6 +51,7 @@ def log_bayes(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
     values, vectors = np.linalg.eigh(0.5 * (a + a.T))
     values = np.maximum(values, 0.0)
     turned = vectors.T @ b
+
     parts = []
     for scale in SCALES:
         variance = 1.0 / (values + scale**-2)

@@ -73,6 +73,7 @@ def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None
     """
     own = np.zeros((fitted.predicted.size, 0)) if beside is None else beside
     last = fitted.jacobian.shape[1] - own.shape[1]
+
     j, r = fitted.jacobian, fitted.residual
     size = len(fitted.u) + len(fitted.x)
     centre = np.concatenate(
@@ -80,7 +81,9 @@ def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None
     )  # r is the residual without tolerance
     penalty = fitted.penalty**2
     gram, slope = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
+
     density, predicted = [], fitted.predicted.copy()
+
     for fold in folds:
         inside = j[fold]
         less, pulled = gram - inside.T @ inside, slope - inside.T @ r[fold]

@@ -87,20 +87,24 @@ class Fitted:
         strong[len(self.u) : len(self.u) + len(self.free)] = [
             f.parameter.role == "strength" for f in self.free
         ]
+
         centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
         prior = np.where(strong, 0.0, self.penalty**2)
         pull = self.jacobian.T @ self.residual - prior * centre
         gram = self.jacobian.T @ self.jacobian + np.diag(prior)
+
         root = np.linalg.cholesky(gram[np.ix_(~strong, ~strong)])
         inside = np.linalg.solve(
             root, np.column_stack((gram[np.ix_(~strong, strong)], pull[~strong]))
         )
         spread = 2.0 * np.log(np.diag(root)).sum() - 2.0 * np.log(self.penalty[~strong]).sum()
+
         misfit = (
             self.residual @ self.residual
             + np.sum(prior * centre**2)
             - inside[:, -1] @ inside[:, -1]
         )
+
         a = gram[np.ix_(strong, strong)] - inside[:, :-1].T @ inside[:, :-1]
         b = pull[strong] - inside[:, :-1].T @ inside[:, -1]
         return float(-0.5 * (misfit + spread) + self._strengths(a, b, centre[strong]))
@@ -113,11 +117,13 @@ class Fitted:
             return 0.0
         free = [f for f in self.free if f.parameter.role == "strength"]
         sign = [int(f.parameter.low >= f.parameter.off) for f in free]
+
         names = [f.name for f in free]
         groups = [[i for i, n in enumerate(names) if n == name] for name in dict.fromkeys(names)]
         chosen = [
             sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))
         ]
+
         pull = b + a @ at  # seen from strengths of nought
         evidence = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
         return float(logsumexp(evidence) - np.log(len(evidence)) - b @ at - 0.5 * at @ a @ at)
@@ -253,6 +259,7 @@ class Problem:
             raw[:, i] = self._difference(effects, free, centre, q, i, predicted)
         for i, (whole, share) in partial.items():
             raw[:, i] = share * raw[:, whole]
+
         jacobian = whiten(self.noise, raw)
         return Fitted(
             tuple(effects), tuple(free), centre[:q], centre[q:], predicted, residual,
@@ -273,6 +280,7 @@ class Problem:
         if i >= q:
             p = free[i - q].parameter
             step = -STEP if centre[i] * p.sigma + p.centre + STEP * p.sigma > p.high else STEP
+
         moved = centre.copy()
         moved[i] += step
         change: Array = (

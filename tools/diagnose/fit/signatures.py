@@ -100,10 +100,12 @@ def _values(rig: Rig, parameter: Parameter) -> list[float]:
                 for t in (length, campaign)
             }
         )
+
     if parameter.scan and parameter.unit == "m":
         return _places(rig, parameter)
     if parameter.scan:
         return orders(rig, parameter)
+
     if parameter.sigma >= 0.4 * abs(parameter.centre):
         return [0.4 * parameter.centre, parameter.centre, 2.0 * parameter.centre]
     return [parameter.centre]
@@ -127,11 +129,14 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
         [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
     )
     turning = speed[speed > 0.05 * speed.max()] if speed.max() > 0.0 else speed
+
     rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
     highest = NYQUIST * rate * 2.0 * np.pi / max(float(np.quantile(turning, 0.8)), 1e-6)
+
     top = min(parameter.high, HIGHEST_ORDER, highest)
     turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
     least = max(parameter.low, TURNS / max(turned, 1e-6))
+
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // ORDERS))]]
 
@@ -145,6 +150,7 @@ def highest_order(stack: Stack) -> float:
     speed = np.concatenate(
         [np.abs(np.gradient(r.covariates["wheel_angle"], r.time)) for r in stack.rig.runs]
     )
+
     turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
     usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
     return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
@@ -157,8 +163,10 @@ def ripple_columns(stack: Stack, residual: Array) -> Array:
     orders = np.arange(3.0, highest_order(stack), 0.25)
     if not orders.size:
         return np.zeros((stack.size, 0))
+
     moving = stack.covariate("speed") > 0.0
     angle, columns = stack.covariate("wheel_angle"), []
+
     for channel in stack.rig.channels:
         own = np.flatnonzero(stack.of(channel) & moving)
         waves = np.exp(1j * np.outer(angle[own], orders))

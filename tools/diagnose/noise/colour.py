@@ -76,6 +76,7 @@ def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
         np.zeros((len(colours), columns.shape[1])),
         np.zeros((len(colours), columns.shape[1])),
     )
+
     for i in range(len(columns)):
         slow *= kept[0, i]
         fast *= kept[1, i]
@@ -83,6 +84,7 @@ def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
         out[:, i] = innovation
         slow += gain[0, i] * innovation
         fast += gain[1, i] * innovation
+
     out /= scale.T[:, :, None]
     return out, 2.0 * np.log(scale).sum(axis=0)
 
@@ -94,9 +96,11 @@ def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Ar
     times = np.array([[c.time for c in colours], [FAST_TIME * step_of(gaps)] * len(colours)])
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
     white = 1.0 - share.sum(axis=0)
+
     kept = np.exp(-gaps[None, :, None] / times[:, None, :])
     gain, scale = np.empty_like(kept), np.empty(kept.shape[1:])
     ss, ff, sf = share[0], share[1], np.zeros(len(colours))
+
     for i in range(len(gaps)):
         a, b = kept[0, i], kept[1, i]
         ss, ff, sf = (
@@ -169,6 +173,7 @@ def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) ->
     place = np.cumsum(
         np.maximum(np.rint(np.where(np.isfinite(gaps), gaps / step, apart)), 1.0)
     ).astype(int)
+
     kept = float(np.exp(-step / time))
     kicks = rng.standard_normal((int(place[-1]) + 1, count)) * np.sqrt(1.0 - kept**2)
     return np.asarray(lfilter([1.0], [1.0, -kept], kicks, axis=0)[place])

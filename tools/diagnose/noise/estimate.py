@@ -175,9 +175,11 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
     inner = inner + RIDGE * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
         size, 1
     ) * np.eye(size)
+
     root = np.linalg.cholesky(inner)
     taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
     free = max(count - size, 3)
+
     variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), 1e-300) / free
     spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return -0.5 * (free * np.log(variance) + log_det + spread), variance

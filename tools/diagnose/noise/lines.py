@@ -58,10 +58,12 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
     if longest <= 1e-9:
         return np.zeros(0)
+
     along = np.concatenate(parts)
     interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
     span = longest if axis == "time" else float(np.ptp(x[along]))
     low, high = CYCLES / longest, NYQUIST / max(interval, 1e-3 * longest)
+
     tried = np.arange(low, high, 1.0 / (FINER * span))
     return np.asarray(tried[:MOST])
 
@@ -83,12 +85,14 @@ def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Ind
     lost freedom. explainable, cells: what else is no noise, left out first.
     """
     columns = [_long(stack, channel) for channel in stack.rig.channels]
+
     for channel in stack.rig.channels:
         own = np.flatnonzero(stack.of(channel))
         leading, whole = explainable.leading[own], explainable.whole[own]
         taken = saturated_mean(residual[own], leading, whole, cells[own])
         left = np.zeros(stack.size)
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
+
         room = own.size // SHARE
         for axis, parts in _phases(stack, channel):
             for pairs in _lines(
@@ -107,8 +111,10 @@ def _long(stack: Stack, channel: str) -> Array:
     parts, tried = stretches(stack, channel), frequencies(stack, channel, "position")
     if len(parts) < 2 or not tried.size:
         return np.zeros((stack.size, 0))
+
     index, x = np.concatenate(parts), stack.covariate("position")
     longest = max(float(np.ptp(x[part])) for part in parts)
+
     shapes = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
     out = np.zeros((stack.size, 2 * shapes.shape[1]))
     out[index] = shapes.reshape(index.size, -1)
@@ -128,6 +134,7 @@ def _lines(x: Array, tried: Array, parts: list[Index], left: Array) -> Iterator[
     """Columns of one line after the other; `left` (N,) loses them."""
     if tried.size < 2 * FAR:
         return
+
     shapes, near = [waves(x[index], tried) for index in parts], neighbours(x, parts, tried)
     for _ in range(STRONGEST):
         power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
@@ -135,6 +142,7 @@ def _lines(x: Array, tried: Array, parts: list[Index], left: Array) -> Iterator[
         best = int(np.argmin(chance))
         if chance[best] * tried.size > CHANCE:
             return
+
         out = np.zeros((x.size, 2 * len(parts)))
         for number, (shape, index) in enumerate(zip(shapes, parts, strict=True)):
             pair = shape[:, best]

@@ -109,11 +109,13 @@ def own_columns(
             terms,
             SHAPES + waves.shape[1],
         )
+
         for run in range(len(stack.rig.runs)) if sigma.any() else ():
             own = _driven(stack, number, run)
             shapes = np.zeros((stack.size, len(sigma)))
             shapes[own] = sigma * _shapes(stack.time[own], waves[own]) if own.any() else 0.0
             columns += list(shapes[:, : None if _one_condition(own, label) else 1].T)
+
     used = [column for column in columns if column.any()]
     return np.column_stack(used) if used else np.zeros((stack.size, 0))
 
@@ -156,6 +158,7 @@ def _held(
             if only
             else [own & (label == cell) for cell in np.unique(label[own & (label >= 0)])]
         )
+
         for mask in (m for m in masks if m.sum() >= FEW):
             shapes = _shapes(stack.time[mask], waves[mask])[:, : None if only else 1]
             inverse = np.linalg.pinv(shapes)
@@ -194,6 +197,7 @@ def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCo
         and np.abs(two.condition - one.condition).max() <= 1.0
         and np.abs(terms[two.run] - terms[one.run]).max() <= EQUAL
     ]
+
     return min(
         later, key=lambda two: (two.run, np.abs(two.condition - one.condition).max()), default=None
     )
@@ -231,6 +235,7 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
                 out[order] = np.sqrt(
                     _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)
                 )
+
     return out
 
 

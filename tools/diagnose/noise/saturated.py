@@ -43,6 +43,7 @@ def basis(columns: Array, most: int = COLUMNS) -> Array:
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     if not columns.size:
         return np.zeros((columns.shape[0], 0))
+
     values, vectors = np.linalg.eigh(columns.T @ columns)
     kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[
         -max(min(columns.shape[0] // 4, most), 1) :

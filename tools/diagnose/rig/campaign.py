@@ -44,6 +44,7 @@ class Campaign:
             return self._simulated(
                 soil, _scaled(self._joined, weights, travelled), effects, slice(None)
             )
+
         runs = [
             _scaled(m, weights[part], travelled)
             for m, part in zip(self._motions, self.parts, strict=True)
@@ -67,6 +68,7 @@ class Campaign:
             theta_1=None if self._start is None else self._start[part],
             order=ORDER,
         )
+
         if part == slice(None):
             self._start = response.theta_1
         return np.stack([sensed_as(response.sensed, c, self._settings) for c in self._channels])

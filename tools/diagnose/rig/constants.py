@@ -110,6 +110,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
         "n": (prior.exponent.value, prior.exponent.sigma, "-"),
         "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
     }
+
     raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
     if raised:
         least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
@@ -117,6 +118,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
             f"The configuration states {', '.join(raised)} as almost exact;"
             f" they float within {least} instead."
         )
+
     low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
     return tuple(
         Constant(

@@ -84,9 +84,11 @@ class DriveRig:
             _motion(s, settings.drive.torque_constant.value, n)
             for s, n in zip(series, names, strict=True)
         ]
+
         self.unit = _size(m.torque for m in self._motions) / USUAL
         speed = np.abs(np.concatenate([m.velocity for m in self._motions]))
         self.usual = float(np.median(speed[speed > 0.05 * speed.max()]))  # [rad/s]
+
         self.constants = (
             Constant("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
             Constant("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
@@ -95,6 +97,7 @@ class DriveRig:
             ),
             Constant("torque_blur", 0.0, apart**2, "s²"),
         )
+
         self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}
         self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
 
@@ -139,8 +142,10 @@ class DriveRig:
             direction=np.sign(motion.velocity),
             load=zero,
         )
+
         torque = inertia * motion.acceleration + damping * motion.velocity
         situation, _ = drive(replace(situation, torque=torque), effects, 1.0)
+
         sensed = Sensed(zero, situation.current, zero, zero, torque)
         for effect in effects:
             sensed = effect.sensors(sensed, situation)
@@ -167,6 +172,7 @@ class DriveRig:
         )
         still = STILL * self.usual
         fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
+
         covariates = {
             "speed": np.abs(velocity),
             "velocity": velocity,
@@ -224,6 +230,7 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMo
     current_time, current = series["motor_shunt"]
     sampled = max(float(np.median(np.diff(t))) for t in (time, current_time))
     step = max(1.0 / FINE, sampled)
+
     begin, end = max(time[0], current_time[0]), min(time[-1], current_time[-1])
     if end - begin < SHORTEST:
         raise CommandError(
@@ -231,9 +238,11 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMo
             f" expected {SHORTEST:g} s",
             DAMAGED,
         )
+
     fine = np.arange(begin + step, end - step, step)
     smooth = _low_passed(_averaged(fine, step, time, angle), SHARP)
     velocity = _rate(smooth, step)
+
     torque = constant * _low_passed(_averaged(fine, step, current_time, current), SHARP)
     return DriveMotion(
         step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque

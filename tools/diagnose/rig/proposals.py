@@ -27,14 +27,17 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     """The motion of one experiment: its levels in turn, each for an equal time."""
     speeds, slips, loads = LEVELS[key]
     time = np.arange(round(SECONDS * RATE)) / RATE
+
     middle_speed, middle_load = (
         _middle([np.abs(m.wheel_speed) for m in driven]),
         _middle([m.load for m in driven]),
     )
     speed, slip = middle_speed * _stepped(speeds, time), _stepped(slips, time)
+
     last = max(float(np.max(m.pass_number)) for m in driven)
     reached = max(float(np.max(np.asarray(m.start_position) + m.carriage_position)) for m in driven)
     travel = radius * speed * (1.0 - slip)
+
     return Motion(
         time=time,
         wheel_angle=np.cumsum(speed) / RATE,

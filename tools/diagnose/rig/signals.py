@@ -290,10 +290,12 @@ def _line(time: Array, values: Array, edges: Array, reach: int) -> tuple[Turned,
     inside = (block >= 0) & (block < n)
     block, t, y = block[inside], time[inside] - edges[0], values[inside]
     y = y - (first := y[0] if y.size else 0.0)
+
     weights = (np.ones(t.size), t, t * t, y, t * y, y * y)
     s0, s1, s2, y0, y1, y2 = (
         _spread(np.bincount(block, weights=w, minlength=n).astype(float), reach) for w in weights
     )
+
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = s2 - s1 * s1 / s0
         rate = (y1 - s1 * y0 / s0) / spread

@@ -33,12 +33,15 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     rim = settings.wheel.radius * np.asarray(motion.wheel_speed)
     turning = np.abs(rim)[np.abs(rim) > 1e-3]
     usual = float(np.median(turning)) if turning.size else 1e-3
+
     load = np.asarray(motion.load)
     carrying, lifted = load >= settings.load.minimum, load < 0.2 * settings.load.minimum
     step = float(np.median(np.diff(np.asarray(motion.time))))
+
     passing = float(np.clip(ANGLE / max(usual / settings.wheel.radius, 1e-6), SETTLING, LONGEST))
     way = np.where(np.abs(rim) > CREEP * usual, np.sign(rim), 0.0)
     apart = round(passing / step), round(STOPPING / step)
+
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
     driving, spinning = (_inside(np.where(state, way, 0.0), *apart) for state in (carrying, lifted))
     resting = _inside((rest & carrying).astype(float), round(RESTING / step), round(RISING / step))

@@ -37,17 +37,21 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     nominal = signals.info.nominal_load
     stated = settings.load.nominal.value if nominal is None else nominal
     constant = np.full(signals.time.size, float(stated))
+
     measured = signals.analogue.get("load")
     if measured is None or settings.wrench is None or settings.wrench.load.offset.sigma > 1e5:
         return Weights(constant, True)
+
     load = _bridged(measured)
     near, lifted = np.abs(load - stated) <= CLOSE * stated + 1.0, load <= RAISED * stated
+
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
     known = nominal is not None or abs(held - stated) <= DOUBT * _sigma(
         settings.load.nominal, settings.wrench.load
     )
     if known and np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
         return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
+
     note = (
         "Weights are taken from the measured load in runs that do not state theirs or that change"
         " them: friction of the load axis cannot show there."
@@ -72,9 +76,11 @@ def levels(time: Array, load: Array) -> Array:
     padded = np.pad(load, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
     slack = LEVEL * np.abs(load) + 6.0 * _noise(load)
+
     level = np.ptp(windows, axis=1) <= slack
     local = windows.mean(axis=1)
     out = np.where(level, local, load)
+
     for stretch in np.split(np.arange(load.size), np.flatnonzero(np.diff(level.astype(int))) + 1):
         if level[stretch[0]] and np.ptp(local[stretch]) <= slack[stretch].mean():
             out[stretch] = load[stretch].mean()

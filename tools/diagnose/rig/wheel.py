@@ -107,6 +107,7 @@ class WheelRig:
         # the last for values without a set of weights of their own
         own = (*(value[name] for name in self._sets.names), 0.0)
         physics = (*(value[name] for name in PHYSICS), *own, *effects)
+
         if physics not in self._kept:
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
@@ -161,6 +162,7 @@ class WheelRig:
         u = np.zeros(len(self.constants))
         before = self.predict(u, ())
         u[place] = 1.0
+
         share = [doubt / self.constants[place].sigma for doubt in self._doubt]
         return [
             {c: np.abs(after[c] - was[c]) * s for c in self.channels}
@@ -231,6 +233,7 @@ class WheelRig:
         if "torque" not in self.channels:
             return runs
         still = [run.used["torque"] & (run.covariates["speed"] == 0.0) for run in runs]
+
         means = [
             float(r.measured["torque"][m].mean())
             for r, m in zip(runs, still, strict=True)
@@ -239,12 +242,14 @@ class WheelRig:
         driven = np.concatenate(
             [r.measured["torque"][r.used["torque"] & ~m] for r, m in zip(runs, still, strict=True)]
         )
+
         if (
             len(means) < 2
             or not driven.size
             or float(np.ptp(means)) < HELD * float(np.sqrt(np.mean(driven**2)))
         ):
             return runs
+
         self.caveats.append(
             "The motor holds torque while the wheel stands, so its current at rest tells no offset."
         )
@@ -270,6 +275,7 @@ class WheelRig:
         speed = self.settings.wheel.radius * np.abs(motion.wheel_speed)
         step = float(np.median(np.diff(signals.time)))
         ones = np.ones(signals.time.size)
+
         return {
             "slip": np.asarray(situation.slip),
             "speed": np.asarray(speed),
@@ -299,6 +305,7 @@ def _channels(
             and (channel != "load" or all(weights_known))
         ):
             channels.append(channel)
+
     return tuple(channels)
 
 
@@ -322,8 +329,10 @@ def _motion(signals: Signals, weights: Array, settings: Settings, began: float) 
         _filled(signals.wheel_speed),
         _filled(signals.carriage_rate) * settings.pulley_radius,
     )
+
     rest = at_rest(settings.wheel.radius * wheel_speed, carriage_speed)
     temperature = signals.analogue.get("temperature")
+
     return Motion(
         time=signals.time + began,
         wheel_angle=angle,

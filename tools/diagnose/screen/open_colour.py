@@ -75,11 +75,13 @@ class OpenNoise:
         base = np.column_stack((fitted.raw / fitted.penalty[: len(centre)], problem.allowed))
         y = stack.measured - fitted.predicted + fitted.raw @ centre
         columns = np.column_stack((base, *(s.columns for s in signatures), y))
+
         self._base = np.arange(base.shape[1])
         ends = base.shape[1] + np.cumsum([0, *(s.columns.shape[1] for s in signatures)])
         self._own = [np.arange(low, high) for low, high in pairwise(ends.tolist())]
         self._share = [s.prior for s in signatures]
         self._y = columns.shape[1] - 1
+
         self._colours = colours()
         self._prior = log_prior(self._colours, stack.gaps)
         self._squares = [
@@ -99,11 +101,13 @@ class OpenNoise:
         scales = SCALES if more.size else SCALES[:1]
         prior = np.ones((len(scales), index.size - 1))
         prior[:, self._base.size :] = scales[:, None] ** -2
+
         parts = [self._suiting(squares, index) for squares in self._squares]
         at = [
             int(np.argmax(part.rest - 0.5 * part.count * np.log(part.variance))) for part in parts
         ]
         size = [1.0 for _ in parts]
+
         peaks: list[tuple[float, float]] = []
         for _ in range(SWEEPS):
             peaks = []

@@ -28,6 +28,7 @@ def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) ->
     cosine, sine = (
         whiten(noise, np.where(moving, wave, 0.0)) for wave in (np.cos(phase), np.sin(phase))
     )
+
     power = np.zeros(len(orders))
     for channel in stack.rig.channels:
         own = stack.of(channel)

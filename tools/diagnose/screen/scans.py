@@ -92,13 +92,16 @@ def _weighed(
     if shared:
         squares, inside, b = (np.sum([f[i] for f in projected], axis=0) for i in range(3))
         projected = [(squares, inside, b)]
+
     width = projected[0][0].size // count
     sizes = [
         np.maximum(s - np.sum(i**2, axis=0), 0.0).reshape(count, width).mean(axis=1)[:, None]
         for s, i, _ in projected
     ]
     powers = [np.sum(b.reshape(count, width, -1) ** 2, axis=1) for _, _, b in projected]
+
     level = 1.0 if near is None else _level(sizes, powers, near)
+
     parts = np.zeros((len(SCALES), *powers[0].shape))
     for size, power in zip(sizes, powers, strict=True):
         for part, scale in zip(parts, SCALES, strict=True):

@@ -130,8 +130,10 @@ def tail_chance(values: Array, value: float) -> float:
     """
     least = 1.0 / (1 + values.size)
     counted = float(1 + np.sum(values >= value)) * least
+
     start = float(np.quantile(values, 0.9))
     beyond = values[values > start] - start
+
     if counted > 10.0 * least or not beyond.size:
         return counted
     fitted = 0.1 * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12)))

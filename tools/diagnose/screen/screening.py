@@ -101,6 +101,7 @@ def _signatures(problem: Problem, model: Model, first: Screen | None) -> Iterato
             tried = list(shape_grid(stack.rig, effect))
         else:
             tried = first.fixed.get(name, [])[:AGAIN]
+
         prior = -np.log(max(len(tried), 1))
         for fixed in _worth(problem, model, effect, tried):
             made = signature(stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)

@@ -129,6 +129,7 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
     effects, screen = search.problem.stack.rig.effects, search.screens[model]
     names = [n for n in likely(screen, list(effects), most) if not search.has((*model.names, n))]
     made = each(jobs, lambda name: _fitted(search, model, effects[name], screen.best[name]), names)
+
     if made:
         top = max(max(m.evidence for m in made), search.best().evidence)
         behind = _hopeless(search, top)
@@ -138,6 +139,7 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
         ]
         done = iter(each(jobs, lambda m: _finished(search.problem, m), close))
         made = [next(done) if m in close else m for m in made]
+
     return replace(search, models=(*search.models, *made))
 
 
@@ -204,6 +206,7 @@ def _retested(search: Search) -> Search:
             fitted = search.problem.descend(types, free, best.fitted.u, x)
             prior = _one_more(search, search.best(1)) * (len(kept) - 1)
             search = replace(search, models=(*search.models, Model(fitted, kept, prior)))
+
     return search
 
 

@@ -92,6 +92,7 @@ def weigh(search: Search) -> list[WeighedModel]:
     gains = {m: m.fitted.log_evidence - base.fitted.log_evidence for m in search.models if m.names}
     if not gains:
         return []
+
     top = max(gains.values())
     near = [m for m in gains if gains[m] > top - max(NEAR * top, FAR)]
     near.sort(key=lambda m: -gains[m])

@@ -55,9 +55,11 @@ def _gains(problem: Problem, fitted: Fitted, added: list[Array], sizes: Sequence
     columns = _bent(problem.stack, fitted, added)
     if not columns.shape[1]:
         return np.zeros(len(sizes))
+
     a, b = fitted.projection().project(whiten(problem.noise, columns))
     values, vectors = np.linalg.eigh(0.5 * (a + a.T))
     values, turned = np.maximum(values, 0.0), vectors.T @ b
+
     gain = [
         np.sum(turned**2 / (values + rho**-2)) - np.log1p(rho**2 * values).sum() for rho in sizes
     ]

@@ -120,11 +120,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--trials", default="", help="the command that made the files, to be kept with the table"
     )
+
     arguments = parser.parse_args(argv)
+
     lines = [
         line for path in arguments.files for line in path.read_text(encoding="utf-8").splitlines()
     ]
     cases = usable([json.loads(line) for line in lines])
+
     by, log_score = learn(cases)
     table = {**by.__dict__, "cases": len(cases), "score": log_score, "trials": arguments.trials}
     text = json.dumps(table, indent=1) + "\n"

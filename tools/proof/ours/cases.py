@@ -76,11 +76,13 @@ def draw(settings: Settings, rng: np.random.Generator, lack: str = "") -> Plan:
     loads = rng.permutation(np.linspace(rng.uniform(30, 45), rng.uniform(80, 110), count))
     if lack == "loads":
         loads = np.full(count, float(rng.uniform(45.0, 90.0)))
+
     speed = rng.uniform(0.012, 0.03)
     motions, began = [], 0.0
     for number in range(count):
         motions.append(_motion(settings, rng, float(loads[number]), speed, began))
         began += PAUSE
+
     return Plan(
         settings,
         _soil(settings, rng),
@@ -112,6 +114,7 @@ def _known(settings: Settings, rng: np.random.Generator) -> Settings:
     """Another soil and wheel, known as well as a bevameter knows them."""
     wheel = replace(settings.wheel, radius=float(rng.uniform(0.06, 0.15)))
     wheel = replace(wheel, width=float(wheel.radius * rng.uniform(0.8, 1.3)))
+
     prior = settings.soil
     cohesion, tan_phi, k = rng.uniform(200, 1500), rng.uniform(0.45, 0.75), rng.uniform(0.01, 0.03)
     soil = replace(
@@ -169,6 +172,7 @@ def _motion(
     slips = rng.permutation([0.05, 0.15, 0.3, 0.45, 0.6])[: int(rng.integers(3, 6))]
     rest = Segment(2.0, load, float(slips[0]), 0.0)
     each = (SECONDS - rest.duration) / len(slips)
+
     driven = [
         Segment(each, load, float(s), float(speed * rng.choice([0.5, 1.0, 1.6]))) for s in slips
     ]
@@ -176,6 +180,7 @@ def _motion(
         driven.append(replace(rest, duration=1.5))
         if rng.random() < 0.4:
             driven.insert(len(driven) // 2, replace(rest, duration=1.5))
+
     motion = motion_of(
         Schedule((rest, *driven), float(rng.uniform(0.3, 0.9))),
         settings.wheel.radius, RATE, float(rng.integers(1, 4)), float(rng.choice([0.0, 0.15, 0.3])),
@@ -203,11 +208,14 @@ def _recorded(
         acting,
         torque_constant=settings.drive.torque_constant.value,
     )
+
     time = np.asarray(motion.time)
+
     edges = time[0] + np.arange(int((time[-1] - time[0]) * GRID) + 1) / GRID
     wheel = slope(time, _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng), edges)
     travel = np.asarray(servo.carriage_position) / settings.pulley_radius
     carriage = slope(time, _counted(travel, 7.669904e-4, rng), edges)
+
     sensed = response.sensed
     channels = {"sinkage": sensed.sinkage, "current": sensed.current}
     if plan.wrench:
@@ -220,12 +228,14 @@ def _recorded(
         name: block_mean(time, _read(plan, name, np.asarray(value), rng, noisy), edges)
         for name, value in channels.items()
     }
+
     info = RunInfo(
         name=f"run{number + 1}",
         nominal_load=plan.weights[number],
         pass_number=int(np.max(motion.pass_number)),
         start_position=float(np.max(motion.start_position)),
     )
+
     middle = 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     return Signals(
         info.name,
@@ -248,6 +258,7 @@ def _servo(motion: Motion, rng: np.random.Generator) -> Motion:
         np.asarray(delayed(time, speed, float(rng.uniform(0.01, 0.06))))
         for speed in (motion.wheel_speed, motion.carriage_speed)
     )
+
     step = 1.0 / RATE
     return replace(
         motion,
@@ -270,6 +281,7 @@ def _read(plan: Plan, name: str, values: Array, rng: np.random.Generator, noisy:
     if not noisy:
         return values
     sigma = NOISE[name] * plan.noise
+
     gaps = np.full(values.size, 1.0 / RATE)
     gaps[0] = np.inf
     slow = (
@@ -277,6 +289,7 @@ def _read(plan: Plan, name: str, values: Array, rng: np.random.Generator, noisy:
         if plan.slow
         else 0.0
     )
+
     scale, offset = plan.errors.get(name, (0.0, 0.0))
     noise = sigma * rng.standard_normal(values.size) + slow + scale * values + offset
     return np.asarray(np.rint((values + noise) / QUANTUM[name]) * QUANTUM[name])

@@ -19,8 +19,10 @@ def table(results: Results) -> str:
     cousin, pair, unlisted = (
         [r for r in done if r["stratum"] == s] for s in ("cousin", "pair", "unlisted")
     )
+
     lines = ["| figure | value |", "|---|---|"]
     lines += [f"| {name} | {value} |" for name, value in _rows(none, one, cousin, pair, unlisted)]
+
     failed = [r for r in results if "error" in r]
     unseen = sum("skipped" in r for r in results)
     unusable = f"{unseen} undetectable in any campaign drawn, {len(failed)} errors"
@@ -30,6 +32,7 @@ def table(results: Results) -> str:
         if done
         else []
     )
+
     return "\n".join(
         [
             *lines,
@@ -150,6 +153,7 @@ def _reliability(results: Results) -> list[str]:
             group = _group(r, r["first"])
             stated.append(min(sum(r["probability"].get(n, 0.0) for n in group), 1.0))
             right.append(bool(r["truth"]) and r["truth"][0] in group)
+
     lines = ["| stated | cases | right |", "|---|---|---|"]
     edges = (0.0, 0.2, 0.5, 0.8, 0.95, 1.0001)
     for low, high in pairwise(edges):

@@ -104,6 +104,7 @@ def trial(case: Case) -> dict[str, Any]:
         scored = _trial(case)
     except Exception as error:
         scored = {"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
+
     names = {c.__name__: c.stands_for for c in COUSINS}
     truth = [names.get(n, n) for n in case.truth]
     return {
@@ -124,9 +125,11 @@ def _trial(case: Case) -> dict[str, Any]:
     if drawn is None:
         return {"skipped": True}
     plan, acting = drawn
+
     rig = WheelRig(record(plan, acting), plan.settings)
     noise = np.random.default_rng(0)
     search = search_models(prepare_screening(fit_base(rig, noise), noise))
+
     decision = decide(search)
     diagnosis = explain(search, decision, {"seed": 0})
     return (
@@ -139,6 +142,7 @@ def _trial(case: Case) -> dict[str, Any]:
 def work(search: Search, decision: Decision) -> dict[str, Any]:
     """What the search weighed: to learn the calibration from, and to find the reason of a miss."""
     evidence = ((label(of), round(e, 1)) for of, e in search.first.evidence.items())
+
     return {
         "screen": dict(sorted(evidence, key=lambda i: -i[1])[:8]),
         "weighed": [
@@ -178,6 +182,7 @@ def _strong(
     size = limit * float(np.exp(rng.uniform(*np.log(span))))
     if size > LARGEST:
         return None
+
     values = {
         p.name: float(np.clip(p.off + (getattr(trial, p.name) - p.off) * size / 0.5, p.low, p.high))
         for p in effect.parameters()
@@ -203,6 +208,7 @@ def _scored(
     true = {"c": float(np.mean(plan.soil.cohesion)), "tan_phi": float(np.mean(plan.soil.tan_phi))}
     soil = diagnosis.soil
     assert soil is not None
+
     return {
         "acting": [str(a) for a in acting],
         "verdict": diagnosis.verdict,
@@ -250,9 +256,11 @@ def _oracle(
     x = np.array(
         [(v - f.parameter.centre) / f.parameter.sigma for v, f in zip(at, free, strict=True)]
     )
+
     fitted = search.problem.descend(tuple(types), free, search.base.fitted.u, x)
     stack = search.problem.stack
     best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
+
     gained = search.base.fitted.log_evidence
     return {
         "oracle": float(np.mean([diagnosis.fit.after[c] / best[c] for c in best])),
@@ -285,8 +293,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--out", type=Path, help="one JSON line a case")
     arguments = parser.parse_args(argv)
+
     strength = tuple(arguments.strength) if arguments.strength else None
     chosen = list(cases(arguments.cases, arguments.seed, arguments.only, strength, arguments.lack))
+
     results = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for number, result in enumerate(pool.map(trial, chosen), 1):

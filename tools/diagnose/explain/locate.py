@@ -146,8 +146,9 @@ def _families(
     every = [*smooth, *((w.shape.family, w.columns) for w in waves)]
     shapes, columns = [shape for shape, _ in every], [block for _, block in every]
 
-    ready = whiten_rows(screening.problem.noise, np.column_stack(columns), everything(stack))
-    projected = projection.project_rows(ready, everything(stack))
+    everything = np.ones(stack.size, bool)
+    ready = whiten_rows(screening.problem.noise, np.column_stack(columns), everything)
+    projected = projection.project_rows(ready, everything)
 
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     spans = [np.arange(start, end) for start, end in pairwise(ends.tolist())]
@@ -169,10 +170,6 @@ def _families(
         replace(family, p=chance[family.shape], wave=wave, prior=wave.prior)
         for family, wave in zip(families[first:], waves, strict=True)
     ]
-
-
-def everything(stack: Stack) -> Bools:
-    return np.ones(stack.size, bool)
 
 
 def _with_steps(stack: Stack, signature: Signature, points: changes.Changes) -> Array:

@@ -93,8 +93,8 @@ def ripple(stack: Stack, channel: str, order: float, amplitude: float, share: fl
 
 
 def wave(stack: Stack, residual: Array, shape: Shape, share: float) -> str:
-    """A wave in time or along the bed, its amplitude the root of the mean square over the
-    stretches.
+    """A wave of a residual (N,) in time or along the bed, its amplitude the root of the mean square
+    over the stretches.
     """
     channel, (axis,), frequency = shape.channel, shape.along, shape.at
     assert frequency is not None
@@ -241,7 +241,7 @@ def _stretch(
 
 
 def shows(stack: Stack, residual: Array, channel: str, places: Sequence[float]) -> bool:
-    """Whether changes between runs take most of what the runs' mean residuals differ by."""
+    """Whether changes between runs take most of what the means of a residual (N,) differ by."""
     number_of, own = (
         changes.values(stack, "run"),
         stack.of(channel) & (stack.covariate("speed") > 0.0),

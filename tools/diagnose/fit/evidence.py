@@ -81,7 +81,7 @@ def subsets(count: int) -> list[tuple[int, ...]]:
 
 
 def log_evidence(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
-    """ln B averaged over the subsets of strengths."""
+    """ln B averaged over the subsets of strengths: A (p, p), b (p,) or (p, draws)."""
     parts = [
         log_bayes(a[np.ix_(s, s)], b[list(s)], tuple(sign[i] for i in s))
         for s in subsets(len(sign))

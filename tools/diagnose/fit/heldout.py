@@ -31,7 +31,7 @@ class HeldOut:
 
 
 def run_folds(stack: Stack) -> list[Bools]:
-    """Each run; where there are fewer than three, the thirds of each run in time."""
+    """Each run, marked (N,); where there are fewer than three, the thirds of each run in time."""
     runs = np.unique(stack.run)
     if len(runs) >= 3:
         return [stack.run == r for r in runs]
@@ -40,7 +40,7 @@ def run_folds(stack: Stack) -> list[Bools]:
 
 
 def condition_folds(stack: Stack) -> list[Bools]:
-    """Bands of load and of slip, as far as they vary."""
+    """Bands of load and of slip, marked (N,), as far as they vary."""
     folds = []
     for name in ("load", "slip"):
         if name in stack.rig.runs[0].covariates:
@@ -104,6 +104,6 @@ def _log_density(error: Array, jacobian: Array, gram: Array) -> float:
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:
-    """Root mean square error of each channel in its unit."""
+    """Root mean square error of a prediction (N,) in each channel, in its unit."""
     error = stack.measured - predicted
     return {c: float(np.sqrt(np.mean(error[stack.of(c)] ** 2))) for c in stack.rig.channels}

@@ -68,11 +68,8 @@ class Fitted:
     def acting(self) -> tuple[Effect, ...]:
         return build(self.effects, self.free, self.x)
 
-    @property
-    def all_u(self) -> Array:
-        return np.concatenate((self.u, self.x, self.slack))
-
     def covariance(self) -> Array:
+        """Of all unknowns (q + p + t, q + p + t), in the units of u, x and slack."""
         gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
         return np.asarray(np.linalg.inv(gram))
 
@@ -141,6 +138,7 @@ def _choices(strengths: list[int]) -> list[list[int]]:
 
 
 def build(effects: Sequence[Maker], free: Sequence[FreeParameter], x: Array) -> tuple[Effect, ...]:
+    """The effects with their free parameters at x (p,)."""
     values: list[dict[str, float]] = [{} for _ in effects]
     for f, value in zip(free, x.tolist(), strict=True):
         values[effects.index(f.effect)][f.parameter.name] = f.value(value)
@@ -175,7 +173,7 @@ class Problem:
         x: Array,
         rounds: int = ROUNDS,
     ) -> Fitted:
-        """The nearest optimum from constants u and effect parameters x."""
+        """The nearest optimum from constants u (q,) and effect parameters x (p,)."""
         q = len(u)
         penalty = np.concatenate(
             (np.ones(q), [f.weight for f in free], np.ones(self.tolerance.shape[1]))

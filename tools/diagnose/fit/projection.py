@@ -106,18 +106,6 @@ class Projection:
             self.surrogates,
         )
 
-    @property
-    def covariance(self) -> Array:
-        """Of the unknowns (q, q)."""
-        inverse = np.linalg.inv(self._root)
-        return inverse.T @ inverse
-
-    @property
-    def misfit(self) -> float:
-        """Whitened squares plus prior strain at the linear optimum."""
-        strain = self.strain @ self.strain
-        return float(self.residual @ self.residual + strain - self._pulled @ self._pulled)
-
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (m, m) and b (m,) of whitened columns (N, m) for the recordings."""
         inside = self._inside(columns)
@@ -127,7 +115,7 @@ class Projection:
         )
 
     def project_all(self, columns: Array) -> Projected:
-        """The same for the surrogates too."""
+        """The same of whitened columns (N, m) for the surrogates too."""
         a, b = self.project(columns)
         noise, strains = self._nulls.residuals, self._nulls.strains
 

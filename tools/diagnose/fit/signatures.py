@@ -34,9 +34,8 @@ def raw_signatures(
     """Unwhitened signatures of all candidates about the prediction (N,) at constants u (q,)."""
     for name, effect in stack.rig.effects.items():
         if names is None or name in names:
-            shapes = list(shape_grid(stack.rig, effect))
-            for shape in shapes:
-                made = signature(stack, u, base, effect, shape)
+            for fixed in shape_grid(stack.rig, effect):
+                made = signature(stack, u, base, effect, fixed)
                 if made is not None:
                     yield made
 
@@ -46,16 +45,19 @@ def signature(
     u: Array,
     base: Array,
     effect: type[Effect],
-    shape: Mapping[str, float],
+    fixed: Mapping[str, float],
     others: tuple[Effect, ...] = (),
 ) -> Signature | None:
-    """None where the effect changes nothing that is measured, or runs away however weak it is."""
-    derivatives = [_derivative(stack, u, base, effect, shape, p, others) for p in strengths(effect)]
+    """Of an effect about the prediction base (N,) at constants u (q,), its shape parameters fixed.
+
+    None where the effect changes nothing that is measured, or runs away however weak it is.
+    """
+    derivatives = [_derivative(stack, u, base, effect, fixed, p, others) for p in strengths(effect)]
     columns = np.column_stack(derivatives)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
-    return Signature(effect.name, columns, sign, dict(shape))
+    return Signature(effect.name, columns, sign, dict(fixed))
 
 
 def _derivative(
@@ -63,7 +65,7 @@ def _derivative(
     u: Array,
     base: Array,
     effect: type[Effect],
-    shape: Mapping[str, float],
+    fixed: Mapping[str, float],
     strength: Parameter,
     others: tuple[Effect, ...],
 ) -> Array:
@@ -72,7 +74,7 @@ def _derivative(
     """
     largest = LARGEST * np.abs(stack.measured).max(initial=0.0)
     for step in STEPS:
-        acting = effect(**{**shape, strength.name: strength.off + step * strength.sigma})
+        acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             change = stack.predict(u, (*others, acting)) - base
         if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:

@@ -57,7 +57,9 @@ def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Arra
 
 
 def first_guess(stack: Stack, predicted: Array) -> Noise:
-    """White noise from the differences between neighbours, which a slow misfit hardly touches."""
+    """White noise of what a prediction (N,) leaves, from differences between neighbours: a slow
+    misfit hardly touches them.
+    """
     residual, colours = stack.measured - predicted, []
     for channel in stack.rig.channels:
         inside = stack.of(channel) & np.isfinite(stack.gaps)
@@ -144,7 +146,7 @@ def colours() -> list[Colour]:
 
 
 def log_prior(tried: Sequence[Colour], gaps: Array) -> Array:
-    """Of each colour, up to a constant."""
+    """Of each colour (g,), up to a constant; gaps (n,) between the values [s]."""
     return np.asarray(-RARE * np.log([_slow_power(c, step_of(gaps)) for c in tried]))
 
 

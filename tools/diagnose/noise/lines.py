@@ -33,7 +33,9 @@ SHARE = 8  # of a channel's values, those that lines may take
 
 
 def stretches(stack: Stack, channel: str) -> list[Index]:
-    """Values of a channel in one run while the wheel moves, long runs cut into equal parts."""
+    """Places (n,) of a channel's values in one run while the wheel moves, long runs cut into equal
+    parts.
+    """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     parts: list[Index] = []
     for number in range(len(stack.rig.runs)):

@@ -38,7 +38,7 @@ def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -
 
 
 def basis(columns: Array, most: int = COLUMNS) -> Array:
-    """Orthonormal columns that span most of the same space, no more than a quarter of the rows."""
+    """Orthonormal columns (n, k) that span most of what columns (n, m) span, k ≤ n/4."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     if not columns.size:

@@ -113,6 +113,7 @@ class DriveRig:
         return [{"torque": np.zeros_like(run.time)} for run in self.runs]
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+        """Motor torque [N·m] of every run (n,), for constants u (q,) in prior σ and effects."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
         torques = [
             self._torque(m, inertia / self.unit, damping / self.unit, effects)
@@ -218,7 +219,7 @@ class DriveMotion:
         return slice(edge := round(EDGE / self.step), -edge, self.every)
 
     def compared(self, values: Array) -> Array:
-        """Low-passed and thinned to the grid of the comparison."""
+        """Values (m,) on the fine grid, low-passed, on the grid of the comparison (n,)."""
         return np.asarray(_low_passed(values, BAND / self.every)[self.kept])
 
 

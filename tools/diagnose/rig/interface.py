@@ -113,8 +113,8 @@ class Rig(Protocol):
 
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
-        """Constants that do to some values, marked per run, what another constant does to all: a
-        cheap derivative.
+        """Constants that do to some values, marked per run (n,), what another constant does to all:
+        a cheap derivative.
         """
 
     @property
@@ -131,8 +131,8 @@ class Rig(Protocol):
 
     @property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
-        """Per run, standard deviation of every channel's prediction by what is left open of the
-        motion.
+        """Per run, standard deviation (n,) of every channel's prediction by what is left open of
+        the motion, in the channel's unit.
         """
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
@@ -149,8 +149,8 @@ class Rig(Protocol):
         """
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen | None:
-        """Every channel under an experiment, for constants u and effects; None where the rig cannot
-        foresee it.
+        """Every channel under an experiment, for constants u (q,) and effects; None where the rig
+        cannot foresee it.
         """
 
     @property
@@ -178,35 +178,39 @@ class Stack:
         self.size = int(sum(sizes))
 
     def joined(self, values: Sequence[Mapping[str, Array]]) -> Array:
-        """Per run and channel to one vector."""
+        """Values (n,) per run and channel as one vector (N,)."""
         pieces = [values[n][c][mask] for (c, n), mask in zip(self.parts, self._masks, strict=True)]
         return np.concatenate(pieces) if pieces else np.zeros(0)
 
     def covariate(self, name: str) -> Array:
+        """Of every value (N,), in the unit of the rig's `units`."""
         return self.joined(
             [dict.fromkeys(self.rig.channels, run.covariates[name]) for run in self.rig.runs]
         )
 
     @cached_property
     def measured(self) -> Array:
+        """(N,) in the channels' units."""
         return self.joined([run.measured for run in self.rig.runs])
 
     @cached_property
     def motion_sigma(self) -> Array:
+        """(N,) in the channels' units: see Rig.motion_sigma."""
         return self.joined(self.rig.motion_sigma)
 
     @cached_property
     def gaps(self) -> Array:
-        """Time since the value before in the same channel and run [s]; inf at the first."""
+        """Time (N,) since the value before in the same channel and run [s]; inf at the first."""
         return self.gaps_of(np.ones(self.size, bool))
 
     def gaps_of(self, kept: Bools) -> Array:
-        """The same, with only some values kept."""
+        """The same (n,), with only the n values kept that are marked (N,)."""
         gap = np.diff(self.time[kept], prepend=0.0)
         first = np.diff(self.channel[kept] * 100_000 + self.run[kept], prepend=-1) != 0
         return np.where(first, np.inf, gap)
 
     def predict(self, u: Array, effects: Sequence[Effect] = ()) -> Array:
+        """(N,) in the channels' units, for constants u (q,) in prior σ."""
         return self.joined(self.rig.predict(u, effects))
 
     @cached_property
@@ -214,8 +218,10 @@ class Stack:
         """Of each constant of `rig.partial`: the constant that it is a part of, and its
         derivative's share of that one's (N,).
         """
-        place = {known.name: i for i, known in enumerate(self.rig.constants)}
-        sigma = [known.sigma for known in self.rig.constants]
+        constants = self.rig.constants
+        place = {constant.name: i for i, constant in enumerate(constants)}
+        sigma = [constant.sigma for constant in constants]
+
         out = {}
         for name, (whole, masks) in self.rig.partial.items():
             share = sigma[place[name]] / sigma[place[whole]]
@@ -226,5 +232,6 @@ class Stack:
         return out
 
     def of(self, channel: str) -> Bools:
+        """Marks the values of a channel (N,)."""
         mask: Bools = self.channel == self.rig.channels.index(channel)
         return mask

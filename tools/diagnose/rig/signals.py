@@ -129,6 +129,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
     ]
     if missing:
         raise _too_little(recording, f"no readings of {missing[0]}", "both encoders")
+
     encoders = [series["wheel_encoder"], series["carriage_encoder"]]
     start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
     count = int((end - start) * rate)
@@ -136,12 +137,14 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         raise _too_little(
             recording, f"{max(end - start, 0.0):.2f} s of both encoders together", "some seconds"
         )
+
     edges = start + np.arange(count + 1) / rate
     wheel, carriage = (slope(*encoder, edges) for encoder in encoders)
     analogue = {
         name: block_mean(*values, edges)
         for name, values in _analogue(recording, settings, series).items()
     }
+
     return Signals(
         recording.run.name or recording.path.stem,
         recording.path,
@@ -200,6 +203,7 @@ def _series(recording: Recording, channel: Channel) -> Series:
 
 
 def physical(raw: Array, calibration: Calibration) -> Array:
+    """Raw values (n,) in the SI unit of the channel (n,)."""
     return np.asarray(raw * calibration.scale.value + calibration.offset.value, dtype=float)
 
 
@@ -259,13 +263,12 @@ def doubt(wheel: Turned, carriage: Turned) -> Array:
 
 
 def slope(time: Array, values: Array, edges: Array) -> Turned:
-    """Value and slope of an encoder at the middle of each interval.
+    """Value and slope of an encoder at the middle of each of n intervals, edges (n + 1,) [s].
 
     By a line fitted over the interval and its neighbours, QUICK to either side; where the slope is
-    steady within its
-    own noise, STEADY or LONG to either side, if that line leaves no more than the short one: at
-    creeping speed one count is much of the slip, and counts that beat with the sampling make slow
-    waves of what was steady.
+    steady within its own noise, STEADY or LONG to either side, if that line leaves no more than the
+    short one: at creeping speed one count is much of the slip, and counts that beat with the
+    sampling make slow waves of what was steady.
     """
     best, left = _line(time, values, edges, QUICK)
     quick, calm = best.rate, np.ones(best.rate.size, bool)

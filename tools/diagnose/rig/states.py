@@ -49,8 +49,8 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
 
 
 def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
-    """Both stand still but for the encoders' noise; a standing wheel's slip means nothing, so both
-    speeds become 0.
+    """Where both speeds (n,) [m/s] are 0 but for the encoders' noise: a standing wheel's slip means
+    nothing.
     """
     turning = np.abs(rim_speed)[np.abs(rim_speed) > 1e-3]
     least = 0.01 * float(np.median(turning)) if turning.size else 1e-4

@@ -68,8 +68,8 @@ def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
 
 
 def levels(time: Array, load: Array) -> Array:
-    """The measured load: its mean over each stretch on which it is level, as measured where it
-    changes.
+    """The measured load (n,) [N]: its mean over each stretch on which it is level, else as it was
+    measured.
     """
     step = float(np.median(np.diff(time)))
     half = max(round(0.5 * HOLD / step), 1)

@@ -93,6 +93,9 @@ class WheelRig:
     # ---- prediction ------------------------------------------------------------------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+        """Every channel (n,) of every run, for constants u (q,) in prior σ and effects beyond the
+        configured ones.
+        """
         value = {
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)

@@ -116,7 +116,7 @@ class Screen:
 
 
 def tail_quantile(values: Array, level: float) -> float:
-    """The value exceeded with probability `level`: exponential tail beyond the 90 % quantile
+    """What values (n,) exceed with probability `level`: exponential tail beyond the 90 % quantile
     (Davison, Smith 1990).
     """
     start = float(np.quantile(values, 0.9))
@@ -125,7 +125,7 @@ def tail_quantile(values: Array, level: float) -> float:
 
 
 def tail_chance(values: Array, value: float) -> float:
-    """Chance of a value among nulls: counted; where fewer than ten reach it by the tail of
+    """Chance of a value among nulls (n,): counted; where fewer than ten reach it by the tail of
     `tail_quantile`, which is not trusted beyond a tenth of what can be counted.
     """
     least = 1.0 / (1 + values.size)

@@ -210,7 +210,6 @@ def _recorded(
     )
 
     time = np.asarray(motion.time)
-
     edges = time[0] + np.arange(int((time[-1] - time[0]) * GRID) + 1) / GRID
     wheel = slope(time, _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng), edges)
     travel = np.asarray(servo.carriage_position) / settings.pulley_radius

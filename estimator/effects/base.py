@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from gritd.estimator.stages.situation import ContactLaw, Motion, Reaction, Sensed, Situation
+from gritd.estimator.stages.situation import ContactLaw, Motion, Reaction, Recall, Sensed, Situation
 from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
 
 Stage = Literal["soil", "contact", "wheel", "testbed", "drivetrain", "sensor", "any"]
@@ -34,6 +34,7 @@ EXPERIMENTS = {
     "long_run": "hold one condition until nothing warms up or dries any more",
     "penetration": "press a plate or the standing wheel into the soil and read force against depth",
     "dead_weight": "press the wheel on a rigid stop under known weights",
+    "rough_rim": "glue sandpaper on the rim and repeat",
     "smooth_wheel": "repeat with a smooth wheel of the same radius",
     "level": "put a spirit level on the bed, or turn the testbed round",
     "tape": "measure radius, travel and surface with tape and gauge",
@@ -101,7 +102,8 @@ class Fingerprint(NamedTuple):
     covariate: (
         str  # slip, speed, load, sinkage, wheel_angle, position, time, acceleration, run, constant,
     )
-    #                 rate (of the channel itself), heat (∫I² since the run began)
+    #                 rate (of the channel itself), heat (∫I² since the run began),
+    #                 reversal (angle turned since the drive last turned round)
     sentence: str
 
 
@@ -121,9 +123,12 @@ class Effect:
     fingerprint: ClassVar[Fingerprint]
     # other effect -> key of EXPERIMENTS
     confusable_with: ClassVar[Mapping[str, str]] = told_apart()
-    at_start: ClassVar[float] = 0.0  # what `remember` starts from
+    at_start: ClassVar[Recall] = (0.0,)  # what `remember` starts from
     filter_only: ClassVar[bool] = (
         False  # acts on the on-line filter alone; the forward model needs nothing of it
+    )
+    by_run: ClassVar[bool] = (
+        False  # looks along time, so a campaign's runs go through the forward model one by one
     )
     needs_sinkage: ClassVar[bool] = (
         False  # the load stage needs a predicted sinkage: the balance is solved twice
@@ -178,7 +183,11 @@ class Effect:
         """What is true, from what the channels read: the inverse of `sensors`."""
         return sensed
 
-    def remember(self, memory: float, step: float, situation: Situation) -> float:
+    def answered(self, slip: Scalar, load: Scalar, situation: Situation) -> tuple[Scalar, Scalar]:
+        """On line: slip and load [N] that the rim's stresses answer to, from the present ones."""
+        return slip, load
+
+    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
         """On line: the memory one `step` [s] later; others find it in situation.memory."""
         return memory
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
 from gritd.estimator.stages.history import path_relaxed, smoothed
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Recall, Situation
 from gritd.estimator.terramechanics.soil import Scalar
 
 PRESLIDING = 1e-4  # [m] travel over which the friction turns round
@@ -35,17 +35,19 @@ class LoadAxisFriction(Effect):
     )
     confusable_with = told_apart(sensor_latency="load_step", frame_compliance="load_step")
     needs_sinkage = True
-    at_start = 1.0
+    by_run = True
+    at_start = (1.0,)
 
     def load(self, load: Scalar, situation: Situation) -> Scalar:
         return load - np.minimum(self.friction, np.maximum(load, 0.0)) * self._direction(situation)
 
-    def remember(self, memory: float, step: float, situation: Situation) -> float:
-        moved = situation.sinking * step
-        return float(memory + (np.sign(moved) - memory) * -np.expm1(-np.abs(moved) / PRESLIDING))
+    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+        (direction,), moved = memory, situation.sinking * step
+        share = -np.expm1(-np.abs(moved) / PRESLIDING)
+        return (float(direction + (np.sign(moved) - direction) * share),)
 
     def _direction(self, situation: Situation) -> Scalar:
         """s, −1 after rising … 1 after sinking."""
         if self.name in situation.memory:
-            return situation.memory[self.name]
+            return situation.memory[self.name][0]
         return path_relaxed(smoothed(situation.time, situation.sinkage), PRESLIDING)

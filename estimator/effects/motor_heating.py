@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.history import relaxed
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Recall, Situation
 from gritd.estimator.terramechanics.soil import Scalar
 
 
@@ -41,11 +41,12 @@ class MotorHeating(Effect):
     def torque_factor(self, situation: Situation) -> Scalar:
         return 1.0 / (1.0 + self.fall * self._heat(situation))
 
-    def remember(self, memory: float, step: float, situation: Situation) -> float:
-        return float(memory + (situation.current**2 - memory) * -np.expm1(-step / self.duration))
+    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+        (heat,) = memory
+        return (float(heat + (situation.current**2 - heat) * -np.expm1(-step / self.duration)),)
 
     def _heat(self, situation: Situation) -> Scalar:
         """H [A²]."""
         if self.name in situation.memory:
-            return situation.memory[self.name]
-        return relaxed(situation.time, situation.current**2, self.duration)
+            return situation.memory[self.name][0]
+        return relaxed(situation.time, situation.current**2, self.duration, situation.run)

@@ -27,6 +27,7 @@ class SensorLatency(Effect):
     )
 
     stage = "sensor"
+    by_run = True
     fingerprint = Fingerprint(
         "load", "rate", "pulses in proportion to how fast the channel itself changes"
     )

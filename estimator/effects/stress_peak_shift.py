@@ -19,8 +19,8 @@ class StressPeakShift(Effect):
     sand.
     """
 
-    share: float = strength("added to c₁", "", typical=0.1, low=-0.3, high=0.3)
-    slip_share: float = strength("added to c₂", "", typical=0.2, low=-0.4, high=0.4)
+    share: float = strength("added to c₁", "", typical=0.1, low=-1.0, high=1.0)
+    slip_share: float = strength("added to c₂", "", typical=0.2, low=-1.0, high=1.0)
 
     stage = "contact"
     fingerprint = Fingerprint(

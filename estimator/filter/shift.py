@@ -38,6 +38,7 @@ REMEMBERED = 256
 ORDERS = tuple(np.arange(degree + 1) for degree in DEGREE)  # of the polynomials in θ₁ and i
 INSIDE = 1.0 - 1e-12  # as near to an edge as sin t allows
 ORDER = 24  # quadrature nodes in each zone
+PEAK = 0.999  # of θₘ/θ₁: at the entry itself σₘ says nothing of the modulus
 INTEGRALS = len(Integrals._fields)
 PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
 
@@ -119,7 +120,7 @@ def true_integrals(
     law = paper_contact(wheel, situation)
     for effect in effects:
         law = effect.contact(law, situation)
-    theta_m = law.theta_m_ratio * theta_1
+    theta_m = np.clip(law.theta_m_ratio, 0.0, PEAK) * theta_1
     depth = (wheel.radius * (np.cos(theta_m) - np.cos(theta_1))) ** soil.exponent
 
     def forces(c: float, sigma_m: float, tan_phi: float) -> original.Forces:
@@ -131,6 +132,7 @@ def true_integrals(
             theta_m=theta_m,
             theta_2=-law.theta_2_ratio * theta_1,
             mobilisation=law.mobilisation,
+            side_slip=law.side_slip,
             order=ORDER,
         )
 

@@ -30,6 +30,7 @@ from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import Aid
+from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.chain import Context
 from gritd.estimator.wheel.sync import Snapshot
 from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
@@ -79,7 +80,7 @@ class TrackState(NamedTuple):
 
     estimate: Estimate
     memory: Memory
-    recall: Mapping[str, float]  # what configured effects remember, by name
+    recall: Mapping[str, Recall]  # what configured effects remember, by name
     columns: Columns = ()  # of the uncertain effect parameters, at the last update
     linearised: Point | None = None  # where the memory was linearised last
     began: int = -1  # end of the first window [ns]

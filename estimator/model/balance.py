@@ -44,14 +44,17 @@ class Balance(NamedTuple):
 def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER) -> Forces:
     """Forces of Eqs. (8)-(10) under the contact law; θₘ and θ₂ keep their ratio to θ₁."""
     soil, law = contact.soil, contact.law
+    cohesion = soil.cohesion * law.strength * law.adhesion
+    tan_phi = soil.tan_phi * law.strength * law.friction
     return forces(
         wheel,
-        replace(soil, cohesion=soil.cohesion * law.strength, tan_phi=soil.tan_phi * law.strength),
+        replace(soil, cohesion=cohesion, tan_phi=tan_phi),
         theta_1,
         contact.slip,
         theta_m=np.clip(law.theta_m_ratio, 0.0, 1.0) * theta_1,
         theta_2=-law.theta_2_ratio * theta_1,
         mobilisation=law.mobilisation,
+        side_slip=law.side_slip,
         order=order,
     )
 
@@ -174,6 +177,9 @@ def _take(contact: Contact, index: slice | Index) -> Contact:
             _at(law.theta_m_ratio, index),
             _at(law.theta_2_ratio, index),
             _at(law.strength, index),
+            _at(law.adhesion, index),
+            _at(law.friction, index),
+            _at(law.side_slip, index),
             law.mobilisation,
         ),
         _at(contact.slip, index),

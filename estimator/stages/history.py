@@ -4,17 +4,18 @@ of time.
 
 from __future__ import annotations
 
-from itertools import accumulate
-
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.estimator.terramechanics.soil import Array, Scalar
+
+Bools = NDArray[np.bool_]
 
 SMOOTHING = 0.2  # [s] span over which a measured speed or sinkage is averaged
 
 
 def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
-    """Moving average over `span` [s] of evenly sampled values; towards the ends the window narrows."""
+    """Moving average over `span` [s] of evenly sampled values; the window narrows at the ends."""
     time, value = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
     if value.ndim == 0:
         return value
@@ -47,21 +48,44 @@ def delayed(time: Scalar, value: Scalar, delay: float) -> Scalar:
     return np.interp(np.asarray(time) - delay, time, value)
 
 
-def relaxed(time: Scalar, drive: Scalar, duration: float) -> Array:
-    """y with duration · dy/dt = drive − y and y = 0 at the start; exact for a drive constant
+def relaxed(time: Scalar, drive: Scalar, duration: float, run: Scalar = 0.0) -> Array:
+    """y with duration · dy/dt = drive − y and y = 0 where a run begins; exact for a drive constant
     between samples.
     """
-    return _relax(drive, -np.expm1(-np.diff(time, prepend=np.ravel(time)[:1]) / duration), 0.0)
+    begins = run_begins(run, np.size(time))
+    share = -np.expm1(-np.diff(time, prepend=np.ravel(time)[:1]) / duration)
+    return _relax(np.where(begins, 0.0, drive), np.where(begins, 1.0, share))
+
+
+def followed(target: Scalar, share: Array, run: Scalar = 0.0) -> Array:
+    """y that goes a share of the way to its target at each sample; a run begins at its target."""
+    return _relax(np.asarray(target), np.where(run_begins(run, share.size), 1.0, share))
 
 
 def path_relaxed(path: Scalar, length: float, start: float = 1.0) -> Array:
     """y with length · dy/ds = sign(dx) − y along the path length s of x."""
     moved = np.diff(path, prepend=np.ravel(path)[:1])
-    return _relax(np.sign(moved), -np.expm1(-np.abs(moved) / length), start)
+    share = -np.expm1(-np.abs(moved) / length)
+    return _relax(np.append(start, np.sign(moved)), np.append(1.0, share))[1:]
 
 
-def _relax(target: Scalar, gain: Array, start: float) -> Array:
-    """y moves towards its target by a share `gain` of the way, sample by sample."""
-    steps = zip(np.broadcast_to(target, gain.shape).tolist(), gain.tolist(), strict=True)
-    values = accumulate(steps, lambda y, step: y + step[1] * (step[0] - y), initial=start)
-    return np.fromiter(values, dtype=float)[1:]
+def run_begins(run: Scalar, count: int) -> Bools:
+    """Whether a run begins at a sample (n,)."""
+    runs = np.broadcast_to(run, count)
+    begins: Bools = np.append(True, np.diff(runs) != 0.0)[:count]
+    return begins
+
+
+def _relax(target: Array, share: Array) -> Array:
+    """y_n = y_(n−1) + share_n (target_n − y_(n−1)), all samples at once; the first share must be 1.
+
+    Two steps are one step of the same form, so the reach of a step is doubled until it covers the
+    run: Hillis and Steele (1986), Comm. ACM 29, 1170-1183.
+    """
+    kept, y = 1.0 - share, share * target
+    reach = 1
+    while reach < y.size and kept.any():
+        y[reach:] += kept[reach:] * y[:-reach]
+        kept[reach:] = kept[reach:] * kept[:-reach]
+        reach *= 2
+    return y

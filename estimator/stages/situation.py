@@ -16,6 +16,8 @@ from gritd.estimator.stages.history import rate_of
 from gritd.estimator.terramechanics.original import Mobilisation, janosi
 from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
+Recall = tuple[float, ...]  # what one effect remembers
+
 CREEP = 2e-4  # [m/s] slower than this the wheel neither drives nor brakes: soil forces fade out
 
 
@@ -40,11 +42,12 @@ class Motion:
     sinkage: Scalar | None = (
         None  # measured [m]; only its direction is used, predicted where absent
     )
+    run: Scalar = 0.0  # number of the run, where several stand one after another
 
 
 @dataclass(frozen=True)
 class Situation:
-    """What an effect may know of the wheel. Fields below a comment hold 0 until that stage is done."""
+    """What an effect may know of the wheel. Below a comment, fields hold 0 until that stage."""
 
     time: Scalar  # [s]
     wheel_angle: Scalar  # [rad]
@@ -60,6 +63,7 @@ class Situation:
     load: Scalar  # weights on the axle [N]
     temperature: Scalar | None = None  # [°C]
     travel: Scalar = 0.0  # away from where the run began [m]
+    run: Scalar = 0.0  # number of the run, where several stand one after another
     # the soil stage
     cohesion: Scalar = 0.0  # c [Pa]
     tan_phi: Scalar = 0.0
@@ -73,7 +77,7 @@ class Situation:
     drawbar_pull: Scalar = 0.0  # DP [N]
     # the drivetrain
     current: Scalar = 0.0  # [A]
-    memory: Mapping[str, float] = field(
+    memory: Mapping[str, Recall] = field(
         default_factory=dict
     )  # on line: what an effect remembers, by its name
 
@@ -85,6 +89,9 @@ class ContactLaw:
     theta_m_ratio: Scalar  # θₘ/θ₁ [-], Eq. (5)
     theta_2_ratio: Scalar = 0.0  # −θ₂/θ₁ [-]
     strength: Scalar = 1.0  # factor on c and tan φ [-]
+    adhesion: Scalar = 1.0  # factor on c alone [-]
+    friction: Scalar = 1.0  # factor on tan φ alone [-]
+    side_slip: Scalar = 0.0  # tangent of the angle between wheel and travel [-]
     mobilisation: Mobilisation = janosi  # share of the strength mobilised at j/k
 
 
@@ -130,6 +137,7 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
         load=motion.load,
         temperature=motion.temperature,
         travel=np.abs(motion.carriage_position),
+        run=motion.run,
     )
 
 

@@ -23,6 +23,7 @@ from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 Mobilisation = Callable[[Array], Array]  # share of the shear strength mobilised at j/k; odd in j/k
 
 ORDER = 16  # nodes in each of the two zones; docs/physics.md states the error
+UNMOVED = 1e-300  # [m] displacement of soil that has no direction
 LOCKED = 1e-9  # smallest 1 + i: a locked wheel has travelled 1e9 times what its rim has turned
 
 
@@ -112,6 +113,16 @@ def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
     return displacement
 
 
+def lateral_displacement(wheel: Wheel, slip: Scalar, points: Arc, side_slip: Scalar) -> Array:
+    """Displacement of the soil across the wheel [m]: r (v/rω)(θ₁ − θ) tan β.
+
+    side_slip is tan β, β the angle between wheel and travel. Shear stress acts along the resultant
+    of both displacements: Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    """
+    displacement: Array = wheel.radius * velocity_ratio(slip) * side_slip * points.turned
+    return displacement
+
+
 def janosi(x: Array) -> Array:
     """Share of the shear strength mobilised at x = j/k, Eq. (2): 1 − e^(−x); odd, so that τ has the
     sign of j.
@@ -140,6 +151,7 @@ def contact(
     theta_m: Scalar | None = None,
     theta_2: Scalar = 0.0,
     mobilisation: Mobilisation = janosi,
+    side_slip: Scalar = 0.0,
     order: int = ORDER,
 ) -> Contact:
     """Stresses of Eqs. (3), (4) and (7) at the quadrature nodes of the rear and front zones."""
@@ -153,7 +165,12 @@ def contact(
     sigma = np.concatenate(
         (sigma, sigma)
     )  # Eq. (4) gives the rear zone the same stress at the same s
-    tau = shear_stress(soil, sigma, shear_displacement(wheel, slip, points), mobilisation)
+    displacement = shear_displacement(wheel, slip, points)
+    tau = shear_stress(soil, sigma, displacement, mobilisation)
+    if np.any(side_slip):
+        total = np.hypot(displacement, lateral_displacement(wheel, slip, points, side_slip))
+        along = displacement / np.maximum(total, UNMOVED)
+        tau = shear_stress(soil, sigma, total, mobilisation) * along
     return Contact(points, weight, sigma, tau)
 
 
@@ -178,6 +195,7 @@ def forces(
     theta_m: Scalar | None = None,
     theta_2: Scalar = 0.0,
     mobilisation: Mobilisation = janosi,
+    side_slip: Scalar = 0.0,
     order: int = ORDER,
 ) -> Forces:
     """DP, W, T and resistance of Eqs. (8)-(10). θₘ follows (5) unless given; θ₂ is 0 as in the
@@ -191,6 +209,7 @@ def forces(
         theta_m=theta_m,
         theta_2=theta_2,
         mobilisation=mobilisation,
+        side_slip=side_slip,
         order=order,
     )
     return integrate(wheel, stresses)

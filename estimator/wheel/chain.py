@@ -18,11 +18,12 @@ from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects import in_order, make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import axle_torque, corrected, paper_contact, prepare, react
-from gritd.estimator.stages.situation import Motion, Sensed, Situation
+from gritd.estimator.stages.situation import Motion, Recall, Sensed, Situation
 from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
 from gritd.estimator.wheel.geometry import entry_angle
 from gritd.estimator.wheel.sync import Snapshot
 
+LAGGED = 0.5  # share of a correction for what lags that may be wrong
 SOIL_STEP = 1e-4  # relative change by which the soil effects' slope is found
 
 
@@ -35,7 +36,7 @@ class Context(NamedTuple):
     k: float  # [m]
     acceleration: float = 0.0  # dω/dt [rad/s²]
     sinking: float = 0.0  # dz/dt [m/s]
-    memory: Mapping[str, float] = {}  # what effects remember, by name
+    memory: Mapping[str, Recall] = {}  # what effects remember, by name
     origin: float = 0.0  # where the carriage stood when the run began, by its encoder [m]
 
 
@@ -72,16 +73,18 @@ class Undone(NamedTuple):
 
     wheel_speed: float  # [rad/s]
     travel_speed: float  # [m/s]
+    travel_doubt: float  # standard deviation by what effects make of it
     sinkage: float  # of the rim in the soil [m]
     torque: float  # at the axle, drivetrain undone [N·m]
     load: float  # carried by the rim [N]
+    load_doubt: float  # standard deviation by what effects make of it
     drawbar_pull: float  # [N]
     here: Here
     situation: Situation
 
 
 class Chain:
-    """The effects of a configuration at given parameter values, ready for one window after another."""
+    """The effects of a configuration at given values, ready for one window after another."""
 
     def __init__(self, settings: Settings, effects: tuple[Effect, ...]) -> None:
         self.effects = in_order(effects)
@@ -114,12 +117,16 @@ class Chain:
             replace(situation, torque=torque, drawbar_pull=true.drawbar_pull), wheel
         )
         felt = react(situation, self.effects)
+        present = float(carried - (felt.load - carried))
+        slip, load = self._answered(situation, present)
         return Undone(
             wheel_speed=float(situation.wheel_speed),
-            travel_speed=float(situation.carriage_speed),
+            travel_speed=(travel := _travel_speed(situation, slip)),
+            travel_doubt=LAGGED * abs(travel - float(situation.carriage_speed)),
             sinkage=float(true.sinkage - (felt.sinkage - situation.sinkage)),
             torque=float(torque),
-            load=float(carried - (felt.load - carried)),
+            load=load,
+            load_doubt=LAGGED * abs(load - present),
             drawbar_pull=float(true.drawbar_pull),
             here=self._here(situation, context),
             situation=situation,
@@ -151,6 +158,13 @@ class Chain:
         for effect in self.effects:
             carried = effect.load(carried, situation)
         return float(carried)
+
+    def _answered(self, situation: Situation, load: Scalar) -> tuple[float, float]:
+        """Slip and load [N] that the stresses on the rim answer to."""
+        slip: Scalar = situation.slip
+        for effect in self.effects:
+            slip, load = effect.answered(slip, load, situation)
+        return float(slip), float(load)
 
     def _torque(self, true: Sensed, situation: Situation) -> float:
         if self._settings.drive.torque_source == "wrench":
@@ -201,15 +215,15 @@ class Chain:
         at = self._soil(context.c, context.tan_phi, context.k, situation)
         c, tan_phi, k = (x * (1.0 + SOIL_STEP) for x in (context.c, context.tan_phi, context.k))
         near = self._soil(c, tan_phi, k, situation)
-        strength = float(law.strength)
+        cohesive, rubbing = (float(law.strength * part) for part in (law.adhesion, law.friction))
 
         def line(x: float, y: float, moved: float, factor: float) -> tuple[float, float]:
             slope = (moved - y) / (x * SOIL_STEP) if x else 1.0
             return factor * slope, factor * (y - slope * x)
 
         return Here(
-            *line(context.c, float(at.cohesion), float(near.cohesion), strength),
-            *line(context.tan_phi, float(at.tan_phi), float(near.tan_phi), strength),
+            *line(context.c, float(at.cohesion), float(near.cohesion), cohesive),
+            *line(context.tan_phi, float(at.tan_phi), float(near.tan_phi), rubbing),
             *line(context.k, float(at.shear_modulus), float(near.shear_modulus), 1.0),
         )
 
@@ -218,8 +232,8 @@ class Chain:
         return reduce(lambda soil, e: e.soil(soil, situation), self.effects, soil)
 
     def remember(
-        self, memory: Mapping[str, float], step: float, situation: Situation
-    ) -> dict[str, float]:
+        self, memory: Mapping[str, Recall], step: float, situation: Situation
+    ) -> dict[str, Recall]:
         """What the effects remember, `step` [s] later."""
         return {
             e.name: e.remember(memory.get(e.name, e.at_start), step, situation)
@@ -227,9 +241,17 @@ class Chain:
             if type(e).remember is not Effect.remember
         }
 
-    def fresh_memory(self) -> dict[str, float]:
+    def fresh_memory(self) -> dict[str, Recall]:
         """What the effects remember before the run."""
         return {e.name: e.at_start for e in self.effects if type(e).remember is not Effect.remember}
+
+
+def _travel_speed(situation: Situation, slip: float) -> float:
+    """The carriage speed [m/s] at which the wheel has this slip; as measured where it has it."""
+    rim, travel = float(situation.radius * situation.wheel_speed), float(situation.carriage_speed)
+    if slip == situation.slip or rim * travel <= 0.0:
+        return travel
+    return rim * (1.0 - slip) if slip >= 0.0 else rim / (1.0 + slip)
 
 
 def variants(settings: Settings) -> list[tuple[Effect, ...]]:

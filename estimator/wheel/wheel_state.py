@@ -25,6 +25,7 @@ from gritd.estimator.wheel.sync import Measured, Snapshot
 # the linearised shear displacement changes sign along the contact below about this slip
 BRAKING_SLIP = -0.05
 STALL_SLIP = 0.95
+LOAD_SIGMA_MAX = 0.1  # likewise, relative error of the load
 SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
 STEADY = (
@@ -70,17 +71,24 @@ def wheel_state(
     undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
     true = snapshot._replace(
         wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
-        carriage_speed=snapshot.carriage_speed._replace(value=undone.travel_speed),
+        carriage_speed=_doubted(snapshot.carriage_speed, undone.travel_speed, undone.travel_doubt),
         sinkage=snapshot.sinkage._replace(value=undone.sinkage),
         drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
     )
     now = _plain(replace(settings, wheel=chain.wheel), true)
     return now._replace(
         torque=now.torque._replace(value=undone.torque),
-        load=now.load._replace(value=undone.load),
+        load=_doubted(now.load, undone.load, undone.load_doubt),
         here=undone.here,
         situation=undone.situation,
         read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
+    )
+
+
+def _doubted(measured: Measured, value: float, doubt: float) -> Measured:
+    """A measurement that effects have changed."""
+    return (
+        Measured(value, hypot(measured.sigma, doubt)) if doubt else measured._replace(value=value)
     )
 
 
@@ -174,6 +182,8 @@ def _travel(settings: Settings, now: WheelState) -> Status | None:
 
 def _steadiness(now: WheelState, before: WheelState | None) -> Status:
     if now.slip.sigma > SLIP_SIGMA_MAX:
+        return Status.UNCERTAIN
+    if now.load.sigma > LOAD_SIGMA_MAX * now.load.value:
         return Status.UNCERTAIN
     if now.theta_1.d_sinkage * now.sinkage.sigma > ANGLE_SIGMA_MAX * now.theta_1.value:
         return Status.UNCERTAIN

@@ -47,6 +47,7 @@ AXES = {
     "acceleration": "time [s], speed stepping up and down",
     "rate": "time [s], load stepping up and down",
     "run": "pass",
+    "reversal": "wheel angle since the drive turned round [rad]",
 }
 SHADES = ("#5c6672", "#e8a33d", "#c2410c")
 
@@ -144,6 +145,10 @@ def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
     elif covariate == "acceleration":
         speed = SPEED + 0.1 * np.tanh(8.0 * np.sin(0.3 * time))
         x = time
+    elif covariate == "reversal":
+        speed = np.where(ramp < 0.5, -SPEED, SPEED)
+        time = 2.0 * ramp
+        x = SPEED * (time - 1.0)
     elif covariate == "rate":
         load = LOAD + 20.0 * np.tanh(4.0 * np.sin(0.3 * time))
         x = time

@@ -38,17 +38,19 @@ TIE = 0.1  # [-] shares closer than this are no different
 HIGHEST_ORDER = 60  # [cycles a turn] tried for the wheel angle
 
 
-def campaign(runs: int = RUNS, seed: int = 3) -> list[Motion]:
+def campaign(runs: int = RUNS, seed: int = 3, reversing: bool = False) -> list[Motion]:
     """Runs that drive forward through all loads, slips and speeds in a drawn order, each run the
-    next pass.
+    next pass; reversing: forward and backward in turn.
     """
     rng = np.random.default_rng(seed)
-    return [_run(rng, number) for number in range(runs)]
+    return [_run(rng, number, reversing) for number in range(runs)]
 
 
-def _run(rng: np.random.Generator, number: int) -> Motion:
+def _run(rng: np.random.Generator, number: int, reversing: bool) -> Motion:
     grid = [(load, slip, speed) for load in LOADS for slip in SLIPS for speed in SPEEDS]
     order = np.array([grid[i] for i in rng.permutation(len(grid))])
+    if reversing:
+        order[1::2, 2] *= -1.0
     time = np.arange(0.0, len(grid) * SEGMENT, 1.0 / RATE)
     load, slip, speed = (ramped(time, column) for column in order.T)
     travel = WHEEL.radius * speed * (1.0 - slip)
@@ -97,9 +99,19 @@ def covariates(motions: list[Motion], plain: list[Response]) -> dict[str, Array]
         "position": np.concatenate([np.asarray(m.carriage_position) for m in motions]),
         "time": np.concatenate([np.asarray(m.time) for m in motions]),
         "acceleration": np.concatenate([rate_of(m.time, m.wheel_speed) for m in motions]),
+        "reversal": np.concatenate([since_reversal(np.asarray(m.wheel_angle)) for m in motions]),
         "heat": np.concatenate([np.cumsum(r.current**2) / RATE for r in plain]),
         "run": np.concatenate([m.pass_number * one for m, one in zip(motions, shape, strict=True)]),
     }
+
+
+def since_reversal(angle: Array) -> Array:
+    """Angle turned since the wheel last turned round [rad], positive forward, (n,)."""
+    way = np.sign(np.diff(angle, prepend=angle[:1]))
+    reverses = np.diff(way, prepend=way[:1]) != 0.0
+    last = np.maximum.accumulate(np.where(reverses, np.arange(angle.size) - 1, 0))
+    since: Array = angle - angle[last]
+    return since
 
 
 @dataclass(frozen=True)
@@ -130,7 +142,8 @@ class Shown:
 
 def shown(effect: Effect) -> Shown:
     """Run the campaign with and without the effect."""
-    motions, plain = campaign(), _plain()
+    reversing = effect.fingerprint.covariate == "reversal"
+    motions, plain = campaign(reversing=reversing), _plain(reversing)
     other = [
         simulate_arrays(WHEEL, SOIL, m, (effect,), torque_constant=TORQUE_CONSTANT) for m in motions
     ]
@@ -150,9 +163,10 @@ def shown(effect: Effect) -> Shown:
 
 
 @cache
-def _plain() -> list[Response]:
+def _plain(reversing: bool) -> list[Response]:
     """The campaign without effects."""
-    return [simulate_arrays(WHEEL, SOIL, m, torque_constant=TORQUE_CONSTANT) for m in campaign()]
+    motions = campaign(reversing=reversing)
+    return [simulate_arrays(WHEEL, SOIL, m, torque_constant=TORQUE_CONSTANT) for m in motions]
 
 
 def shares(change: Array, by: dict[str, Array]) -> dict[str, float]:

@@ -58,6 +58,15 @@ DESIGN = set(
         "sensor_latency",
         "stress_linearisation",
         "empirical_law",
+        "backlash",
+        "bed_inclination",
+        "contact_relaxation",
+        "hub_runout",
+        "load_dependent_friction",
+        "rim_friction",
+        "running_in",
+        "sensor_drift",
+        "side_slip",
     ]
 )
 
@@ -251,7 +260,7 @@ def test_latency_is_undone_away_from_the_ends() -> None:
 def test_takes_floats_as_the_loop_has_them(name: str) -> None:
     """Every hook that the on-line filter may call gives one number for one instant."""
     effect = typical(EFFECTS[name])
-    memory = {name: 0.3}
+    memory = {name: (0.3, 60.0)}
     situation = Situation(
         *(1.0, 2.0, 0.3, 0.1, 0.015, 0.4, 2.0, 0.072, 0.071, 0.2, 1.0, 60.0),
         **dict(

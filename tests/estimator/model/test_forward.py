@@ -248,7 +248,7 @@ def test_heating_on_line_follows_the_batch() -> None:
     current = 1.0 + np.sin(np.arange(300) / 20.0)
     situation = Situation(**{**vars(situation_of(steady(n=300), WHEEL)), "current": current})
     batch = effect.torque_factor(situation)
-    memory, live = 0.0, []
+    memory, live = (0.0,), []
     for now in current:
         at = Situation(**{**vars(situation), "current": now, "memory": {effect.name: memory}})
         memory = effect.remember(memory, 0.04, at)

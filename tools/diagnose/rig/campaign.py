@@ -1,5 +1,5 @@
-"""All runs of a campaign through the forward model, in one call where no effect remembers what went
-before.
+"""All runs of a campaign through the forward model, in one call unless an effect needs each run by
+itself.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from gritd.estimator.stages.situation import Motion, Sensed
 from gritd.estimator.terramechanics.soil import Array, Soil
 
 ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
-LAGGING = ("sensor_latency",)  # looks back in time
 
 
 class Campaign:
@@ -82,9 +81,8 @@ def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:
 
 
 def _at_once(effect: Effect) -> bool:
-    """Whether every sample stands for itself, so that runs may be joined."""
-    listed = EFFECTS.get(effect.name) is type(effect)
-    return listed and type(effect).remember is Effect.remember and effect.name not in LAGGING
+    """Whether runs may follow one another in one array without touching."""
+    return EFFECTS.get(effect.name) is type(effect) and not effect.by_run
 
 
 def _filled(motion: Motion) -> Motion:
@@ -104,7 +102,9 @@ def _joined(motions: Sequence[Motion]) -> Motion:
         "time", "wheel_angle", "wheel_speed", "carriage_position", "carriage_speed", "load",
         "pass_number", "start_position", "wheel_acceleration",
     )  # fmt: skip
-    return Motion(**{name: np.concatenate([getattr(m, name) for m in motions]) for name in names})
+    joined = {name: np.concatenate([getattr(m, name) for m in motions]) for name in names}
+    number = np.repeat(np.arange(len(motions), dtype=float), [np.size(m.time) for m in motions])
+    return Motion(**joined, run=number)
 
 
 def _scaled(motion: Motion, weights: Array, travelled: float) -> Motion:

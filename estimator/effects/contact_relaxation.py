@@ -1,0 +1,101 @@
+"""Forces and sinkage that follow over a length of travel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.stages.history import followed
+from gritd.estimator.stages.situation import Reaction, Recall, Situation
+from gritd.estimator.terramechanics.soil import Scalar
+
+ARC = 1.0  # [rad] of a usual contact
+
+
+@dataclass(frozen=True)
+class ContactRelaxation(Effect):
+    """Forces and sinkage follow a change of slip or load over a length of travel, because the wheel
+    has to move on to new soil first.
+
+    y = y∞ + a (ȳ − y∞),   λ dȳ/ds = y∞ − ȳ,   ds = ½ (r |dψ| + |dx|)
+
+    y∞ is T, DP or z at the slip and load of the moment, the run's first value where it begins: a
+    wheel that starts from rest builds its torque up. At rest z stays where it is; in the air
+    nothing lags. On line the forces are those of a slip and a load that lag in the same way.
+    Source: first-order relaxation of a rolling contact, Pacejka (2012), Tire and Vehicle Dynamics,
+    3rd ed., chapter 7; the soil under the rim is renewed over the contact length r sin θ₁. That rim
+    and axle count alike for the path was chosen here.
+    """
+
+    forces: float = strength(
+        "share of a change of T and DP that lags, a", "", typical=1.0, low=0.0, high=1.5
+    )
+    sinkage: float = strength(
+        "share of a change of z that lags, a", "", typical=1.0, low=0.0, high=1.5
+    )
+    length: float = shape("relaxation length, λ", "m", mean=0.03, sigma=0.02, low=0.002, high=0.15)
+
+    stage = "wheel"
+    fingerprint = Fingerprint(
+        "sinkage",
+        "load",
+        "sinkage, torque and drawbar pull trail a step of load or slip over the same length at any "
+        "speed",
+    )
+    at_start = ()
+    confusable_with = told_apart(sensor_latency="speed_step", load_axis_friction="slip_step")
+
+    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+        # at rest the soil's forces fade out, and with them what they lag
+        forces = self.forces * np.abs(situation.direction)
+        return replace(
+            reaction,
+            torque=reaction.torque + forces * self._behind(situation.torque, situation),
+            drawbar_pull=reaction.drawbar_pull
+            + forces * self._behind(situation.drawbar_pull, situation),
+            sinkage=reaction.sinkage + self.sinkage * self._behind(situation.sinkage, situation),
+        )
+
+    def answered(self, slip: Scalar, load: Scalar, situation: Situation) -> tuple[Scalar, Scalar]:
+        behind = situation.memory.get(self.name, ())
+        if not behind:
+            return slip, load
+        lagging, rate = min(self.forces, 1.0), _mobilising(situation)
+        mobilised = -np.expm1(-rate * slip)
+        slip = -np.log1p(-(mobilised + lagging * (behind[0] - mobilised))) / rate
+        return (
+            slip,
+            load + lagging * (behind[1] - load),
+        )
+
+    def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
+        mobilised = -np.expm1(-_mobilising(situation) * situation.slip)
+        now = float(mobilised), float(situation.carried)
+        rim = situation.radius * np.abs(situation.wheel_speed)
+        moved = 0.5 * (rim + np.abs(situation.carriage_speed)) * step
+        if not memory or situation.carried <= 0.0:
+            return now
+        share = float(-np.expm1(-moved / self.length))
+        return tuple(m + share * (n - m) for m, n in zip(memory, now, strict=True))
+
+    def _behind(self, steady: Scalar, situation: Situation) -> Scalar:
+        """ȳ − y∞."""
+        if np.ndim(steady) == 0:
+            return 0.0
+        moved = 0.5 * (
+            situation.radius * _steps(situation.wheel_angle) + _steps(situation.position)
+        )
+        share = np.where(situation.carried > 0.0, -np.expm1(-moved / self.length), 1.0)
+        return followed(steady, share, situation.run) - steady
+
+
+def _mobilising(situation: Situation) -> Scalar:
+    """j/k halfway along a usual contact at slip 1: T and DP go with slip as 1 − e^(−i j/k)."""
+    return 0.5 * ARC * situation.radius / situation.shear_modulus
+
+
+def _steps(path: Scalar) -> Scalar:
+    """Length of each step along a path, 0 at the first."""
+    return np.abs(np.diff(path, prepend=np.ravel(path)[:1]))

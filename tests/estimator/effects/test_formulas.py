@@ -1,0 +1,116 @@
+"""What the formula of an effect says, against the equations written out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize
+
+from gritd.estimator.effects import EFFECTS, make
+from gritd.estimator.filter.shift import IntegralShift
+from gritd.estimator.model import balance
+from gritd.estimator.model.forward import Response, simulate_arrays
+from gritd.estimator.stages.situation import ContactLaw, Motion
+from gritd.estimator.terramechanics.original import forces
+from gritd.tools.testbed.fingerprints import SOIL, WHEEL, campaign, typical
+
+
+@pytest.fixture(scope="module")
+def motion() -> Motion:
+    return campaign(1)[0]
+
+
+@pytest.fixture(scope="module")
+def plain(motion: Motion) -> Response:
+    return simulate_arrays(WHEEL, SOIL, motion)
+
+
+def test_a_smooth_rim_is_a_rim_on_a_weaker_soil(motion: Motion) -> None:
+    smooth = make("rim_friction", {"smoothness": 0.3, "adhesion_loss": 0.6})
+    weaker = replace(SOIL, cohesion=0.4 * SOIL.cohesion, tan_phi=0.7 * SOIL.tan_phi)
+    found = simulate_arrays(WHEEL, SOIL, motion, (smooth,))
+    expected = simulate_arrays(WHEEL, weaker, motion)
+    np.testing.assert_allclose(found.torque, expected.torque, rtol=1e-9)
+    np.testing.assert_allclose(found.sinkage, expected.sinkage, rtol=1e-9)
+
+
+@pytest.mark.parametrize("slip", [0.05, 0.4])
+def test_side_slip_turns_the_shear_stress(slip: float) -> None:
+    """Ishigami et al. (2007), integrated by scipy."""
+    theta_1, tangent, k = 0.8, 0.5, SOIL.shear_modulus
+    theta_m = 0.5 * theta_1
+
+    def torque(theta: float) -> float:
+        front = theta if theta >= theta_m else theta_1 - theta
+        depth = WHEEL.radius * max(np.cos(front) - np.cos(theta_1), 0.0)
+        sigma = SOIL.modulus * depth**SOIL.exponent
+        along = WHEEL.radius * (theta_1 - theta - (1.0 - slip) * (np.sin(theta_1) - np.sin(theta)))
+        across = WHEEL.radius * (1.0 - slip) * (theta_1 - theta) * tangent
+        total = np.hypot(along, across)
+        strength = (SOIL.cohesion + sigma * SOIL.tan_phi) * (1.0 - np.exp(-total / k))
+        return float(strength * along / total) if total else 0.0
+
+    zones = ((0.0, theta_m), (theta_m, theta_1))
+    expected = WHEEL.radius**2 * WHEEL.width * sum(integrate.quad(torque, *z)[0] for z in zones)
+    found = forces(WHEEL, SOIL, theta_1, slip, side_slip=tangent, order=40)
+    assert float(found.torque) == pytest.approx(expected, rel=1e-6)
+    assert found.torque < forces(WHEEL, SOIL, theta_1, slip, order=40).torque
+
+
+def test_a_runout_of_the_hub_moves_the_potentiometer_alone(motion: Motion, plain: Response) -> None:
+    lifted = simulate_arrays(WHEEL, SOIL, motion, (typical(EFFECTS["hub_runout"]),)).sensed
+    assert np.ptp(lifted.sinkage - plain.sensed.sinkage) == pytest.approx(2e-3 * 2**0.5, rel=0.01)
+    for channel in ("torque", "drawbar_pull", "load", "current"):
+        np.testing.assert_array_equal(getattr(lifted, channel), getattr(plain.sensed, channel))
+
+
+def test_an_inclined_bed_shows_in_the_potentiometer_and_in_the_pull(
+    motion: Motion, plain: Response
+) -> None:
+    angle = 0.01
+    found = simulate_arrays(WHEEL, SOIL, motion, (make("bed_inclination", {"angle": angle}),))
+    climbed = (plain.sensed.sinkage - found.sensed.sinkage) / np.asarray(motion.carriage_position)
+    np.testing.assert_allclose(climbed[100:], np.tan(angle), rtol=0.02)
+    lost = (plain.drawbar_pull - found.drawbar_pull) / np.asarray(motion.load)
+    np.testing.assert_allclose(lost, np.sin(angle), rtol=0.02)
+
+
+def test_a_loaded_bearing_consumes_nothing_in_the_air(motion: Motion, plain: Response) -> None:
+    bearing = make("load_dependent_friction", {"arm": 2e-3})
+    lost = simulate_arrays(WHEEL, SOIL, motion, (bearing,)).motor_torque - plain.motor_torque
+    np.testing.assert_allclose(lost, 2e-3 * np.asarray(motion.load), rtol=1e-6)
+    lifted = replace(motion, load=0.0)
+    np.testing.assert_array_equal(simulate_arrays(WHEEL, SOIL, lifted, (bearing,)).motor_torque, 0)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.9])
+def test_the_stress_may_peak_anywhere_on_the_rim(ratio: float) -> None:
+    shifted = make("stress_peak_shift", {"share": ratio - 0.5})
+    slip, load = np.linspace(0.0, 0.8, 9), np.full(9, 20.0)
+    found = balance.solve(WHEEL, balance.Contact(SOIL, ContactLaw(ratio), slip, load))
+    np.testing.assert_allclose(found.forces.load, load, rtol=1e-8)
+    shift = IntegralShift(WHEEL, SOIL, (shifted,)).at(0.025, 0.7, 0.3)
+    assert all(np.isfinite(entry) for integrals in shift for entry in integrals)
+
+
+def test_a_towed_wheel_is_a_wheel_whose_torque_vanishes() -> None:
+    """Without a drive the wheel skids so far that the soil turns it against its bearing's loss."""
+
+    def found(slip: float, loss: float) -> tuple[float, float]:
+        speed, n = 0.3, 10
+        travel, time = WHEEL.radius * speed / (1.0 + slip), np.arange(n) / 25.0
+        motion = Motion(
+            time, speed * time, np.full(n, speed), travel * time, np.full(n, travel), 60.0
+        )
+        friction = make("coulomb_friction", {"loss": loss})
+        response = simulate_arrays(WHEEL, SOIL, motion, (friction,))
+        return float(response.motor_torque[-1]), float(response.drawbar_pull[-1])
+
+    free, braked = (
+        optimize.brentq(lambda slip, loss=loss: found(slip, loss)[0], -0.9, 0.2)
+        for loss in (0.0, 0.1)
+    )
+    assert braked < free < 0.0
+    assert found(braked, 0.1)[1] < found(free, 0.0)[1] < 0.0  # it has to be pulled

@@ -11,8 +11,9 @@ from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context
 from typing import Any
 
-from gritd.tools.cli.command import FAILED, USAGE, CommandError
+from gritd.tools.cli.command import FAILED, CommandError
 from gritd.tools.cli.offspring import bind_to
+from gritd.tools.cli.optional import require
 
 
 @contextmanager
@@ -57,14 +58,9 @@ def _begin(parent: int) -> None:
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Any]:
-    try:
-        from distributed import Client
-    except ImportError:
-        message = (
-            "--scheduler needs dask.distributed; expected it installed: "
-            "pip install 'gritd[cluster]'"
-        )
-        raise CommandError(message, USAGE) from None
+    require("distributed", "--scheduler")
+    from distributed import Client
+
     try:
         client: Any = Client(address, timeout="5s")
     except (OSError, ValueError, TimeoutError):

@@ -5,6 +5,7 @@ residual below.
 from __future__ import annotations
 
 import argparse
+import importlib
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.optional import require
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
@@ -22,7 +24,7 @@ from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.report import comparison, sheet
+from gritd.tools.report import comparison
 from gritd.tools.report.comparison import Comparison
 
 RATE = 10.0  # [Hz] of the grid on which they are compared
@@ -31,6 +33,8 @@ RATE = 10.0  # [Hz] of the grid on which they are compared
 def main(argv: Sequence[str]) -> int:
     """Print the errors, draw what was asked for. Raises ConfigError or CommandError."""
     arguments = _parser().parse_args(argv)
+    if arguments.png:
+        require("matplotlib", "--png")
     configuration = config.load(arguments.config)
     found = compare(
         arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv]
@@ -39,7 +43,7 @@ def main(argv: Sequence[str]) -> int:
         if arguments.report:
             arguments.report.write_text(comparison.render(found), encoding="utf-8")
         if arguments.png:
-            sheet.draw(arguments.png, found)
+            importlib.import_module("gritd.tools.report.sheet").draw(arguments.png, found)
     except OSError as error:
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE

@@ -4,6 +4,7 @@ what it found.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -11,20 +12,21 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import get_args
 
+from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.topics import TOPICS
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.estimator.visible import visible
 from gritd.tools.cli.child import Child, interruptible
 from gritd.tools.cli.command import DONE, FAILED, Parser, number, whole
+from gritd.tools.cli.optional import missing
 from gritd.tools.cli.terminal import control
 from gritd.tools.commands import demo_targets as targets
-from gritd.tools.report import figure
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.testbed import NAME, PLAYED, SHORTEST
 from gritd.tools.testbed.wires import CanKind
@@ -159,15 +161,25 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
     found = targets.judge(ticks, soil, plant)
     table = [*targets.table(found), *targets.without_correction(recording, soil)]
     print("\n".join([*table, "", *targets.punctuality(loop), *_counters(folder, last_words)]))
-    picture = folder / "demo.png"
-    figure.draw(picture, ticks, targets.headline(found, plant, ticks), soil)
-    print(f"log {recording.path}\nfigure {picture}", flush=True)
+    print(f"log {recording.path}")
+    print(
+        f"figure {_drawn(folder, ticks, targets.headline(found, plant, ticks), soil)}", flush=True
+    )
     missed = [*targets.reasons(found), *_replay(recording.path)]
     for reason in missed:
         print(f"target missed: {reason}", file=sys.stderr)
     if not missed:
         print(targets.praise(found))
     return FAILED if missed else DONE
+
+
+def _drawn(folder: Path, ticks: Rows, title: str, soil: Mapping[str, float]) -> str:
+    """The path of the figure, or why there is none."""
+    if how := missing("matplotlib"):
+        return f"not drawn: {how}"
+    picture = folder / "demo.png"
+    importlib.import_module("gritd.tools.report.figure").draw(picture, ticks, title, soil)
+    return str(picture)
 
 
 def _recording(folder: Path) -> Recording:

@@ -28,7 +28,8 @@ from gritd.estimator.messages.tick import (
     names_of,
     row,
 )
-from gritd.estimator.offline.snapshots import Ints, played, snapshots
+from gritd.estimator.offline.snapshots import played, snapshots
+from gritd.estimator.offline.windows import Ints
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
 

@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.status import CHANNEL_BITS
+from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 ANALOGUE = ("sinkage_pot", "motor_shunt")
 NEVER = -(1 << 62)  # [ns]
@@ -51,26 +49,36 @@ def played(recording: Recording, rate: float) -> Played:
 
     Raises RecordingError where a raw topic is not what the contract says.
     """
+    if not recording.counts[TICK]:
+        return played_at(recording, rate)
+
+    raw, logged = _raw(recording), recording.arrays(TICK)
+    consumed = {name: np.searchsorted(logged["order"], rows["order"]) for name, rows in raw.items()}
+    return _streams(logged["stamp"], raw, consumed)
+
+
+def played_at(recording: Recording, rate: float) -> Played:
+    """Ticks at `rate` [Hz] from the first to the last receive time, whatever was logged."""
+    raw = {
+        name: rows[np.argsort(rows["log_time"], kind="stable")]
+        for name, rows in _raw(recording).items()
+    }
+    ticks = _built(raw, round(NS / rate))
+    consumed = {name: np.searchsorted(ticks, rows["log_time"]) for name, rows in raw.items()}
+    return _streams(ticks, raw, consumed)
+
+
+def _raw(recording: Recording) -> dict[str, NDArray[np.void]]:
+    """The raw readings of every channel that has any."""
     raw = {channel: recording.arrays(f"/raw/{channel}") for channel in CHANNELS}
-    raw = {channel: rows for channel, rows in raw.items() if rows.size}
-    if recording.counts[TICK]:
-        logged = recording.arrays(TICK)
-        ticks, consumed = (
-            logged["stamp"],
-            {name: np.searchsorted(logged["order"], r["order"]) for name, r in raw.items()},
-        )
-    else:
-        raw = {
-            channel: rows[np.argsort(rows["log_time"], kind="stable")]
-            for channel, rows in raw.items()
-        }
-        ticks = _built(raw, round(NS / rate))
-        consumed = {
-            channel: np.searchsorted(ticks, rows["log_time"]) for channel, rows in raw.items()
-        }
-    return Played(
-        ticks, {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
-    )
+    return {channel: rows for channel, rows in raw.items() if rows.size}
+
+
+def _streams(
+    ticks: Ints, raw: Mapping[str, NDArray[np.void]], consumed: Mapping[str, Ints]
+) -> Played:
+    streams = {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
+    return Played(ticks, streams)
 
 
 def _built(raw: Mapping[str, NDArray[np.void]], period: int) -> Ints:
@@ -149,26 +157,18 @@ def measured(series: Series) -> list[Measured]:
     return list(map(Measured, series.value.tolist(), series.sigma.tolist()))
 
 
-class Members(NamedTuple):
-    """The accepted readings of a channel, and which of them lie in which window."""
+class Accepted(NamedTuple):
+    """The readings of a channel that came in time, each stamp once, and the windows they lie in."""
 
     stamp: Ints  # (n,) [ns], ascending
     values: NDArray[Any]  # (n,)
-    reading: Ints  # (p,) numbers of the readings inside
-    window: Ints  # (p,) and of the window each is in
-    size: Ints  # (m,) readings in each window
-    first: Ints  # (m,) number of the first of them
-    last: Ints  # (m,) and of the last
-
-    def sum(self, values: Array) -> Array:
-        """Sums over each window (m,) of values (p,)."""
-        return np.bincount(self.window, values, len(self.size)).astype(float)
+    members: Members
 
     def still(self, ends: Ints) -> Ints:
         """How long the value had not changed at the end of each window [ns], 0 in an empty one."""
         changed = np.append(True, self.values[1:] != self.values[:-1])
         since = np.maximum.accumulate(np.where(changed, self.stamp, 0))
-        return np.where(self.size > 0, ends - since[self.last], 0)
+        return np.where(self.members.size > 0, ends - since[self.members.last], 0)
 
 
 class View:
@@ -231,81 +231,73 @@ class View:
         noise: float,
         calibration: Calibration,
     ) -> Series:
-        members = self._members(stream, values, valid, latency)
-        if members is None:
+        accepted = self._accepted(stream, values, valid, latency)
+        if accepted is None:
             return self.nothing
-        known = members.size > 0
-        count = np.where(known, members.size, 1)
-        mean = members.sum(members.values[members.reading]) / count
+
+        size = accepted.members.size
+        mean = accepted.members.mean(accepted.values)
         scale = calibration.scale.value
         return Series(
-            np.where(known, mean * scale + calibration.offset.value, np.nan),
-            np.where(known, noise / np.sqrt(count) * abs(scale), 0.0),
-            known,
-            members.still(self.ends),
+            np.where(size > 0, mean * scale + calibration.offset.value, np.nan),
+            np.where(size > 0, noise / np.sqrt(np.maximum(size, 1)) * abs(scale), 0.0),
+            size > 0,
+            accepted.still(self.ends),
         )
 
     def slope(self, name: str, arm: float) -> Motion:
         """Position and speed of an encoder; arm is the pulley radius, or 1 for an angle."""
         channel, stream = self._settings.channels[name], self._streams.get(name)
-        members = None
-        if stream is not None:
-            members = self._members(
-                stream, stream.values, np.full(stream.stamp.shape, True), channel.latency
-            )
-        if members is None:
+        if stream is None:
             return self.nothing
-        members = members._replace(values=self._rebaselined(members, channel.max_rate))
-        mean, rate, sigma = _fitted(members, channel.noise)
-        span = members.stamp[members.last] - members.stamp[members.first]
+        every = np.full(stream.stamp.shape, True)
+        accepted = self._accepted(stream, stream.values, every, channel.latency)
+        if accepted is None:
+            return self.nothing
+
+        accepted = accepted._replace(values=self._rebaselined(accepted, channel.max_rate))
+        stamp, counts, members = accepted
+        line = lines(members, stamp, counts)
+        span = stamp[members.last] - stamp[members.first]
         known = (members.size >= 3) & (span >= self.length // 2)
+
         scale = channel.calibration.scale.value * arm
+        position = line.mean * scale + channel.calibration.offset.value * arm
+        sigma = _slope_sigma(channel.noise, members.size, line)
         return Motion(
-            np.where(known, rate * scale, np.nan),
+            np.where(known, line.rate * scale, np.nan),
             np.where(known, sigma * abs(scale), 0.0),
             known,
-            members.still(self.ends),
-            np.where(known, mean * scale + channel.calibration.offset.value * arm, np.nan),
+            accepted.still(self.ends),
+            np.where(known, position, np.nan),
         )
 
-    def _members(
+    def _accepted(
         self, stream: Stream, values: NDArray[Any], valid: Bools, latency: float
-    ) -> Members | None:
+    ) -> Accepted | None:
         """The readings in time, sorted, each stamp once; None without any."""
         stamp = stream.stamp - round(latency * NS)
         taken = np.flatnonzero(valid & (stamp > np.append(-1, self._closed)[stream.tick]))
         taken = taken[np.argsort(stamp[taken], kind="stable")]
         stamp = stamp[taken]
+
         fresh = np.diff(stamp, prepend=-1) > 0
         stamp, values = stamp[fresh], values[taken[fresh]]
         if not stamp.size:
             return None
-        low, high = (
-            np.searchsorted(stamp, self.ends - self.length, "right"),
-            np.searchsorted(stamp, self.ends, "right"),
-        )
-        count = high - low
-        window = np.repeat(np.arange(len(count)), count)
-        reading = np.arange(len(window)) + (low - np.cumsum(count) + count)[window]
-        return Members(
-            stamp,
-            values,
-            reading,
-            window,
-            count,
-            np.minimum(low, len(stamp) - 1),
-            np.maximum(high - 1, 0),
-        )
+        return Accepted(stamp, values, members(stamp, self.ends - self.length, self.ends))
 
-    def _rebaselined(self, members: Members, max_rate: float) -> Ints:
+    def _rebaselined(self, accepted: Accepted, max_rate: float) -> Ints:
         """Counts with every jump taken out; see sync.SlopeWindow."""
-        stamp, counts = members.stamp, members.values
+        stamp, counts, _ = accepted
         step, elapsed = np.diff(counts), np.diff(stamp)
         opened = np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp[1:])]
         fast = np.abs(step) * float(NS) > max_rate * elapsed + 2.0 * NS
+
         # a reading that enters an empty window has nothing to jump from
         fresh = np.searchsorted(self._closed, stamp[:-1]) < np.searchsorted(self._closed, stamp[1:])
         jumps = np.flatnonzero(fast & ~(fresh & (stamp[:-1] <= opened))) + 1
+
         shifted, shift, done = counts.copy(), 0, 0
         for i in jumps.tolist():
             shifted[done:i] += shift
@@ -359,24 +351,13 @@ class View:
         return np.asarray(np.any([axis.known for axis in axes], axis=0) & ~np.any(live, axis=0))
 
 
-def _fitted(members: Members, noise: float) -> tuple[Array, Array, Array]:
-    """Mean, least-squares rate [raw/s] and its standard deviation in every window, each (m,); see
-    sync.SlopeWindow.
-    """
-    reading, window = members.reading, members.window
-    origin = members.values[members.first]
-    count = np.maximum(members.size, 1)
-    t = (members.stamp[reading] - members.stamp[members.first][window]).astype(float)
-    x = (members.values[reading] - origin[window]).astype(float)
-    mean = members.sum(x) / count
-    t -= (members.sum(t) / count)[window]
-    spread = members.sum(t * t)
+def _slope_sigma(noise: float, size: Ints, line: Lines) -> Array:
+    """Standard deviation of each window's rate (m,) [raw/s]; see geometry.slope_sigma."""
+    count = np.maximum(size, 1)
+    independent = np.minimum(count, (line.moved + 1.0) ** 2)
     with np.errstate(divide="ignore", invalid="ignore"):  # a window of one reading has no slope
-        rate = members.sum(t * (x - mean[window])) / spread * NS
-        moved = np.abs(members.values[members.last] - origin).astype(float)
-        independent = np.minimum(count, (moved + 1.0) ** 2)
-        sigma = noise / (np.sqrt(spread) / NS) * np.sqrt(count / independent)
-    return origin + mean, rate, sigma
+        sigma: Array = noise / line.spread * np.sqrt(count / independent)
+    return sigma
 
 
 def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> int:

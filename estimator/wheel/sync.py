@@ -6,6 +6,9 @@ readings up to there move in, readings older than the window move out. A reading
 than the horizon allows is counted and
 dropped, one that comes twice is counted and dropped, one that comes out of order but in time
 changes nothing: the result is that of the sorted stream, bit for bit.
+
+This is the streaming form, in exact integers where a count is concerned. The same means and slopes
+from arrays stand in `offline/windows.py`; a test holds the two equal.
 """
 
 from __future__ import annotations

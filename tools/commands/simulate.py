@@ -21,7 +21,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.offline.measured import measured_run
+from gritd.estimator.offline.recorded_motion import recorded_motion
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.stages.situation import Motion
@@ -101,7 +101,7 @@ def _driven(recording: Recording, settings: Settings) -> Motion:
         settings.rates.tick,
     )
     try:
-        return measured_run(recording, settings, settings.rates.tick).motion
+        return recorded_motion(recording, settings, settings.rates.tick)
     except RecordingError as error:
         raise CommandError(error, DAMAGED) from None
 

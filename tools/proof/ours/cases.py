@@ -18,11 +18,12 @@ from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import simulate_arrays
+from gritd.estimator.offline.windows import block_mean, block_slope
 from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.noise.colour import Colour, coloured
-from gritd.tools.diagnose.rig.signals import Signals, block_mean, doubt, slope
+from gritd.tools.diagnose.rig.signals import Signals, doubt
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import soil_of
 
@@ -211,9 +212,9 @@ def _recorded(
 
     time = np.asarray(motion.time)
     edges = time[0] + np.arange(int((time[-1] - time[0]) * GRID) + 1) / GRID
-    wheel = slope(time, _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng), edges)
+    wheel = block_slope(time, _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng), edges)
     travel = np.asarray(servo.carriage_position) / settings.pulley_radius
-    carriage = slope(time, _counted(travel, 7.669904e-4, rng), edges)
+    carriage = block_slope(time, _counted(travel, 7.669904e-4, rng), edges)
 
     sensed = response.sensed
     channels = {"sinkage": sensed.sinkage, "current": sensed.current}

@@ -101,6 +101,7 @@ def _calculate_alike_everywhere() -> None:
 
 def _parser() -> argparse.ArgumentParser:
     listing = "\n".join(f"  {name:14}{summary}" for name, (_, summary) in COMMANDS.items())
+
     parser = Parser(
         prog="gritd",
         usage="gritd [--help] [--version] COMMAND …",
@@ -108,11 +109,13 @@ def _parser() -> argparse.ArgumentParser:
         epilog=f"commands:\n{listing}\n\n`gritd COMMAND --help` explains one.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version")
     parser.add_argument(
         "command", choices=COMMANDS, metavar="COMMAND", help="one of the commands below"
     )
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+
     return parser
 
 

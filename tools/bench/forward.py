@@ -128,6 +128,7 @@ def main() -> int:
     """Print the figures."""
     plain, six = simulated_seconds_per_second(), simulated_seconds_per_second(effects=ONE_OF_EACH)
     speed = balance_speed()
+
     print(
         f"simulator at {RATE:g} Hz: {plain:.0f} simulated seconds a second; "
         f"with six effects {six:.0f}"
@@ -137,6 +138,7 @@ def main() -> int:
         f"{1e3 * speed.scalar:.2f} ms"
     )
     print(f"ratio {speed.ratio:.0f}, largest relative difference of θ₁ {speed.difference:.1e}")
+
     return 0
 
 

@@ -80,6 +80,7 @@ def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
         "recording": recording,
         "forward_model": forward_model,
     }
+
     with Progress("measuring", len(sections) + 1) as progress:
         subject = _subject(sizes, folder)
         progress.advance()
@@ -87,6 +88,7 @@ def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
         for name, section in sections.items():
             figures[name] = section(subject)
             progress.advance()
+
     return figures
 
 
@@ -114,8 +116,10 @@ def tick(subject: Subject) -> Figures:
     pipeline = Pipeline(settings)
     ticks = list(played(read(subject.path), settings.rates.tick))[: subject.sizes.ticks]
     state, spent = pipeline.start(), []
+
     gc.collect()
     gc.freeze()
+
     try:
         for each in ticks:
             start = process_time()
@@ -123,6 +127,7 @@ def tick(subject: Subject) -> Figures:
             spent.append(process_time() - start)
     finally:
         gc.unfreeze()
+
     middle, most = np.quantile(spent, (0.5, 0.99)).tolist()
     return {"median": middle, "at_99_percent": most, "share_of_budget": most * settings.rates.tick}
 
@@ -212,6 +217,7 @@ def recording(subject: Subject) -> Figures:
     """Cost of a message: written, read and checked, read as arrays, and read one by one."""
     count = len(subject.run.readings)
     copies = iter(range(subject.sizes.repeats))
+
     written = subject.repeated(
         lambda: _write(subject, subject.path.with_suffix(f".{next(copies)}.mcap"))
     )
@@ -219,6 +225,7 @@ def recording(subject: Subject) -> Figures:
         lambda: [read(subject.path).arrays(topic.name) for topic in RAW_TOPICS]
     )
     singly = subject.repeated(lambda: sum(1 for _ in read(subject.path).messages()))
+
     times = {"write": written, "read_as_arrays": arrays, "read_one_by_one": singly}
     return {name: statistics.median(spent) / count for name, spent in times.items()} | {
         "bytes": subject.path.stat().st_size / count

@@ -44,6 +44,7 @@ class Child:
     def __init__(self, stop: StopRequest, name: str, module: str, *arguments: str) -> None:
         self._stop, self._name = stop, name
         self._lines: Queue[str] = Queue()
+
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
             stdin=subprocess.PIPE,
@@ -54,9 +55,11 @@ class Child:
             start_new_session=True,  # Ctrl-C reaches us alone: we stop them in order
             preexec_fn=ends_with_us(),
         )
+
         assert self._process.stdout is not None
         self._listener = Thread(target=self._listen, args=(self._process.stdout,), daemon=True)
         self._listener.start()
+
         self._said: list[str] = []
 
     def _listen(self, stream: IO[str]) -> None:
@@ -117,6 +120,7 @@ class Child:
         """SIGTERM, then the lines it still says. Raises CommandError if it does not end."""
         before = len(self._said)
         self._process.terminate()
+
         try:
             self._process.wait(STOP)
         except subprocess.TimeoutExpired:
@@ -125,6 +129,7 @@ class Child:
             raise CommandError(
                 f"the {self._name} did not end within {STOP:g} s of SIGTERM"
             ) from None
+
         self._listener.join(STOP)  # to the end of what it said
         while not self._lines.empty():
             self._said.append(self._lines.get())

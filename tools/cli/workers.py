@@ -36,6 +36,7 @@ def _processes(jobs: int) -> Iterator[Executor]:
     them. Where we are killed, they end as well.
     """
     ended = signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+
     try:
         with ProcessPoolExecutor(
             jobs, get_context("spawn"), initializer=_begin, initargs=(os.getpid(),)

@@ -23,13 +23,16 @@ def main(argv: Sequence[str]) -> int:
         description="What everything costs on this machine; about half a minute.",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
+
     arguments = parser.parse_args(argv)
     with TemporaryDirectory(prefix="gritd-bench-") as folder:
         figures = measure(Sizes(), Path(folder))
+
     if arguments.json:
         print(json.dumps({"machine": machine(), **figures}, indent=2))
     else:
         print(report(figures))
+
     return DONE
 
 
@@ -61,6 +64,7 @@ def report(figures: dict[str, Figures]) -> str:
     """One line a figure, in units for people."""
     on, t, r, f = machine(), figures["tick"], figures["replay"], figures["forces"]
     u, m, w = figures["update"], figures["recording"], figures["forward_model"]
+
     return "\n".join(
         [
             f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, "

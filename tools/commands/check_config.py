@@ -47,16 +47,21 @@ def main(argv: Sequence[str]) -> int:
         "--effective", action="store_true", help="print the YAML with every default filled in"
     )
     arguments = parser.parse_args(argv)
+
     read = config.load(arguments.file)
+
     try:
         check_devices(read.settings)
     except DeviceSettingsError as error:
         raise CommandError(f"{arguments.file}: {error}", USAGE) from None
+
     if warning := open_to_all(Path(arguments.file)):
         print(warning, file=sys.stderr)
+
     if arguments.effective:
         sys.stdout.write(read.text)
         return DONE
+
     ending = "" if read.ended else "; without a last line '...' it cannot be reloaded"
     sys.stdout.write(f"{arguments.file}: valid{ending}\n\n{summary(read.settings)}")
     return DONE
@@ -88,6 +93,7 @@ def _facts(settings: Settings) -> Rows:
     wheel, soil, rates = settings.wheel, settings.soil, settings.rates
     modulus = soil.pressure_sinkage.modulus(wheel.width)
     effects = ", ".join(effect.name for effect in settings.effects) or "none"
+
     return [
         ("testbed", settings.testbed),
         (
@@ -146,6 +152,7 @@ def _device(device: Device) -> str:
 
 def _channels(settings: Settings) -> Rows:
     rows: Rows = [("channel", "device", "signal", "scale", "offset", "noise", "latency")]
+
     for name, channel in settings.channels.items():
         raw, physical, step = UNITS[name]
         scale, offset = _calibration(channel.calibration, f"{physical}/{raw}", physical)
@@ -160,6 +167,7 @@ def _channels(settings: Settings) -> Rows:
                 _ms(channel),
             )
         )
+
     return rows + (_wrench(settings.wrench) if settings.wrench else [])
 
 
@@ -170,6 +178,7 @@ def _wrench(wrench: Wrench) -> Rows:
         ("load", wrench.load, wrench.force_noise, "N"),
         ("torque", wrench.torque, wrench.torque_noise, "N·m"),
     ]
+
     return [
         (
             f"wrench {name}",
@@ -210,12 +219,16 @@ def implied(settings: Settings) -> Rows:
     torque = (
         current.noise * abs(current.calibration.scale.value) * settings.drive.torque_constant.value
     )
+
     if settings.drive.torque_source == "wrench" and settings.wrench:
         torque = settings.wrench.torque_noise
+
     pot = settings.channels["sinkage_pot"]
     sinkage = pot.noise * abs(pot.calibration.scale.value)
+
     rim, travel = speed_sigmas(settings)
     slip = slip_sigma(settings)
+
     return [
         ("torque", f"{torque:.2g} N·m", f"{torque / mean:.2g} N·m"),
         ("sinkage", f"{1e3 * sinkage:.2g} mm", f"{1e3 * sinkage / mean:.2g} mm"),

@@ -35,10 +35,12 @@ def main(argv: Sequence[str]) -> int:
     arguments = _parser().parse_args(argv)
     if arguments.png:
         require("matplotlib", "--png")
+
     configuration = config.load(arguments.config)
     found = compare(
         arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv]
     )
+
     try:
         if arguments.report:
             arguments.report.write_text(comparison.render(found), encoding="utf-8")
@@ -48,6 +50,7 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
         ) from None
+
     print(comparison.printed(found))
     return DONE
 
@@ -70,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
         "--report", type=Path, metavar="OUT.html", help="a page that needs nothing else"
     )
     parser.add_argument("--png", type=Path, metavar="OUT.png", help="the same on one sheet")
+
     return parser
 
 
@@ -86,18 +90,22 @@ def compare(
     settings = configuration.settings
     rig = WheelRig([signals(recording, settings, RATE) for recording in read_all(paths)], settings)
     stack = Stack(rig)
+
     if stack.size == 0:
         raise CommandError(
             f"{paths[0]}: found no sample where the wheel drives under load; expected some seconds",
             FAILED,
         )
+
     configured = np.zeros(len(rig.constants))
     if fitted:
         base = fit_base(rig, np.random.default_rng(0))
         fit, noise = base.fitted, base.problem.noise
     else:
         fit, noise = None, first_guess(stack, stack.predict(configured))
+
     sigma = {c: colour.sigma for c, colour in zip(rig.channels, noise.colours, strict=True)}
+
     return Comparison(
         settings.testbed,
         _traces(rig, _names(rig, paths), (configured, fit.u if fit else configured), sigma),
@@ -121,6 +129,7 @@ def _traces(
     rig: WheelRig, names: Sequence[str], constants: tuple[Array, Array], sigma: dict[str, float]
 ) -> tuple[Trace, ...]:
     before, after = (rig.predict(u, ()) for u in constants)
+
     return tuple(
         Trace(
             names[at],

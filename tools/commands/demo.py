@@ -74,6 +74,7 @@ def _parser() -> Parser:
         default="auto",
         help="slcan where the computer has no multicast",
     )
+
     return parser
 
 
@@ -91,6 +92,7 @@ def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
         arguments.plant,
     ]
     told += ["--folder", str(folder), "--can", arguments.can, "--wait"]
+
     with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
         config = _after(testbed.wait_for("configuration ", READY))
         print(
@@ -158,14 +160,18 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
     recording = _recording(folder)
     ticks, loop = recording.arrays("/tick"), recording.arrays("/loop")
     soil = json.loads((folder / f"{NAME}.truth.json").read_text(encoding="utf-8"))["soil"]
+
     found = targets.judge(ticks, soil, plant)
     table = [*targets.table(found), *targets.without_correction(recording, soil)]
     print("\n".join([*table, "", *targets.punctuality(loop), *_counters(folder, last_words)]))
+
     print(f"log {recording.path}")
     print(
         f"figure {_drawn(folder, ticks, targets.headline(found, plant, ticks), soil)}", flush=True
     )
+
     missed = [*targets.reasons(found), *_replay(recording.path)]
+
     for reason in missed:
         print(f"target missed: {reason}", file=sys.stderr)
     if not missed:
@@ -192,6 +198,7 @@ def _counters(folder: Path, last_words: Sequence[str]) -> list[str]:
     account = [
         line for line in last_words if line.startswith(("queue:", "device ", "loop:", "log "))
     ]
+
     played = folder / PLAYED
     if played.exists():
         p = json.loads(played.read_text(encoding="utf-8"))
@@ -201,6 +208,7 @@ def _counters(folder: Path, last_words: Sequence[str]) -> list[str]:
             f" {p['late_most'] * 1e3:.2f} ms (99 %), {p['late_worst'] * 1e3:.2f} ms (max); "
             f"nobody took: {lost}"
         )
+
     return account
 
 

@@ -88,12 +88,15 @@ def without_correction(recording: Recording, truth: Mapping[str, float]) -> list
     others = tuple(effect for effect in settings.effects if effect.name != LINEARISATION)
     if len(others) == len(settings.effects):
         return []
+
     pipeline = Pipeline(replace(settings, effects=others), "plain")
     state, tick = pipeline.start(), None
+
     with Progress("once more without the correction", recording.counts["/tick"]) as progress:
         for recorded in played(recording, settings.rates.tick):
             state, tick = pipeline.step(state, recorded.readings, recorded.stamp)
             progress.advance()
+
     if tick is None:
         return []
     found = _findings(dict(zip(TICK_NAMES, tick, strict=True)), truth, {})

@@ -34,7 +34,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="gritd import",
         description="Other rigs' public data to recordings; see docs/importing.md.",
     )
+
     commands = parser.add_subparsers(dest="rig", metavar="RIG", required=True)
+
     for name, rig in importers().items():
         command = commands.add_parser(name, help=rig.SUMMARY, description=rig.SUMMARY)
         command.add_argument(
@@ -49,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
             help="folder to write into",
         )
         rig.add_arguments(command)
+
     return parser
 
 

@@ -46,17 +46,21 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--once", action="store_true", help="one picture, without control characters"
     )
+
     arguments = parser.parse_args(argv)
+
     with connected(arguments.socket) as connection:
         if arguments.once or not redrawable():
             print("\n".join(told(lines, next(reports(connection)))))
             return DONE
+
         with screen() as show:
             shown = 0.0
             for report in reports(connection):
                 if time.monotonic() - shown >= EVERY:
                     shown = time.monotonic()
                     show(report)
+
     return DONE
 
 
@@ -109,9 +113,11 @@ def lines(report: Report) -> Iterator[str]:
     yield from _trouble(report)
     yield f"{report['configuration']}"
     yield ""
+
     if tick:
         yield from (_quantity(tick, *shown) for shown in SHOWN)
         yield from _belief(tick)
+
     yield from _channels(report["channels"])
     yield from (_device(name, stats) for name, stats in report["devices"].items())
     yield from _loop_and_log(report)

@@ -32,11 +32,14 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
         f"{begun.cases} cases in {output}; sealed before any diagnosis, SHA-256 {begun.sealed}",
         flush=True,
     )
+
     specs = begun.specs(arguments.keep, diagnose)
     _run(specs, arguments, output / SEALS)
+
     if arguments.seal_only:
         print(f"all sealed, {output / SEALS}; go on with: gritd prove --resume --output {output}")
         return DONE
+
     rows = [row(spec) for spec in specs]
     _tell(rows, begun, output)
     return FAILED if any(each.verdict == "failed" for each in rows) else DONE
@@ -121,6 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--scheduler", metavar="tcp://…", help="a dask scheduler whose workers see DIR"
     )
+
     return parser
 
 

@@ -43,9 +43,11 @@ def _reason(settings: Settings, recording: Recording, name: str) -> str:
     rows, channel = recording.arrays(f"/raw/{name}"), settings.channels[name]
     if not rows.size:
         return f"{name} has no readings"
+
     if name in ENCODERS:
         window = f"{1e3 / settings.rates.update:g} ms"
         return f"{name} has {rows.size} readings, never three over half a window of {window}"
+
     raw = rows[CHANNELS[name][0]]
     invalid = int(np.count_nonzero(~((channel.low <= raw) & (raw <= channel.high))))
     return (

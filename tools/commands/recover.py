@@ -25,17 +25,21 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "-o", "--output", type=Path, help="default: FILE with .recovered before its suffix"
     )
+
     arguments = parser.parse_args(argv)
     source: Path = arguments.file
     target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
+
     try:
         recording = read(source, topics=())
     except RecordingError as error:
         raise unread(source, error) from None
+
     try:
         recover(recording, vacant(target))
     except RecordingError as error:
         raise unwritten(error) from None
+
     for line in recording.damage:
         print(visible(f"{source}: {line}"), file=sys.stderr)
     print(f"{target}: {summary(recording)}")
@@ -49,6 +53,7 @@ def recover(recording: Recording, target: Path) -> None:
     RecordingError where the file cannot be written; it is then removed.
     """
     file = McapFile(target, library=LIBRARY)
+
     with file.beginning():
         for source in recording.sources.values():
             file.define(source.schema, source.channel)

@@ -43,32 +43,40 @@ def main(argv: Sequence[str]) -> int:
             "--verify replays a recording as it was made: without --config, --engine, --output",
             USAGE,
         )
+
     paths = [Path(name) for name in arguments.files]
+
     for path in paths:
         if not path.exists():
             raise CommandError(f"{path}: found no such file; expected a recording", USAGE)
         if arguments.output:
             files.vacant(_target(arguments, path))
+
     return max([_replay(path, arguments) for path in paths])
 
 
 def _replay(path: Path, arguments: Namespace) -> int:
     recordings = [files.recording(part) for part in parts(path)]
+
     for recording in recordings:
         for line in recording.damage or (
             [] if recording.closed else ["was not closed: replayed as far as it goes"]
         ):
             print(visible(f"{recording.path}: {line}"), file=sys.stderr)
+
     damaged = any(recording.damage for recording in recordings)
     configuration = _configuration(recordings[0], arguments.config)
+
     if arguments.verify:
         return max(_verify(recordings, configuration), DAMAGED if damaged else DONE)
+
     try:
         _recompute(recordings, configuration, arguments)
     except RecordingError as error:
         raise (
             CommandError(error, DAMAGED) if error.errno is None else files.unwritten(error)
         ) from None
+
     return DAMAGED if damaged else DONE
 
 
@@ -96,22 +104,28 @@ def _verify(recordings: list[Recording], configuration: Configuration) -> int:
         raise CommandError(
             f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE
         )
+
     course = _course(recordings, configuration, None, as_it_ran=True)
     if first.run.part:
         course.lose()
+
     differing = Differences()
+
     for recording, tick in _ticks(recordings, configuration, "verifying"):
         if recording.run.lost_before and recording is not differing.recording:
             course.lose()
         differing.recording = recording
         if tick.checkpoint is not None:
             differing.resumed(tick.stamp, course.resume(tick.checkpoint))
+
         record = course.step(tick)
         if tick.logged is not None and course.known:
             differing.compare(tick.logged, record)
         elif tick.logged is not None:
             differing.unknown += 1
+
     print(f"{first.path}: {differing.compared} ticks, {len(TICK_NAMES)} fields each: {differing}")
+
     if not differing.compared:
         raise CommandError(
             f"{first.path}: its first state is not known; verify from the run's first part", USAGE
@@ -168,6 +182,7 @@ def _recompute(
     """
     first = recordings[0]
     reloaded = first.counts["/checkpoint"] > 1 and not arguments.config
+
     if arguments.output or len(recordings) > 1 or reloaded:
         rows, each = _every_tick(recordings, configuration, arguments), "ticks"
     else:
@@ -176,8 +191,10 @@ def _recompute(
             estimates(settings, first, arguments.engine or settings.filter.engine),
             "windows",
         )
+
     if not len(rows):
         raise CommandError(f"{first.path}: holds no readings", DAMAGED)
+
     print(report(first.path, rows, each))
     if np.all(rows["status"] == Status.STARTING):
         print(
@@ -192,8 +209,10 @@ def _every_tick(
     first = recordings[0]
     output = files.vacant(_target(arguments, first.path)) if arguments.output else None
     writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
+
     records = []
     course = _course(recordings, configuration, arguments.engine, as_it_ran=False)
+
     for _, tick in _ticks(recordings, configuration, "replaying"):
         if tick.checkpoint is not None and not arguments.config:
             course.reconfigure(tick.checkpoint)
@@ -203,9 +222,11 @@ def _every_tick(
             for reading in tick.readings:
                 writer.reading(reading)
             writer.message(TICK_TOPIC.name, tick.stamp, record)
+
     if writer is not None:
         writer.close()
         print(f"wrote {writer.path}")
+
     return np.array(
         records, dtype=[(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS]
     )
@@ -275,4 +296,5 @@ def _parser() -> Parser:
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write readings and recomputed ticks to a recording"
     )
+
     return parser

@@ -19,6 +19,7 @@ def report(path: Path, rows: Rows, each: str) -> str:
     """`each` says what a row is, "ticks" or "windows". What the rows lack is left out."""
     last = {name: rows[name][-1] for name in rows.dtype.names or ()}
     seconds = (int(last["evaluated"]) - int(rows["evaluated"][0])) * 1e-9
+
     return "\n".join(
         [
             f"{path}: {seconds:.1f} s, {len(rows)} {each}, {int(last['updates'])} filter updates, "
@@ -66,6 +67,7 @@ def _side_by_side(rows: Rows) -> Iterator[str]:
     for name, unit in SIDE_BY_SIDE:
         if not len(tracking) or f"{name}_predicted" not in names or isnan(tracking[name].mean()):
             continue
+
         measured, predicted = tracking[name], tracking[f"{name}_predicted"]
         difference = sqrt(np.mean((measured - predicted) ** 2))
         sigma = (

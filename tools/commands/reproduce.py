@@ -83,7 +83,9 @@ def main(argv: Sequence[str]) -> int:
         "--simulations", type=whole(1), default=SIMULATIONS, help=f"default: {SIMULATIONS}"
     )
     parser.add_argument("--seed", type=whole(0), default=2005)
+
     arguments = parser.parse_args(argv)
+
     for section in (
         closed_forms(arguments.seed),
         figure_3(),
@@ -94,6 +96,7 @@ def main(argv: Sequence[str]) -> int:
     ):
         for line in section:
             print(line, flush=True)
+
     return DONE
 
 
@@ -125,9 +128,11 @@ def closed_form_differences(seed: int) -> dict[str, Array]:
     )
     theta_1, slip = rng.uniform(0.1, 1.2, DRAWS), rng.uniform(-0.3, 0.9, DRAWS)
     sigma_m = rng.uniform(1e3, 1e5, DRAWS)
+
     ours = linear.forces(WHEEL, c, tan_phi, k, theta_1, slip, sigma_m, linear.ARRAYS)
     f = linear.shear_exponent(WHEEL, k, theta_1, slip, linear.ARRAYS).f
     theirs = original.integrate(WHEEL, triangular_contact(theta_1, slip, f, sigma_m, c, tan_phi))
+
     return {
         "T": np.abs(ours.torque - theirs.torque) / (WHEEL.radius * theirs.load),
         "W": np.abs(ours.load / theirs.load - 1),
@@ -162,11 +167,13 @@ def figure_3() -> Lines:
         + "".join(f"{share:>16.2f}" for share in (0.0, 0.25, 0.5, 0.75))
         + "   largest gap in 1−e^−x"
     )
+
     for slip in (0.05, 0.2, 0.5, 0.8):
         exact, straight = exponents(slip)
         cells = "".join(f"{exact[at]:>8.3f}{straight[at]:>8.3f}" for at in (0, 25, 50, 75))
         gap = np.max(np.abs(janosi(exact) - janosi(straight)))
         yield f"  {slip:4.2f}   j/k, f·x  {cells}   {gap:.3f}"
+
     yield ""
 
 
@@ -192,11 +199,13 @@ def table_3() -> Lines:
         "and two stand-ins for its low-cohesion soils."
     )
     yield _header("soil")
+
     angles, slips = np.radians(np.linspace(10, 60, 51)), np.linspace(0.05, 0.8, 16)
     theta_1, slip = (grid.ravel() for grid in np.meshgrid(angles, slips))
     rows: list[Row] = []
     for named in (*TABLE_1, LOOSE_SAND, MARS_LIKE):
         rows += compare(named.name, named.under(WHEEL.width), theta_1, slip)
+
     yield from map(_row, rows)
     yield "  o is the original; DP passes through zero, where |Δ|/|o| means little."
     yield f"  {nearest(rows, 2.0, 2.6)}\n"
@@ -214,14 +223,17 @@ def simulations(count: int, seed: int) -> Lines:
         "r 72 mm, b 71 mm."
     )
     yield _header("θ₁")
+
     rows = compare("10-60°", soil, theta_1, slip)
     yield from map(_row, rows)
     yield f"  … solving the vertical balance (9) of {count} wheels"
+
     solved = balance.solve(WHEEL, balance.Contact(soil, ContactLaw(0.5), slip, load))
     carried = np.logical_not(solved.overloaded)
     kept = Soil(**{name: values[carried] for name, values in vars(soil).items()})
     carrying = compare("of W 10-100 N", kept, solved.theta_1[carried], slip[carried])
     yield from map(_row, carrying)
+
     yield (
         f"  {count - np.count_nonzero(carried)} wheels sank to the axle and are left out of the "
         "last two rows."
@@ -339,16 +351,20 @@ def fitted_soil() -> Lines:
     yield (
         "(20)-(22) fitted to T and DP of the original model, loads 30-105 N, slips 5-60 %, no noise"
     )
+
     columns = f"{'bare':>8}{'shifted':>9}{'prior off':>11}"
     yield f"  {'':<12}{'c [Pa]':>8}{columns}    {'tan φ':>6}{columns}"
+
     for named in LOW_COHESION:
         soil = named.under(WHEEL.width)
         prior = replace(soil, cohesion=1.25 * soil.cohesion, tan_phi=0.95 * soil.tan_phi)
+
         found = (
             fit(soil),
             fit(soil, IntegralShift(WHEEL, soil)),
             fit(soil, IntegralShift(WHEEL, prior)),
         )
+
         c = "".join(f"{x:>{width}.0f}" for (x, _), width in zip(found, (8, 9, 11), strict=True))
         tan_phi = "".join(
             f"{x:>{width}.4f}" for (_, x), width in zip(found, (8, 9, 11), strict=True)
@@ -357,6 +373,7 @@ def fitted_soil() -> Lines:
             f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    "
             f"{float(soil.tan_phi):>6.4f}{tan_phi}"
         )
+
     yield (
         "  The linearisation alone moves c by a quarter or more. "
         "The effect stress_linearisation removes it, also if"

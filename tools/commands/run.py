@@ -96,6 +96,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--socket", metavar="PATH", help=f"status socket (default: {SOCKET} beside the logs)"
     )
+
     parser.add_argument("--name", type=file_name, help="name of the run")
     parser.add_argument(
         "--load", type=number(above=0.0), metavar="N", help="nominal load of the run [N]"
@@ -118,4 +119,5 @@ def _parser() -> Parser:
         metavar="S",
         help="seconds between status lines, 0 for none",
     )
+
     return parser

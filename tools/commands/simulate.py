@@ -46,18 +46,22 @@ def main(argv: Sequence[str]) -> int:
     """Simulate, write the recording and its truth. Raises ConfigError or CommandError."""
     arguments = _parser().parse_args(argv)
     configuration = config.load(arguments.config)
+
     settings, soil = (
         configuration.settings,
         soil_of(configuration.settings, _soil_changes(arguments.soil)),
     )
     acting = _acting(settings, arguments.effect)
+
     vacant(arguments.output)
     motion, info = _motion(arguments, configuration)
     run = simulate_run(settings, soil, motion, acting, arguments.seed)
+
     try:
         write(arguments.output, configuration, info, run)
     except RecordingError as error:
         raise unwritten(error) from None
+
     write_truth(arguments.output, settings, soil, acting, run, arguments.seed)
     print(_summary(arguments.output, acting, run))
     return DONE
@@ -73,15 +77,19 @@ def _motion(
         configuration.settings,
         recorded(arguments.motion) if arguments.motion else None,
     )
+
     info = driven.run if driven else configuration.run
     info = replace(
         info, pass_number=arguments.pass_number or info.pass_number, name=arguments.output.stem
     )
+
     if driven:
         return replace(_driven(driven, settings), pass_number=float(info.pass_number)), info
+
     schedule = schedules.read(arguments.schedule)
     _check_length(arguments.schedule, schedule.duration, settings.rates.tick)
     place = float(info.pass_number), info.start_position
+
     info = replace(info, nominal_load=_weights(schedule.segments, info.nominal_load))
     return schedules.motion_of(schedule, settings.wheel.radius, settings.rates.tick, *place), info
 
@@ -159,6 +167,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="must not exist yet"
     )
+
     return parser
 
 
@@ -170,9 +179,11 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
         e.name: {name: value.value for name, value in e.parameters.items()}
         for e in settings.effects
     }
+
     for text in given:
         key, _, value = text.partition("=")
         name, _, parameter = key.partition(".")
+
         known = quantities(name)
         if known is None or parameter not in known:
             options = ", ".join(effects.EFFECTS if known is None else known)
@@ -181,9 +192,11 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
                 f"expected one of {options}",
                 USAGE,
             )
+
         values.setdefault(name, {})[parameter] = _quantity(
             f"--effect {text}", value, known[parameter].unit or ""
         )
+
     try:
         made = [effects.make(name, parameters) for name, parameters in values.items()]
     except ValueError as error:
@@ -193,12 +206,14 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
 
 def _soil_changes(given: Sequence[str]) -> dict[str, float]:
     changes = {}
+
     for text in given:
         name, _, value = text.partition("=")
         if name not in SOIL_VALUES:
             raise CommandError(
                 f"--soil {text}: found '{name}'; expected one of {', '.join(SOIL_VALUES)}", USAGE
             )
+
         kind = SOIL_VALUES[name]
         changes[name] = _quantity(f"--soil {text}", value, kind.unit or "")
         if not kind.holds(changes[name]):
@@ -220,11 +235,13 @@ def _quantity(where: str, text: str, unit: str) -> float:
 def _summary(path: Path, acting: Sequence[Effect], run: Run) -> str:
     time = np.asarray(run.motion.time)
     bogged = int(run.response.overloaded.sum())
+
     lines = [
         f"{path}: {time[-1] - time[0]:.1f} s, {len(run.readings)} readings",
         f"effects: {', '.join(effect.name for effect in acting) or 'none'}",
         f"truth: {path.with_suffix('.truth.json')}, {path.with_suffix('.truth.npz')}",
     ]
+
     if bogged:
         lines.append(
             f"note: the load exceeds what the soil carries in {bogged} samples; "

@@ -122,20 +122,24 @@ def summary(report: Report) -> Iterator[str]:
     """A few lines for people."""
     tick, loop, log = report["tick"], report["loop"], report["log"]
     yield f"gritd {report['pid']}: {report['status']} {' '.join(report['flags'])}".rstrip()
+
     if tick:
         yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
     if found := report.get("disagreement"):
         yield f"  model    {disagreement(found)}"
+
     yield (
         f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
         f"{report['real_time']}"
     )
+
     for name, stats in report["devices"].items():
         yield (
             f"  {name:8} {stats['state']}, {stats['rate']:.0f} readings/s, {stats['bad']} bad, "
             f"{stats['lost']} lost"
         )
+
     yield (
         f"  log      {log['state']}, {log['dropped']} dropped, {log['file']} {log['error']}"
     ).rstrip()

@@ -73,21 +73,26 @@ def draw(effect: type[Effect], path: Path) -> None:
     label, unit, scale = LABELS[channel]
     motion, x = sweep(covariate, turns=TEETH / _order(effect))
     curves = [scale * _seen(effect, motion, share)[channel] for share in (0.0, 0.5, 1.0)]
+
     figure, (above, below) = plt.subplots(
         2, 1, figsize=(5.4, 4.0), sharex=True, height_ratios=(2, 1)
     )
+
     for curve, shade, name in zip(
         curves, SHADES, ("without", "half strength", "typical strength"), strict=True
     ):
         above.plot(x, curve, color=shade, lw=1.5, label=name)
         below.plot(x, curve - curves[0], color=shade, lw=1.5 if name != "without" else 0.8)
+
     above.set_ylabel(f"{label} [{unit}]")
     below.set_ylabel(f"change [{unit}]")
     below.set_xlabel(AXES[covariate])
     above.legend(frameon=False, fontsize=8)
+
     for axes in (above, below):
         axes.spines[["top", "right"]].set_visible(False)
         axes.margins(x=0.0)
+
     figure.align_ylabels()
     figure.tight_layout()
     figure.savefig(path, dpi=80, metadata={"Software": None})
@@ -130,6 +135,7 @@ def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
     time, ramp = np.linspace(0.0, 60.0, N), np.linspace(0.0, 1.0, N)
     load, slip, speed = np.full(N, LOAD), np.full(N, SLIP), np.full(N, SPEED)
     passes = np.ones(N)
+
     if covariate in ("slip", "constant"):
         slip = 0.02 + 0.78 * ramp
         x = slip
@@ -161,17 +167,20 @@ def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
         }
         time = longest[covariate] * ramp
         x = time
+
     motion = _driven(time, load, slip, speed, passes)
     if covariate == "wheel_angle":
         x = np.asarray(motion.wheel_angle) / (2.0 * np.pi)
     if covariate == "position":
         x = np.asarray(motion.carriage_position)
+
     return motion, x
 
 
 def _driven(time: Array, load: Array, slip: Array, speed: Array, passes: Array) -> Motion:
     travel = WHEEL.radius * speed * (1.0 - slip)
     step = time[1] - time[0]
+
     return Motion(
         time=time,
         wheel_angle=np.cumsum(speed) * step,
@@ -220,6 +229,7 @@ def _index(effects: Sequence[type[Effect]]) -> str:
 def _section(effect: type[Effect]) -> str:
     rivals = [f"`{name}` ({EXPERIMENTS[how]})" for name, how in effect.confusable_with.items()]
     where = f"{effect.fingerprint.channel} over {effect.fingerprint.covariate}".replace("_", " ")
+
     return "\n".join(
         [
             f"## {effect.name}\n",

@@ -72,7 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", metavar="WORD", default="", help="targets whose name holds this")
+
     arguments = parser.parse_args(argv)
+
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         for target in TARGETS:
@@ -83,6 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                     arguments.seed,
                     Path(folder),
                 )
+
     return FAILED if failed else DONE
 
 
@@ -95,10 +98,12 @@ def run(target: Target, cases: int, seed: int, folder: Path) -> int:
             failed += 1
             if failed <= SHOWN:
                 print(f"{target.name}, case {number}: {wrong}", file=sys.stderr, flush=True)
+
     print(
         f"{target.name}: {cases} cases, {failed} failed, {time.monotonic() - began:.0f} s",
         flush=True,
     )
+
     return failed
 
 
@@ -114,6 +119,7 @@ def mutated(data: bytes, rng: random.Random, most: int = 8) -> bytes:
     for _ in range(rng.randint(1, most)):
         at, length = rng.randrange(len(data) + 1), rng.randint(1, 16)
         kind = rng.randrange(5)
+
         if kind == 0 and at < len(data):
             data = data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :]
         elif kind == 1:
@@ -124,6 +130,7 @@ def mutated(data: bytes, rng: random.Random, most: int = 8) -> bytes:
             data = data[:at] + rng.randbytes(length) + data[at:]
         elif rng.random() < 0.2:
             data = data[:at]
+
     return data
 
 
@@ -142,11 +149,14 @@ def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], byte
             Frame("pot", n, rng.randrange(1 << 32), (rng.random(),))
             for n in range(rng.randint(1, 3))
         ]
+
         data = mutated(b"".join(map(encode, frames)), rng)
         cut = rng.randrange(len(data) + 1)
         decoder.decode(data[:cut])
         decoder.decode(data[cut:])
+
         found = [frame for piece in probe for frame in decoder.decode(piece)]
+
         return (
             ""
             if any(frame.values == (1234,) for frame in found)
@@ -291,9 +301,11 @@ def wild_inputs(_: Path) -> Case:
                 if rng.random() < 0.2
                 else NS // 10
             )
+
             state, record = pipeline.step(state, wild_readings(rng, t, number, sane), t)
             if wrong := unfit(record, state, settings):
                 return f"tick {number}: {wrong}"
+
         running[:] = [(state, t)]
         return ""
 
@@ -310,6 +322,7 @@ def wild_readings(rng: random.Random, t: int, number: int, sane: bool) -> list[R
     readings = []
     for place in range(5):
         stamp = t - NS // 20 - place * NS // 50
+
         plain: dict[str, int | float | tuple[float, ...]] = {
             "wheel_encoder": number * 313 - place * 62,
             "carriage_encoder": number * 16 - place * 3,
@@ -318,6 +331,7 @@ def wild_readings(rng: random.Random, t: int, number: int, sane: bool) -> list[R
             "wrench": (10.0, 0.0, 70.0 + rng.gauss(0, 0.3), 0.0, 2.0, 0.0),
             "motor_temperature": 20.0,
         }
+
         for channel, value in plain.items():
             wild = rng.random() < (0.02 if sane else 0.6)
             readings.append(
@@ -328,6 +342,7 @@ def wild_readings(rng: random.Random, t: int, number: int, sane: bool) -> list[R
                     t,
                 )
             )
+
     rng.shuffle(readings)
     return readings
 
@@ -354,14 +369,17 @@ def unfit(record: Sequence[float], state: State, settings: Settings) -> str:
     """
     if not all(math.isfinite(record[place]) for place in (*ESTIMATE, *SIGMAS)):
         return f"not finite: {[record[place] for place in (*ESTIMATE, *SIGMAS)]}"
+
     bounds = settings.filter
     limits = (bounds.cohesion_bounds, bounds.tan_phi_bounds, bounds.shear_modulus_bounds)
     for place, (low, high) in zip(ESTIMATE, limits, strict=True):
         if not low * (1 - 1e-9) <= record[place] <= high * (1 + 1e-9):
             return f"{TICK_NAMES[place]} is {record[place]}, outside [{low}, {high}]"
+
     covariance = np.array(state.track.estimate.P)
     if not np.array_equal(covariance, covariance.T):
         return "covariance not symmetric"
+
     lowest = float(np.linalg.eigvalsh(covariance)[0])
     return "" if lowest > 0.0 else f"covariance not positive definite: {lowest}"
 

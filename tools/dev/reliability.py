@@ -78,14 +78,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--figures", metavar="FILE", help="write the page from figures measured before"
     )
+
     arguments = parser.parse_args(argv)
     if arguments.figures:
         return _write(Path(arguments.figures))
+
     with tempfile.TemporaryDirectory() as folder:
         figures = Path(folder) / "figures.jsonl"
         began = time.monotonic()
         if _run(figures, arguments.quick):
             return FAILED
+
         print(f"all scenarios in {time.monotonic() - began:.0f} s")
         return _write(figures)
 
@@ -100,6 +103,7 @@ def _write(path: Path) -> int:
             file=sys.stderr,
         )
         return FAILED
+
     PAGE.write_text(page(figures), encoding="utf-8")
     above = [figure for figure in figures if _above(figure)]
     for f in above:
@@ -107,6 +111,7 @@ def _write(path: Path) -> int:
             f"{f['row']}: {f['name']}: {f['value']:.3g} {f['unit']}, limit {f['limit']:g}",
             file=sys.stderr,
         )
+
     return FAILED if above else DONE
 
 
@@ -122,6 +127,7 @@ def _run(figures: Path, quick: bool) -> int:
         chosen,
         str(ROOT / "tests" / "scenarios"),
     ]
+
     return subprocess.run(
         command, env={**os.environ, FIGURES: str(figures)}, cwd=ROOT, check=False
     ).returncode
@@ -156,6 +162,7 @@ def _table(figures: Sequence[Figure]) -> Iterator[str]:
     groups: dict[tuple[str, str, str], list[Figure]] = {}
     for figure in figures:
         groups.setdefault((figure["row"], figure["name"], figure["level"]), []).append(figure)
+
     for row, name, level in sorted(groups, key=lambda key: key[0].lower()):
         found = groups[row, name, level]
         worst, limit, unit = max(f["value"] for f in found), found[0]["limit"], found[0]["unit"]
@@ -163,6 +170,7 @@ def _table(figures: Sequence[Figure]) -> Iterator[str]:
             "" if limit is None else f"{limit:g} {unit}".strip(),
             f"{worst:.3g} {unit}".strip(),
         )
+
         shown = f"**{shown}**" if any(map(_above, found)) else shown
         yield f"| {row} | {name} | {shown} | {bound} | {len(found)} | {level} |".replace("  ", " ")
 

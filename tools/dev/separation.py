@@ -112,6 +112,7 @@ def runs(have: Have) -> tuple[Motion, ...]:
     schedule = Schedule(_segments(have), RAMP)
     first = motion_of(schedule, WHEEL.radius, RATE)
     lasts = schedule.duration
+
     more = [(p, 0.0) for p in (2.0, 3.0) if "second_pass" in have] + [
         (1.0, x) for x in (0.25, 0.5) if "shifted_start" in have
     ]
@@ -119,6 +120,7 @@ def runs(have: Have) -> tuple[Motion, ...]:
         replace(first, time=first.time + lasts * (i + 1), pass_number=number, start_position=start)
         for i, (number, start) in enumerate(more)
     ]
+
     long = [motion_of(Schedule((Segment(LONG, LOAD, SLIP, SPEED),), RAMP), WHEEL.radius, 1.0)]
     return first, *later, *(long if "long_run" in have else [])
 
@@ -128,14 +130,17 @@ def _segments(have: Have) -> tuple[Segment, ...]:
     loads = (LOAD, 35.0, 95.0) if "load_step" in have else (LOAD,)
     slips = (SLIP, 0.05, 0.6) if "slip_step" in have else (SLIP,)
     speeds = (SPEED, 0.006, 0.036) if "speed_step" in have else (SPEED,)
+
     driven = [(load, slip, speed) for load in loads for slip in slips for speed in speeds]
     drawn = [driven[i] for i in np.random.default_rng(1).permutation(len(driven))]
+
     if "standstill" in have:
         drawn += [(LOAD, SLIP, 0.0)] * 2
     if "lifted_spin" in have:
         drawn += [(0.0, SLIP, speed) for speed in (0.006, 0.018, 0.036, -0.018)]
     if "reversal" in have:
         drawn += [(load, slip, -SPEED) for load in loads for slip in slips]
+
     return tuple(Segment(HOLD, *condition) for condition in drawn)
 
 

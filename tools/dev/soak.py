@@ -101,11 +101,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="minutes of a part of the recording: many ends an hour; default 2",
     )
     parser.add_argument("--seed", type=int, default=1)
+
     arguments = parser.parse_args(argv)
     failures = simulated(arguments) if arguments.hours else []
     failures += on_wires(arguments) if arguments.minutes else []
+
     for failure in failures:
         print(f"failed: {failure}", file=sys.stderr)
+
     return FAILED if failures else DONE
 
 
@@ -119,15 +122,18 @@ def simulated(arguments: Namespace) -> list[str]:
     settings = replace(
         settings, effects=(), rates=Rates(tick=arguments.tick)
     )  # of the linear plant
+
     pipeline = Pipeline(settings, arguments.engine)
     state, began, memory, ticks = pipeline.start(), time.monotonic(), [], 0
     unfit = 0
+
     for number, batches in enumerate(laps(pool, arguments.hours, round(NS / arguments.tick))):
         for stamp, batch in batches:
             state, record = pipeline.step(state, batch, stamp)
             unfit += not all(math.isfinite(record[place]) for place in READ)
             ticks += 1
         memory.append((number * LAP / 3600.0, resident(os.getpid())))
+
         if (number + 1) % NOISES == 0:
             print(
                 f"{(number + 1) * LAP / 3600.0:.0f} h of {arguments.hours:g}",
@@ -135,6 +141,7 @@ def simulated(arguments: Namespace) -> list[str]:
                 file=sys.stderr,
                 flush=True,
             )
+
     slope = growth(memory)
     found = dict(zip(TICK_NAMES, record, strict=True))
     print(
@@ -146,6 +153,7 @@ def simulated(arguments: Namespace) -> list[str]:
         f"{slope:+.3f} MB per simulated hour",
         flush=True,
     )
+
     wrong = [f"{unfit} unfit ticks"] * bool(unfit) + leak(memory)
     return wrong + [f"{found['resets']} false resets"] * bool(found["resets"])
 
@@ -219,6 +227,7 @@ def on_wires(arguments: Namespace) -> list[str]:
     """Testbed and daemon as processes, and busy ones beside them; what was not right."""
     seconds = arguments.minutes * 60.0
     os.environ.update(unit_environment())
+
     with tempfile.TemporaryDirectory() as name, busy(arguments.busy):
         told = ["--folder", name, "--wait", "--seconds", str(seconds + 10.0), "--plant", "linear"]
         with Child(StopRequest(), "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
@@ -238,12 +247,14 @@ def on_wires(arguments: Namespace) -> list[str]:
             ) as daemon:
                 daemon.wait_for("device ", READY)
                 daemon.wait_for("device ", READY)
+
                 testbed.tell("play")
                 looks = list(watched(Path(name) / "gritd.sock", seconds))
                 testbed.stop()
                 time.sleep(DRAINED)
                 last = look(Path(name) / "gritd.sock")
                 words = daemon.stop()
+
         played = json.loads((Path(name) / PLAYED).read_text(encoding="utf-8"))
     return [*judged(looks, words, arguments), *unreported(last, played)]
 
@@ -332,6 +343,7 @@ def judged(
     memory = [(look["uptime"] / 3600.0, look["memory"]) for look in looks]
     slope = growth(memory)
     grown = {what: more(what, looks) for what in ("descriptors", "threads")}
+
     print(
         f"daemon: {last['uptime'] / 60:.1f} min on wires beside {arguments.busy} busy processes,"
         f" {arguments.part:g} min a part, memory {last['memory']:.1f} MB, {slope:+.2f} MB/h,"
@@ -343,10 +355,12 @@ def judged(
         "lost on the wires: "
         f"{json.dumps({name: device['lost'] for name, device in last['devices'].items()})}"
     )
+
     for name in ("late_50", "late_99", "late_999", "late_max"):
         worst = [1e3 * look["loop"][name] for look in looks]
         print(f"{name} of 10 s [ms]: median {np.median(worst):.3f}, worst {max(worst):.3f}")
     print("\n".join(line for line in words if line.startswith(("queue:", "loop:", "log "))))
+
     wrong = leak(memory) if arguments.minutes >= 30.0 else []
     wrong += [f"{by} {what} more than at the start" for what, by in grown.items() if by > 0]
     return wrong + ["the log was not closed"] * (

@@ -71,6 +71,7 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
         raise RigFileError(
             f"{path}: found no column {missing[0]}; expected the columns {', '.join(columns)}"
         )
+
     table: Table = {name: [] for name in columns}
     for number, row in enumerate(reader, start=2):
         for name in columns:
@@ -80,8 +81,10 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
                     f"expected {len(reader.fieldnames or ())} fields"
                 )
             table[name].append(row[name])
+
     if not table[columns[0]]:
         raise RigFileError(f"{path}: found no rows; expected data under {', '.join(columns)}")
+
     return table
 
 
@@ -114,11 +117,14 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
     """
     lines = [line for line in read_text(path).splitlines() if line.strip()][skip:]
     rows = [line.split(",")[:columns] for line in lines]
+
     if not rows:
         raise RigFileError(f"{path}: found no rows; expected {columns} numbers in each")
+
     for place, row in enumerate(rows, start=skip + 1):
         if len(row) < columns:
             raise RigFileError(f"{path}: row {place}: found {len(row)} fields; expected {columns}")
+
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), columns)
     except ValueError:
@@ -128,6 +134,7 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
                 for i, row in enumerate(rows, skip + 1)
             ]
         )
+
     good = np.all(np.abs(values) <= LARGEST, axis=1)
     if not np.all(good):
         bad = int(np.argmin(good)) + skip + 1
@@ -135,6 +142,7 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
             f"{path}: row {bad}: found a number that is not finite; "
             f"expected {columns} finite numbers"
         )
+
     return values
 
 

@@ -86,11 +86,13 @@ def write(
     with reported(path, "create"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.unlink(missing_ok=True)
+
     order = {channel: place for place, channel in enumerate(CHANNELS)}
     writer = RunWriter(path, (), configured.text, run)
     merged = heapq.merge(
         *(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel])
     )
+
     for reading in merged:
         writer.reading(reading)
     writer.close()

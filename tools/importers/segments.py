@@ -68,6 +68,7 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
     times = np.concatenate(
         [stamps(START, seconds + spacing * number) for number in range(len(conditions))]
     )
+
     sinkage = _all([c.sinkage for c in conditions], *run, 3)
     found = [
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
@@ -78,12 +79,15 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
         ),
         Stream("sinkage_pot", times, (sinkage - counting.pot_offset) / counting.pot_scale),
     ]
+
     if any(c.current is not None for c in conditions):
         found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], *run, 4)))
+
     axes = np.zeros((len(times), 6))
     axes[:, 0] = _all([c.drawbar_pull for c in conditions], *run, 0)
     axes[:, 1] = _all([c.lateral_force for c in conditions], *run, 1)
     axes[:, 2] = _all([c.load for c in conditions], *run, 2)
+
     return [*found, Stream("wrench", times, axes)]
 
 

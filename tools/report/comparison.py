@@ -89,6 +89,7 @@ def render(found: Comparison) -> str:
     """The whole document."""
     head, rows = found.errors()
     fitted = " → soil fitted" if found.soil else ""
+
     return page(
         f"gritd compare: {found.testbed}",
         _title(found),
@@ -109,10 +110,13 @@ def _title(found: Comparison) -> Markup:
         f"with {listed([name_of(b) for b in found.baseline])}" if found.baseline else "no effects"
     )
     kicker = f"gritd compare · {found.testbed} · {counted(len(found.runs), 'run')} · {effects}"
+
     said = f"As configured, the simulation is off by {_off(found, 'before')}."
     if found.soil:
         said += f" With the soil fitted, by {_off(found, 'after')}."
+
     lead = tag("p", held(said), class_="summary")
+
     return tag(
         "header",
         tag("p", kicker, class_="kicker"),
@@ -137,11 +141,13 @@ def _pictures(found: Comparison) -> Iterator[Markup]:
     key = figures.legend(
         {k: v for k, v in KEY.items() if found.soil or k != "after"} | {"unused": "not compared"}
     )
+
     if len(found.runs) == 1:
         yield figures.figure(
             f"All channels of {found.runs[0]}.", figures.channels(found.traces), legend=key
         )
         return
+
     for channel in found.channels:
         of = [trace for trace in found.traces if trace.channel == channel]
         caption = f"{name_of(channel).capitalize()} of {counted(len(of), 'run')}."
@@ -173,6 +179,7 @@ def printed(found: Comparison) -> str:
     """The table of errors, the fitted soil and the caveats, for a terminal."""
     head, rows = found.errors()
     widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
+
     lines = [
         "  ".join(
             c.ljust(w) if i == 0 else c.rjust(w)
@@ -180,11 +187,13 @@ def printed(found: Comparison) -> str:
         )
         for row in (head, *rows)
     ]
+
     if found.soil:
         lines += ["", "root mean square residual as configured → with the soil fitted", ""]
         lines += [
             f"{name_of(k):20}{quantity(found.soil.prior[k])}  →  {quantity(q)}"
             for k, q in found.soil.after.items()
         ]
+
     lines += [f"note: {caveat}" for caveat in found.caveats]
     return "\n".join(map(visible, lines))

@@ -91,7 +91,9 @@ def _verdict(found: Diagnosis) -> Markup:
     name, meaning = VERDICTS[found.verdict]
     effects = [_or_alike(h) for h in found.accepted]
     title = f"{name}: {listed(effects)}" if found.verdict == "explained" and effects else name
+
     runs = {trace.run for trace in found.traces}
+
     return tag(
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
@@ -144,15 +146,18 @@ def _figures(found: Diagnosis) -> Iterator[tuple[str, str, str]]:
     test = found.test
     alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
     yield "evidence of a mismatch", nats(test.statistic), alarm
+
     for h in found.accepted:
         said = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
         if h.indistinguishable_from:
             said.append(f"together with its like {percent(_together(found, h))}")
         yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(said)
+
     channel = _most_improved(found)
     if channel:
         change, floor = _change(found, channel)
         yield f"{name_of(channel)} error, held out", change, f"noise {floor}"
+
     for key in ("c", "tan_phi"):
         if found.soil is not None and key in found.soil.after:
             yield name_of(key), quantity(found.soil.after[key]), _without(found.soil, key)
@@ -241,16 +246,20 @@ def _misfit(found: Diagnosis) -> Markup | None:
 def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
     here = (scatter.channel, scatter.covariate)
     places = [place for place in found.location if (place.channel, place.covariate) == here]
+
     against = figures.drawn_against(scatter)
     about = f"Residual of {name_of(scatter.channel)} against {name_of(against)}"
     if against == "run":
         about = f"Residual of {name_of(scatter.channel)} in each run, in order of time"
+
     changes = places[0].changes if places else ()
     marks = {"change": "starts or stops"} if changes else {}
     key = figures.legend({"mean": "mean", "band": "± 2σ of the noise", **marks})
+
     caption = (
         f"{about}. {sentence(tables.named(found, places[0].where))}" if places else f"{about}."
     )
+
     runs = list(dict.fromkeys(trace.run for trace in found.traces))
     drawn = figures.scatter(scatter, explanation(found), runs, changes)
     return figures.figure(caption, drawn, legend=key, small=True)
@@ -268,12 +277,14 @@ def _hypotheses(found: Diagnosis) -> Markup | None:
 def _soil(found: Diagnosis) -> Markup | None:
     if found.soil is None:
         return None
+
     legend = {"prior": "known before", **_fitted(found)}
     strain = (
         found.soil.strained()
         or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
     )
     caption = f"Soil, ± 1σ thick and ± 2σ thin. {strain}"
+
     drawn = figures.figure(
         caption, figures.soil(found.soil), legend=figures.legend(legend), small=True
     )
@@ -305,6 +316,7 @@ def _next(found: Diagnosis) -> Markup | None:
     following = found.next_experiment
     if following is None:
         return None
+
     gain = f"expected gain {nats(following.expected_gain_nats)}"
     if math.isfinite(following.expected_probability):
         gain += (
@@ -313,6 +325,7 @@ def _next(found: Diagnosis) -> Markup | None:
         )
     if following.separates:
         gain = f"it would tell {listed([name_of(n) for n in following.separates])} apart; {gain}"
+
     return tag(
         "section",
         tag("h2", "Next experiment"),

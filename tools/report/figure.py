@@ -54,6 +54,7 @@ def draw(path: Path, ticks: Rows, title: str, truth: Mapping[str, float] | None 
 
 def _signals(axes: Array, ticks: Rows, seconds: Array) -> None:
     some = slice(None, None, max(1, len(ticks) // DRAWN))
+
     for ax, (field, label, factor) in zip(axes, SIGNALS, strict=True):
         _shade_idle(ax, ticks, seconds)
         ax.plot(
@@ -75,6 +76,7 @@ def _signals(axes: Array, ticks: Rows, seconds: Array) -> None:
                 label="predicted at the estimate",
             )
         _dress(ax, label, seconds, ticks[field][_steady(ticks)] * factor)
+
     axes[0].set_title(
         "Measured and predicted   (shaded: not used by the filter)", fontsize=11, loc="left"
     )
@@ -89,9 +91,11 @@ def _learned(axes: Array, ticks: Rows, seconds: Array, truth: Mapping[str, float
         low, high = (value - 2 * sigma)[some], (value + 2 * sigma)[some]
         ax.fill_between(seconds[some], low, high, color=ESTIMATE, alpha=0.18, lw=0, label="± 2σ")
         ax.plot(seconds[some], value[some], color=ESTIMATE, lw=1.6, label="estimate")
+
         if field in truth:
             ax.axhline(truth[field] * factor, color=TRUTH, lw=1.2, ls=(0, (6, 3)), label="truth")
         _dress(ax, label, seconds, np.concatenate((low, high)))
+
         ax.text(
             0.995,
             0.95,
@@ -101,6 +105,7 @@ def _learned(axes: Array, ticks: Rows, seconds: Array, truth: Mapping[str, float
             va="top",
             fontsize=10,
         )
+
     axes[0].set_title("Learned", fontsize=11, loc="left")
     axes[0].legend(loc="lower right", ncols=3, fontsize=9, frameon=False)
     _innovations(axes[-1], ticks, seconds)
@@ -123,6 +128,7 @@ def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:
     """Innovation over its stated standard deviation, one point an update."""
     ax.axhspan(-2, 2, color=ESTIMATE, alpha=0.10, lw=0)
     ax.axhline(0, color="#b0bec5", lw=0.8)
+
     for field, color in UPDATES.items():
         offered = ticks[f"{field}_s"] > 0.0
         score = ticks[f"{field}_innovation"][offered] / np.sqrt(ticks[f"{field}_s"][offered])
@@ -136,6 +142,7 @@ def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:
             alpha=0.75,
             label=f"{name} ({_inside(score)} in ± 2)",
         )
+
     ax.set_ylim(-5, 5)
     ax.set_ylabel("innovation / σ [–]")
     ax.set_xlabel("time [s]")

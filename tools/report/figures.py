@@ -116,20 +116,24 @@ def trace_picture(trace: Trace) -> Markup:
     """Recording and simulation; under them recorded − simulated on a scale of its own."""
     unit, factor = shown(trace.unit)
     time, used = np.asarray(trace.time, float) - trace.time[0], np.asarray(trace.used, bool)
+
     measured, before, after = (
         np.asarray(v, float) * factor for v in (trace.measured, trace.before, trace.after)
     )
+
     both = differs(trace)
     seen = used if used.any() else np.ones(time.shape, bool)
     span = (0.0, float(time[-1]) or 1.0)
     simulated = [(np.where(seen, before, np.nan), "before")] + (
         [(np.where(seen, after, np.nan), "after")] if both else []
     )
+
     top = plot.axes(span, plot.limits(measured[seen], before[seen], after[seen]), *ROWS.signal)
     noise = 2.0 * _known(trace.sigma) * factor
     low = plot.axes(
         span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual
     )
+
     label = (
         f"{name_of(trace.channel)} of run {trace.run}: recording and simulation over time, "
         "with the residual below"
@@ -178,11 +182,14 @@ def scatter(
     sides = [(f"without {explanation}", "before")] + (
         [(f"with {explanation}", "after")] if differs(of) else []
     )
+
     values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
     sigma = _known(of.sigma) * factor
     y_limits = plot.limits(*values.values(), [-2 * sigma, 2 * sigma], keep=0.0)
+
     x, name, x_limits, names = _by_run(of, runs) if drawn_against(of) == "run" else _along(of)
     at = plot.axes(x_limits, y_limits, 20.0, 190.0)
+
     drawn = []
     for title, kind in sides:
         label = f"Residual of {name_of(of.channel)} against {name}, {title}"
@@ -196,6 +203,7 @@ def scatter(
             else plot.line(at, *running_mean(x, values[kind]), "line mean"),
         )
         drawn.append(panel(title if len(sides) > 1 else "", plot.picture(224.0, label, *marks)))
+
     return panels(drawn)
 
 
@@ -223,15 +231,18 @@ def _by_run(of: Scatter, runs: Sequence[str]) -> Along:
     """A column a run, its values from left to right in order of time."""
     run = np.asarray(of.run, dtype=int)
     count = max([len(runs), *(run + 1).tolist()])
+
     x = run.astype(float)
     for each in np.unique(run):
         own = run == each
         x[own] += COLUMN * (np.arange(own.sum()) / max(own.sum() - 1, 1) - 0.5)
+
     longest = max(MOST_LETTERS // count, 1)
     names = [
         (n if len(n) <= longest else str(i + 1))
         for i, n in enumerate([*runs, *[""] * (count - len(runs))])
     ]
+
     return x, "run", (-0.5, count - 0.5), names
 
 

@@ -107,6 +107,7 @@ def section(title: str, *content: Child) -> Markup:
 def page(title: str, *body: Child) -> str:
     """The whole document, style included."""
     style = resources.files("gritd.tools.report").joinpath("style.css").read_text(encoding="utf-8")
+
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -116,6 +117,7 @@ def page(title: str, *body: Child) -> str:
         tag("title", title),
         tag("style", Markup(style)),
     )
+
     return (
         "<!DOCTYPE html>\n" + tag("html", head, tag("body", tag("main", *body)), lang="en") + "\n"
     )

@@ -39,6 +39,7 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
     """Groups joined by `indistinguishable_from`, accepted ones first, then in the given order."""
     known = {h.effect for h in of}
     groups: list[list[Hypothesis]] = []
+
     for h in of:
         near = {h.effect, *h.indistinguishable_from} & known
         joined = [
@@ -48,6 +49,7 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         ]
         groups = [g for g in groups if g not in joined]
         groups.append([o for g in joined for o in g] + [h])
+
     order = {h.effect: (not h.accepted, i) for i, h in enumerate(of)}
     for group in groups:
         group.sort(key=lambda h: order[h.effect])
@@ -57,9 +59,11 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
 def _group(group: Sequence[Hypothesis]) -> Markup:
     if len(group) == 1:
         return tag("div", _bar(group[0]), class_="group")
+
     total = min(sum(h.probability for h in group), 1.0)
     said = f"Not told apart by these recordings; together {percent(total)}."
     bars = (_bar(h) for h in group)
+
     return tag(
         "div",
         tag("p", held(said), class_="apart"),
@@ -71,6 +75,7 @@ def _group(group: Sequence[Hypothesis]) -> Markup:
 
 def _bar(h: Hypothesis) -> Markup:
     width = f"width:{100.0 * min(max(h.probability, 0.0), 1.0):.1f}%"
+
     label = tag(
         "p", tag("b", name_of(h.effect)), " accepted" if h.accepted else None, class_="effect"
     )
@@ -86,6 +91,7 @@ def _bar(h: Hypothesis) -> Markup:
         class_="track accepted" if h.accepted else "track",
         aria_hidden="true",
     )
+
     return tag(
         "div",
         label,
@@ -100,11 +106,13 @@ def _separation(group: Sequence[Hypothesis]) -> Child:
     """What would tell the members apart, each way once."""
     inside = {h.effect for h in group}
     ways: dict[str, list[str]] = {}
+
     for h in group:
         for rival, how in h.separated_by.items():
             pair = listed(sorted((name_of(h.effect), name_of(rival))))
             if rival in inside and pair not in ways.setdefault(how, []):
                 ways[how].append(pair)
+
     items = (tag("li", f"{'; '.join(pairs)}: {how}") for how, pairs in ways.items())
     return (
         (tag("p", "What would tell them apart:", class_="note"), tag("ul", items, class_="note"))
@@ -116,11 +124,13 @@ def _separation(group: Sequence[Hypothesis]) -> Child:
 def _rest(of: Sequence[Hypothesis], others: bool) -> Child:
     if not of:
         return None
+
     least = (
         f", each below {percent(max(max(h.probability for h in of), UNLIKELY))}" if others else ""
     )
     summary = f"{counted(len(of), 'other effect' if others else 'effect')} tried{least}"
     rows = [(name_of(h.effect), percent(h.probability), number(h.heldout_gain_nats, 2)) for h in of]
+
     return tag(
         "details",
         tag("summary", summary),

@@ -116,7 +116,9 @@ def frame(
         height = float(at.y(value))
         parts.append(tag("line", class_="grid", x1=at.x.start, x2=at.x.end, y1=height, y2=height))
         parts.append(text(at.x.start - 6, height + 3.5, said, "end"))
+
     parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
+
     if below is not None:
         widths = (
             ticks(at.x.low, at.x.high, 6)
@@ -128,6 +130,7 @@ def frame(
         ):
             parts.append(text(float(at.x(value)), at.y.start + 14, said, "middle"))
         parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
+
     return tag("g", parts)
 
 
@@ -206,6 +209,7 @@ def stretches(at: Axes, x: Array, marked: Array, class_: str) -> Markup | None:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], marked.astype(int), [0]))))
     if not edges.size:
         return None
+
     place, last = at.x(x), len(x) - 1
     parts = []
     for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -215,4 +219,5 @@ def stretches(at: Axes, x: Array, marked: Array, class_: str) -> Markup | None:
             parts.append(
                 tag("rect", class_=class_, x=left, y=at.y.end, width=right - left, height=height)
             )
+
     return at.clipped(*parts)

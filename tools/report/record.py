@@ -45,6 +45,7 @@ class Record:
     def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
         """Of the JSON; its files are looked for in a folder. Raises KeyError, …"""
         redo, hypotheses = document["redo"], document["hypotheses"]
+
         return cls(
             folder,
             {_within(folder, Path(name)): str(value) for name, value in redo["files"].items()},
@@ -88,6 +89,7 @@ def read(path: Path, data: Path | None = None) -> Record:
     """
     if path.exists() and not path.is_file():
         raise CommandError(f"{path}: found no regular file; expected a diagnosis to redo", USAGE)
+
     try:
         with path.open(encoding="utf-8") as stream:
             text = stream.read(MOST_BYTES)
@@ -96,6 +98,7 @@ def read(path: Path, data: Path | None = None) -> Record:
         raise CommandError(
             f"{path}: found {reason.lower()}; expected a diagnosis to redo", USAGE
         ) from None
+
     embedded = ELEMENT.search(text)
     try:
         return Record.parsed(

@@ -25,12 +25,14 @@ def draw(path: Path, found: Comparison) -> None:
     runs, channels = found.runs, found.channels
     down = -(-len(runs) // ACROSS)
     across = -(-len(runs) // down)
+
     figure = Figure(
         figsize=(COLUMN * max(across, 2), ROW * len(channels) * down + 0.8),
         dpi=DPI,
         layout="constrained",
     )
     blocks = figure.subfigures(down, across, squeeze=False).flat
+
     for number_of, (block, run) in enumerate(zip(blocks, runs, strict=False)):
         heights = [3.0, 1.2] * len(channels)
         axes = block.subplots(
@@ -41,6 +43,7 @@ def draw(path: Path, found: Comparison) -> None:
             trace = next(t for t in found.traces if (t.run, t.channel) == (run, channel))
             _trace(axes[2 * at, 0], axes[2 * at + 1, 0], trace, legend=number_of == at == 0)
         axes[-1, 0].set_xlabel("time [s]")
+
     figure.savefig(path, format="png")
 
 
@@ -58,18 +61,22 @@ def _trace(signal: Axes, residual: Axes, trace: Trace, legend: bool) -> None:
     time = np.asarray(trace.time) - trace.time[0]
     measured = np.asarray(trace.measured, float) * factor
     signal.plot(time, measured, color=MEASURED, lw=3.0, label="recorded")
+
     for label, which, color in _sides(trace):
         simulated = np.where(used, np.asarray(getattr(trace, which), float) * factor, np.nan)
         signal.plot(time, simulated, color=color, lw=1.2, label=label)
         residual.plot(time, measured - simulated, color=color, lw=0.9)
+
     residual.axhspan(
         -2 * trace.sigma * factor, 2 * trace.sigma * factor, color=IDLE, lw=0, zorder=0
     )
+
     signal.set_ylabel(f"{name_of(trace.channel)} [{unit}]", fontsize=9)
     residual.set_ylabel("residual", fontsize=9)
     for ax in (signal, residual):
         plain(ax)
         ax.tick_params(labelsize=8)
+
     errors = " → ".join(
         number(figures.rms(trace, which) * factor, 2) for _, which, _ in _sides(trace)
     )

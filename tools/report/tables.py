@@ -42,6 +42,7 @@ def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
 def location(found: Diagnosis) -> Markup | None:
     if not found.location:
         return None
+
     rows = [
         (
             name_of(p.channel),
@@ -52,12 +53,14 @@ def location(found: Diagnosis) -> Markup | None:
         )
         for p in found.location
     ]
+
     head = ("channel", "against", "in words", "starts or stops at", "q")
     note = (
         "Recorded against predicted, the value's own run held out. A channel's misfit is what "
         "soil and calibration cannot take; shares overlap where covariates vary together. q: "
         "false-discovery rate over all pairs tried."
     )
+
     return section("Where, in words", table(head, rows, numbers=4), tag("p", note, class_="note"))
 
 
@@ -86,6 +89,7 @@ def held_out(found: Diagnosis) -> Markup | None:
     fit = found.fit
     if not fit.before:
         return None
+
     innovations = fit.innovation_before is not None or fit.innovation_after is not None
     sides = ["without", "with"] if fit.before != fit.after else ["error"]
     head = [
@@ -95,6 +99,7 @@ def held_out(found: Diagnosis) -> Markup | None:
         f"{sides[-1]} ÷ floor",
         *(["innovations"] if innovations else []),
     ]
+
     rows = []
     for channel, before in fit.before.items():
         after, floor = fit.after.get(channel), fit.noise_floor.get(channel)
@@ -103,6 +108,7 @@ def held_out(found: Diagnosis) -> Markup | None:
         ratio = after / floor if after is not None and floor else None
         innovation = [_innovation(found, channel)] if innovations else []
         rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
+
     notes = [tag("p", UNSEEN)]
     if innovations:
         notes.append(
@@ -116,6 +122,7 @@ def held_out(found: Diagnosis) -> Markup | None:
         notes.append(tag("p", fit.innovation_note))
     if found.remaining:
         notes.append(tag("p", sentence(named(found, found.remaining))))
+
     return section(
         "Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note")
     )
@@ -131,8 +138,10 @@ def law(found: Diagnosis) -> Markup | None:
     law = found.law
     if law is None:
         return None
+
     domain = [(name_of(name), _range(name, *ends)) for name, ends in law.domain.items()]
     values = [(name_of(name), quantity(q)) for name, q in law.parameters.items()]
+
     return section(
         "An empirical law",
         tag(

@@ -56,24 +56,31 @@ def _serve(
     clock, queue = Clock(), ReadingQueue()
     notice = real_time()
     readers = build_readers(configuration.settings, clock.now, queue)
+
     for found in sweep(folder):
         say(f"{found}: a power cut had taken its name; it has it again")
+
     path = run_path(folder, run.name, clock.now())
     daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock)
     publisher = Publisher(socket, Reporter(daemon, readers, queue, notice))
     watcher = Watcher(configuration.source, readers, queue, publisher, status_every)
+
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda *_: daemon.stop())
     signal.signal(signal.SIGHUP, lambda *_: watcher.ask_reload())
+
     say(f"logging to {path}")
     for warning in filter(None, (notice, open_to_all(Path(configuration.source)))):
         say(warning, sys.stderr)
         daemon.say(WARNING, warning)
+
     threading.excepthook = _say_in_a_line
     logging.getLogger("can").setLevel(logging.CRITICAL)  # a reader says the same, once
+
     with closing(publisher):
         publisher.start()
         last = daemon.serve(watcher)
+
     watcher.report(daemon)
     say(closing_line(last))
     return DONE if last.state == "closed" else FAILED

@@ -36,6 +36,7 @@ class Reporter:
     def __call__(self) -> Report:
         daemon = self._daemon
         log, disagreement = daemon.writer.status(), daemon.model.present
+
         return {
             "pid": os.getpid(),
             "uptime": time.monotonic() - self._began,
@@ -75,8 +76,10 @@ def _tick(daemon: Daemon) -> Report:
     loop = {"ticks": daemon.loop.ticks, **daemon.loop.lateness()}
     if daemon.loop.latest is None:
         return {"status": "STARTING", "flags": [], "tick": {}, "loop": loop, "channels": {}}
+
     tick, record = daemon.loop.latest
     fields = dict(zip(TICK_NAMES, tick, strict=True))
+
     return {
         "status": Status(int(fields["status"])).name,
         "flags": [flag.name for flag in Flag if flag and int(fields["flags"]) & flag],

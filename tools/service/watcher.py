@@ -50,11 +50,14 @@ class Watcher:
             queue,
             publisher,
         )
+
         self._notifier = Notifier()
         self._every = every
+
         self._states = {reader.device: "" for reader in readers}
         self._writing, self._files, self._hanging, self._untidy = "writing", 1, "", ""
         self._dropped, self._overflowing, self._unconfirmed = 0, False, False
+
         self._calls = 0
         self._ready = self._reload_asked = False
         self._loading: Thread | None = None  # of a configuration
@@ -70,17 +73,22 @@ class Watcher:
         self._follow_queue(daemon)
         self._follow_writer(daemon)
         self._follow_health(daemon)
+
         if self._reload_asked and self._loading is None:
             self._reload_asked = False
             self._begin_reload(daemon)
+
         if self._loading is not None and not self._loading.is_alive():
             self._loading = None
             self._end_reload(daemon)
+
         if self._due(TIDY):
             self._tidy(daemon)
+
         self._notify(daemon)
         if self._due(self._every):
             say(status_line(daemon))
+
         self._calls += 1
 
     def _due(self, period: float) -> bool:
@@ -108,6 +116,7 @@ class Watcher:
         dropped, begins = self._queue.counts().dropped, False
         if dropped > self._dropped and not self._overflowing:
             begins = self._overflowing = True
+
         if begins or (self._overflowing and self._due(1.0)):
             new, self._dropped = dropped - self._dropped, dropped
             self._overflowing = new > 0
@@ -128,6 +137,7 @@ class Watcher:
                 else "confirms again"
             )
             self._tell(daemon, WARNING if self._unconfirmed else INFO, f"log: the medium {text}")
+
         status = daemon.writer.status()
         if status.state != self._writing:
             self._writing = status.state
@@ -136,6 +146,7 @@ class Watcher:
                 WARNING if status.state == "degraded" else INFO,
                 f"log {status.state} {status.error}",
             )
+
         if len(status.files) > self._files:
             self._files = len(status.files)
             self._tell(daemon, INFO, f"logging to {status.files[-1]}")
@@ -207,6 +218,7 @@ class Watcher:
         """Keep the recordings under their cap."""
         open_file = daemon.writer.status().files[-1]
         trouble = ""
+
         try:
             for path in trim(
                 open_file.parent, daemon.configuration.settings.logging.disk_cap, [open_file]
@@ -217,6 +229,7 @@ class Watcher:
                 f"{error.filename or open_file.parent}: logging.disk_cap cannot be kept: "
                 f"{error.strerror}"
             )
+
         if trouble and trouble != self._untidy:
             self._tell(daemon, WARNING, trouble)
         self._untidy = trouble
@@ -224,11 +237,13 @@ class Watcher:
     def report(self, daemon: Daemon) -> None:
         """Every counter, once, at the end."""
         self._notifier.tell(notify.STOPPING)
+
         counts = self._queue.counts()
         say(
             f"queue: received {counts.received} = processed {counts.processed} + dropped "
             f"{counts.dropped} + queued {counts.queued}"
         )
+
         for reader in self._readers:
             s = reader.stats()
             say(
@@ -237,6 +252,7 @@ class Watcher:
                 f"{s.quarantined} quarantined, {s.incomplete} incomplete, {s.unknown} unknown, "
                 f"{s.errors} bus errors, reopened {s.reopened} times"
             )
+
         say(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")
 
 
@@ -268,6 +284,7 @@ def status_line(daemon: Daemon) -> str:
     """The latest tick in one line."""
     if daemon.loop.latest is None:
         return "no tick yet"
+
     tick, loop = daemon.loop.latest
     t = dict(zip(TICK_NAMES, tick, strict=True))
     line = (
@@ -276,5 +293,6 @@ def status_line(daemon: Daemon) -> str:
         f"{t['cohesion']:6.0f} ± {t['cohesion_sigma']:4.0f} Pa  tan φ {t['tan_phi']:.3f} ± "
         f"{t['tan_phi_sigma']:.3f}  late {loop.lateness * 1e3:.2f} ms"
     )
+
     flags = [flag.name or "" for flag in Flag if flag and int(t["flags"]) & flag]
     return f"{line}  {' '.join(flags)}".rstrip()

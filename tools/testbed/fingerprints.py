@@ -51,9 +51,11 @@ def _run(rng: np.random.Generator, number: int, reversing: bool) -> Motion:
     order = np.array([grid[i] for i in rng.permutation(len(grid))])
     if reversing:
         order[1::2, 2] *= -1.0
+
     time = np.arange(0.0, len(grid) * SEGMENT, 1.0 / RATE)
     load, slip, speed = (ramped(time, column) for column in order.T)
     travel = WHEEL.radius * speed * (1.0 - slip)
+
     return Motion(
         time=time + 180.0 * number,
         wheel_angle=np.cumsum(speed) / RATE,
@@ -88,6 +90,7 @@ def channels(response: Response) -> dict[str, Array]:
 def covariates(motions: list[Motion], plain: list[Response]) -> dict[str, Array]:
     """Every covariate of the campaign, (n,) each."""
     shape = [np.ones(np.shape(m.time)) for m in motions]
+
     return {
         "slip": np.concatenate([r.slip for r in plain]),
         "speed": np.concatenate(
@@ -147,16 +150,20 @@ def shown(effect: Effect) -> Shown:
     other = [
         simulate_arrays(WHEEL, SOIL, m, (effect,), torque_constant=TORQUE_CONSTANT) for m in motions
     ]
+
     before, after = ([channels(r) for r in responses] for responses in (plain, other))
     change = {
         c: np.concatenate([a[c] - b[c] for a, b in zip(after, before, strict=True)]) for c in NOISE
     }
+
     by = covariates(motions, plain)
     rate = {
         c: np.concatenate([rate_of(m.time, b[c]) for m, b in zip(motions, before, strict=True)])
         for c in NOISE
     }
+
     strength = {c: float(np.sqrt(np.mean(change[c] ** 2))) / NOISE[c] for c in NOISE}
+
     return Shown(
         change, strength, {c: shares(change[c], {**by, "rate": rate[c]}) for c in NOISE}, by
     )

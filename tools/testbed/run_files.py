@@ -40,6 +40,7 @@ def write_truth(
         "overloaded_samples": int(run.response.overloaded.sum()),
     }
     path.with_suffix(".truth.json").write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+
     sensed = {f"sensed_{name}": value for name, value in vars(run.response.sensed).items()}
     arrays = {**sensed, **vars(run.motion), **vars(run.response)}
     kept = {name: value for name, value in arrays.items() if name != "sensed" and value is not None}

@@ -92,6 +92,7 @@ def motion_of(
     time = np.arange(max(round(schedule.duration * rate), 2)) / rate
     load, slip, speed = (_ramped(schedule, time, name) for name in ("load", "slip", "speed"))
     travel = np.where(slip >= 0.0, speed * (1.0 - slip), speed / (1.0 + np.minimum(slip, 0.0)))
+
     return Motion(
         time=time,
         wheel_angle=_summed(speed / radius, rate),

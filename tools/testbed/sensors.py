@@ -35,12 +35,14 @@ def readings(
         "motor_shunt": np.asarray(response.sensed.current),
         "motor_temperature": np.full(np.shape(motion.time), AMBIENT),
     }
+
     sent = []
     for name, channel in settings.channels.items():
         some = slice(None, None, SPARSE if name == "motor_temperature" else 1)
         sent.append(_channel(channel, np.asarray(motion.time)[some], values[name][some], rng))
     if settings.wrench is not None:
         sent.append(_wrench(settings.wrench, np.asarray(motion.time), response, rng))
+
     return sorted(
         (reading for channel in sent for reading in channel), key=lambda r: (r.received, r.channel)
     )
@@ -53,12 +55,14 @@ def _channel(
     noise = sqrt(max(channel.noise**2 - ROUNDING, 0.0)) if counted else channel.noise
     raw = _raw(channel.calibration, physical) + noise * rng.standard_normal(time.size)
     stamps = _stamps(time, channel.latency)
+
     if counted:
         counts = np.rint(raw).astype(np.int64).tolist()
         return [
             Reading(s, channel.name, count, s + TRANSPORT)
             for s, count in zip(stamps, counts, strict=True)
         ]
+
     step = (channel.high - channel.low) / ADC_STEPS
     volts = np.clip(
         channel.low + step * np.rint((raw - channel.low) / step), channel.low, channel.high
@@ -77,11 +81,13 @@ def _wrench(
     axes["fx"] = _raw(wrench.drawbar_pull, np.asarray(sensed.drawbar_pull))
     axes["fz"] = _raw(wrench.load, np.asarray(sensed.load))
     axes["ty"] = _raw(wrench.torque, np.asarray(sensed.torque))
+
     noise = np.repeat([wrench.force_noise, wrench.torque_noise], 3)
     noisy = (
         axes[name] + sigma * rng.standard_normal(time.size)
         for name, sigma in zip(WRENCH_FIELDS, noise, strict=True)
     )
+
     six = np.stack(list(noisy), axis=1).tolist()
     stamps = _stamps(time, wrench.latency)
     return [

@@ -110,6 +110,7 @@ def play(
     """
     start = time.monotonic_ns() + LEAD
     late = []
+
     for reading in readings:
         due = start + reading.received
         left = due - time.monotonic_ns()
@@ -119,6 +120,7 @@ def play(
             time.sleep(left / NS)
         rig.send(reading)
         late.append(time.monotonic_ns() - due)
+
     half, most = np.quantile(late, (0.5, 0.99)) / NS if late else (0.0, 0.0)
     return Played(float(half), float(most), max(late, default=0) / NS, len(late), rig.lost)
 
@@ -128,15 +130,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
+
     configuration = config.load(arguments.config)
     prepared = experiment(configuration, arguments.seconds, arguments.plant, arguments.seed)
     write_truth(folder, prepared)
+
     with Rig(configuration.settings, arguments.can) as rig:
         print(
             "configuration "
             f"{rig_config.write(configuration, rig.devices, arguments.plant, folder)}",
             flush=True,
         )
+
         if not arguments.wait or sys.stdin.readline():
             stop = _stop_on_signals()
             # a real rig is not held up by the computer's other work; where refused, it may be
@@ -145,6 +150,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             (folder / PLAYED).write_text(
                 json.dumps(asdict(played), indent=2) + "\n", encoding="utf-8"
             )
+
     return DONE
 
 
@@ -196,6 +202,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--wait", action="store_true", help="play when a line comes on standard input"
     )
+
     return parser
 
 

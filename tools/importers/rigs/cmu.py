@@ -83,6 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wheel", choices=("smooth", "grouser"), help="only this wheel; default: both"
     )
+
     parser.add_argument(
         "--rim-speed",
         type=number(low=0.0),
@@ -103,11 +104,14 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     if not (tables or logs or pressed):
         expected = "smooth_all_trials_steady_state.csv or another of those in docs/importing.md"
         raise RigFileError(f"{args.paths[0]}: found none of the rig's files; expected {expected}")
+
     configured = configuration("rig_cmu.yaml", args.output, "cmu.yaml")
     written = [args.output / "cmu.yaml"]
+
     for file, match in tables:
         if match[1] in wheels:
             written += _import_table(file, match[1], args.rim_speed, args.output, configured, tell)
+
     loads = {
         name: load for file, _ in find(args.paths, INDEX) for name, load in _loads(file).items()
     }
@@ -115,10 +119,12 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         wheel = "smooth" if match[1] == "vx_10" else "grouser"
         if wheel in wheels:
             written.append(_import_log(file, wheel, loads, args.output, configured))
+
     if pressed:
         written.append(
             _import_pressed([(file, match[1], match[2]) for file, match in pressed], args.output)
         )
+
     return written
 
 
@@ -140,11 +146,13 @@ def _import_table(
             f"{path}: found no row of rim speed {', '.join(f'{s:g}' for s in speeds)} mm/s and "
             "beta 0"
         )
+
     written = []
     tell("steady state     rim [mm/s]    slip   W [N]  DP [N]  z [mm]")
     for speed, repeat, condition in trials:
         name = f"{wheel}-{speed:03.0f}-{repeat}"
         tell(_row(name, condition))
+
         info = RunInfo(
             name=name,
             nominal_load=round(condition.load.value, 2),
@@ -152,6 +160,7 @@ def _import_table(
         )
         made = streams([condition], COUNTING, round(speed), repeat)
         written.append(write(output / f"{wheel}-table" / f"{name}.mcap", made, configured, info))
+
     return written
 
 
@@ -231,18 +240,22 @@ def _import_log(
     clock = increasing(path, "the clock", rows[:, 5] / 1000, first=1)
     seconds = clock - clock[0]
     times = stamps(round(rows[0, 6] * 1e3) * (NS // 1000), seconds)
+
     logged = [
         Stream("wheel_encoder", times, counts(seconds, rows[:, 2] * 1e-3, COUNT)),
         Stream("carriage_encoder", times, counts(seconds, rows[:, 1] * 1e-3, COUNT)),
         Stream("sinkage_pot", times, rows[:, 4] - rows[0, 4]),
     ]
+
     plain = path.name.removesuffix(".gz")
     name = plain.removesuffix(".txt")
+
     info = RunInfo(
         name=name,
         nominal_load=loads.get(plain),
         notes=f"{wheel} wheel; raw log; no forces recorded",
     )
+
     return write(output / f"{wheel}-logs" / f"{name}.mcap", logged, configured, info)
 
 
@@ -283,15 +296,19 @@ def read_penetration(path: Path, series: str, which: str) -> Penetration:
     rig = path.with_name(re.sub(r"\.ft\.csv(\.gz)?$", r".rig.txt\1", path.name))
     rows = matrix(rig, 7)
     clock = increasing(rig, "the time", rows[:, 6] + 3600.0 * HOURS_BEHIND[series], first=1)
+
     force = np.convolve(zero - forces[:, 3], np.full(10, 0.1), "same")
     last = int(np.argmax(force))
     before = np.flatnonzero(force[:last] < CONTACT)
+
     if not before.size or last - before[-1] < 100:
         raise RigFileError(
             f"{path}: found no loading from under {CONTACT:g} N over a second; expected one"
         )
+
     height = np.interp(forces[:, 0], clock, rows[:, 4])
     pressed = slice(int(before[-1]), last + 1)
+
     return Penetration(
         f"{series}-{which}",
         _body(series, which),

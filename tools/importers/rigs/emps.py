@@ -40,18 +40,22 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         raise RigFileError(
             f"{args.paths[0]}: found no log; expected DATA_EMPS.mat or DATA_EMPS_PULSES.mat"
         )
+
     gains = sorted({float(log["gtau"][0]) for log in logs.values()})
     if len(gains) > 1:
         raise RigFileError(
             f"{next(iter(logs))}: gtau: found {gains[0]:g} and {gains[1]:g}; expected one drive"
         )
+
     configured = configuration("rig_emps.yaml", args.output, "emps.yaml", gain=f"{gains[0]:.12f}")
     written = [args.output / "emps.yaml"]
+
     for file, log in logs.items():
         name = file.stem.lower().replace("_", "-")
         tell(f"{name}: {len(log['t'])} samples, position {np.ptp(log['qm']):.4f} m peak to peak")
         info = RunInfo(name=name, notes="drive without soil")
         written.append(write(args.output / f"{name}.mcap", _streams(log), configured, info))
+
     return written
 
 
@@ -62,17 +66,20 @@ def read_log(path: Path) -> dict[str, Array]:
     except Exception as error:  # scipy raises a different one for each kind of damage
         reason = " ".join(str(error).split())
         raise RigFileError(f"{path}: cannot be read: {reason}; expected a MATLAB file") from None
+
     log = {}
     for name in ("t", "qm", "vir", "gtau"):
         if name not in content:
             raise RigFileError(f"{path}: found no variable {name}; expected t, qm, vir and gtau")
         log[name] = np.ravel(np.asarray(content[name], dtype=np.float64))
+
     for name, values in log.items():
         expected = 1 if name == "gtau" else len(log["t"])
         if len(values) != expected or not np.all(np.abs(values) <= LARGEST):
             raise RigFileError(
                 f"{path}: {name}: found {len(values)} values; expected {expected}, all finite"
             )
+
     increasing(path, "t", log["t"], first=1)
     return log
 

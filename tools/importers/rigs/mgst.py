@@ -85,6 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="corrected",
         help="with (default) or without the authors' correction for rubbing on the side wall",
     )
+
     parser.add_argument(
         "--conceal",
         choices=CONCEALABLE,
@@ -92,12 +93,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="leave a channel out of the recordings; may be repeated",
     )
+
     parser.add_argument(
         "--begin",
         type=number(above=0.0),
         metavar="SECONDS",
         help="leave out what comes before this time of the rig's log",
     )
+
     parser.add_argument(
         "--lag",
         type=number(above=0.0),
@@ -109,6 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a trial, one configuration for all. Raises RigFileError, RecordingError."""
     trials = [read_trial(*pair) for pair in _pairs(args.paths)]
+
     known = {"drawbar_pull": "2", "torque": "0.3"}
     sigmas = {
         f"{name}_sigma": f"{UNKNOWN:.1f}" if name in args.conceal else text
@@ -119,7 +123,9 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         "rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas
     )
     written = [args.output / "mgst.yaml"]
+
     tell(HEADER)
+
     for trial in trials:
         lag, correlation = find_lag(trial) if args.lag is None else (args.lag, float("nan"))
         if lag + STEADY >= trial.rig.t[-1]:
@@ -127,10 +133,12 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
                 f"{trial.name}: found a lag of {lag:g} s; expected less, "
                 f"the log has {trial.rig.t[-1]:.1f} s"
             )
+
         tell(_row(trial, lag, correlation))
         streams = _streams(trial, lag, args.begin or 0.0, args.drawbar_pull, set(args.conceal))
         info = _info(trial, lag, args.drawbar_pull, args.conceal)
         written.append(write(args.output / f"{trial.name}.mcap", streams, configured, info))
+
     return written
 
 
@@ -141,16 +149,19 @@ def _pairs(paths: list[Path]) -> list[tuple[Path, Path, re.Match[str]]]:
     """Rig log, force/torque log and the matched name of each trial, by time of day."""
     rigs = find(paths, RIG_FILE)
     sensors = {match[2]: file for file, match in find(paths, SENSOR_FILE)}
+
     if not rigs:
         raise RigFileError(
             f"{paths[0]}: found no rig log; expected files like "
             "20210208-165209-trio-s20-p925.rig.csv"
         )
+
     for file, match in rigs:
         if match[2] not in sensors:
             raise RigFileError(
                 f"{file}: found no sensor log; expected 1-g_{match[3]}-{match[2]}.processed.csv.gz"
             )
+
     return [(file, sensors[match[2]], match) for file, match in rigs]
 
 
@@ -223,15 +234,18 @@ def find_lag(trial: Trial) -> tuple[float, float]:
     grid = np.arange(0.0, min(trial.rig.t[-1], trial.sensor.t[-1]), 0.01)
     motor = _fluctuation(np.interp(grid, trial.rig.t, trial.rig.current))
     axle = _fluctuation(np.interp(grid, trial.sensor.t, trial.sensor.torque))
+
     begin = 150
     if len(grid) < begin + 300:
         raise RigFileError(
             f"{trial.name}: found {grid.size / 100:.1f} s of data; expected 4.5 s or more, or --lag"
         )
+
     lags = np.arange(20, 101)
     fits = [
         float(np.corrcoef(motor[begin:], axle[begin - lag : len(axle) - lag])[0, 1]) for lag in lags
     ]
+
     best = int(np.argmax(fits))
     return float(lags[best]) / 100, fits[best]
 
@@ -256,16 +270,19 @@ def _streams(
     times = stamps(rig.start, rig.t)[shared]
     wheel = counts(rig.t, rig.rim_speed / RADIUS, WHEEL_COUNT)
     carriage = counts(rig.t, rig.carriage_speed, CARRIAGE_COUNT)
+
     logged = {
         "wheel_encoder": wheel,
         "carriage_encoder": carriage,
         "sinkage_pot": rig.sinkage,
         "motor_shunt": rig.current,
     }
+
     streams = [Stream(name, times, values[shared]) for name, values in logged.items()]
     inside = (sensor.t + lag >= begin) & (sensor.t + lag <= rig.t[-1])
     sensed = stamps(rig.start, sensor.t + lag)[inside]
     streams.append(Stream("wrench", sensed, _wrench(sensor, pull, concealed)[inside]))
+
     return [stream for stream in streams if stream.channel not in concealed]
 
 
@@ -306,11 +323,13 @@ def _row(trial: Trial, lag: float, correlation: float) -> str:
     end = lag + sensor.t[-1]
     driving = (rig.t > STEADY) & (rig.t < end)
     sensed = (sensor.t + lag > STEADY) & (sensor.t + lag < rig.t[-1])
+
     slip = 1.0 - np.mean(rig.carriage_speed[driving]) / np.mean(rig.rim_speed[driving])
     motor = TORQUE_PER_AMPERE * np.mean(rig.current[driving]) * 1e-3
     axle = np.mean(sensor.torque[sensed])
     pull, raw = np.mean(sensor.drawbar_pull[sensed]), np.mean(sensor.drawbar_pull_raw[sensed])
     sinkage = np.mean(rig.sinkage[driving]) / COUNTS_PER_MM
+
     return (
         f"{trial.name:<18} {slip:7.4f} {np.mean(sensor.load[sensed]):7.1f} {pull:7.1f} {raw:7.1f} "
         f"{axle:7.2f} "

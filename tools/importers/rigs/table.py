@@ -61,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="M/S",
         help="of the faster of rim and carriage, default 0.01",
     )
+
     for name, unit, default in (
         ("drawbar-pull", "N", 0.5),
         ("sinkage", "m", 0.25e-3),
@@ -74,6 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="SIGMA",
             help=explained,
         )
+
     parser.add_argument(
         "--soil-strength",
         choices=("unknown", "table"),
@@ -91,10 +93,13 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
             f"{args.paths[0]}: found no table; expected a CSV file with "
             f"{', '.join(CONSTANTS + MEASURED)}"
         )
+
     soils = [file for file in files if _has(file, SOIL[0])]
+
     written = []
     for path in tables:
         written += _import(path, soils, args, tell)
+
     return written
 
 
@@ -106,15 +111,18 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
     table = read_table(path, CONSTANTS + MEASURED)
     conditions = _conditions(path, table, args)
     stem = path.name.partition(".")[0]
+
     configured = configuration(
         "rig_table.yaml", args.output, f"{stem}.yaml", **_values(path, table, soils, args)
     )
+
     load = float(np.mean([condition.load.value for condition in conditions]))
     info = RunInfo(
         name=stem,
         nominal_load=round(load, 2),
         notes=f"{len(conditions)} steady states from a table",
     )
+
     tell(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
     recording = write(args.output / f"{stem}.mcap", streams(conditions, COUNTING), configured, info)
     return [args.output / f"{stem}.yaml", recording]
@@ -123,11 +131,13 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
 def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Condition]:
     columns = [numbers(path, table, name).tolist() for name in MEASURED]
     conditions = []
+
     for row, (load, slip, pull, sinkage, torque) in enumerate(zip(*columns, strict=True), start=2):
         if not -1.0 <= slip <= 1.0 or load <= 0.0:
             raise RigFileError(
                 f"{path}: row {row}: found slip {slip:g}, load {load:g}; expected -1 … 1, above 0 N"
             )
+
         conditions.append(
             Condition(
                 rim_speed=args.speed * min(1.0, 1.0 + slip),
@@ -138,6 +148,7 @@ def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Cond
                 current=scatter_of_mean(torque, args.torque_sigma),
             )
         )
+
     return conditions
 
 
@@ -149,6 +160,7 @@ def _values(
     soil = _soil(path, soils, constant["soil_simulant"])
     radius = finite_number(path, "wheel_radius_m", constant["wheel_radius_m"])
     shear = finite_number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
+
     values: dict[str, float] = {
         "radius": radius,
         "width": finite_number(path, "wheel_width_m", constant["wheel_width_m"]),
@@ -164,6 +176,7 @@ def _values(
         "torque_sigma": args.torque_sigma,
         "drawbar_pull_sigma": args.drawbar_pull_sigma,
     }
+
     strength, comment = _strength(soil, args.soil_strength)
     return {name: f"{value:.9f}" for name, value in (values | strength).items()} | {
         "source": constant["source"],
@@ -180,10 +193,12 @@ def _strength(soil: dict[str, float], source: str) -> tuple[dict[str, float], st
             "tan_phi": 0.6,
             "tan_phi_sigma": 0.15,
         }, NOT_TAKEN
+
     cohesion, tan_phi = (
         soil["cohesion_kPa"] * 1e3,
         math.tan(math.radians(soil["friction_angle_deg"])),
     )
+
     sigmas = {"cohesion_sigma": max(100.0, 0.5 * cohesion), "tan_phi_sigma": 0.1 * tan_phi}
     return {"cohesion": cohesion, "tan_phi": tan_phi, **sigmas}, "as tabulated."
 

@@ -36,6 +36,7 @@ class Batch:
     def specs(self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE) -> list[Spec]:
         rng = np.random.default_rng(_number(self.secret, "assignments"))
         drawn = strata.assignments(self.cases, rng, self.strata)
+
         return [
             Spec(
                 number,
@@ -96,17 +97,21 @@ def run(
     waiting = [spec for spec in specs if not spec.done]
     waiting.reverse()
     active: dict[Future[Any], tuple[Spec, bool]] = {}
+
     while waiting or active:
         while waiting and len(active) < AHEAD * width:
             spec = waiting.pop()
             active[executor.submit(trial.prepare, spec)] = (spec, False)
+
         done, _ = wait(active, return_when=FIRST_COMPLETED)
         for future in done:
             spec, last = active.pop(future)
             value = future.result()
+
             if last:
                 finished(spec)
                 continue
+
             sealed(spec, value)
             if not diagnosed:
                 finished(spec)

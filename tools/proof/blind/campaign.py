@@ -64,6 +64,7 @@ def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habit
     """Habits by chance where they are not fixed."""
     fixed = fixed or Habits()
     runs = int(rng.choice((1, 2, 3, 4, 5, 6), p=(0.1, 0.1, 0.25, 0.25, 0.15, 0.15)))
+
     drawn = {
         "runs": runs,
         "loads": 1 if rng.random() < 0.15 else 4,
@@ -77,6 +78,7 @@ def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habit
     chosen: dict[str, Any] = {
         name: value for name, value in drawn.items() if getattr(fixed, name) is None
     }
+
     habits = replace(fixed, **chosen)
     return replace(
         habits, lifted=bool(habits.lifted and habits.wrench)
@@ -89,13 +91,17 @@ def campaign(rig: Rig, ground: Ground, habits: Habits, rng: np.random.Generator)
     weights = _weights(rig, ground, min(count, habits.loads or 4), rng)
     runs: list[Run] = []
     begins = 0.0
+
     for number in range(count):
         again = bool(habits.second_pass) and number > 0 and rng.random() < 0.5
         weight = runs[-1].weight if again else weights[number % len(weights)]
+
         run = _run(rig, habits, weight, rng)
         passes, start = (runs[-1].passes + 1, runs[-1].start) if again else (1, _start(rng))
         runs.append(replace(run, passes=passes, start=start, begins=begins))
+
         begins += run.duration + float(rng.uniform(60.0, 400.0))
+
     return tuple(runs)
 
 
@@ -120,6 +126,7 @@ def _run(rig: Rig, habits: Habits, weight: float, rng: np.random.Generator) -> R
     usual = float(rng.uniform(0.015, 0.04))
     slips = rng.permutation(np.linspace(*SLIPS, int(rng.integers(4, 7)))) + rng.uniform(-0.02, 0.02)
     stretches = [_stretch(weight, float(slip), usual, habits, rng) for slip in slips]
+
     if habits.reversal:
         stretches[-2:] = [
             replace(stretches[-2], duration=3.0),
@@ -129,6 +136,7 @@ def _run(rig: Rig, habits: Habits, weight: float, rng: np.random.Generator) -> R
         stretches.append(Stretch(4.0, 0.0, 0.0, usual))
     if habits.standstill:
         stretches.insert(0, Stretch(float(rng.uniform(1.5, 3.0)), weight, 0.1, 0.0))
+
     ramp = float(rng.uniform(*RAMP))
     return Run(tuple(stretches), ramp, 1, 0.0, 0.0)
 

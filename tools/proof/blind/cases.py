@@ -64,6 +64,7 @@ class Case:
     def answers(self) -> dict[str, Any]:
         """As JSON types."""
         ground = self.trial.world.ground
+
         return {
             "case": self.number,
             "seed": self.seed,
@@ -116,9 +117,11 @@ def _attempt(
     family, trial = _trial(habits, rng)
     detector = Detector(trial)
     facts = detector.facts()
+
     made = [effect_drawn(name, rng, facts) for name in assignment.effects]
     fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
     effects = tuple(effect for effect, _ in fitted)
+
     return Case(
         number=number,
         seed=seed,
@@ -149,6 +152,7 @@ def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Tria
         family, ground = knowledge.ground_drawn(rng)
         rig = knowledge.rig_drawn(rng)
         runs = campaign.campaign(rig, ground, habits, rng)
+
         heaviest = max(run.weight for run in runs)
         if (
             min(run.weight for run in runs) >= 4.0
@@ -156,6 +160,7 @@ def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Tria
             and campaign.deepest(rig, ground, heaviest) < 1.15
         ):
             break
+
     known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
     rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
     return family, Trial(World(rig, ground), known, knowledge.chain_drawn(known, rng), runs)

@@ -128,13 +128,16 @@ class Detector:
             *self._nuisance,
             *(self._strength(effects, place) for place in range(len(effects))),
         ]
+
         held = _held_out([motion.time.size for motion in self._motions])
         sums: dict[str, list[Array]] = {}
+
         for run, inside in held:
             covariance = self._covariance(columns, run, inside)
             for channel in self._roots[run]:
                 rows = np.stack([column[run][channel] for column in columns], axis=1)[inside]
                 sums.setdefault(channel, []).append(((rows @ covariance) * rows).sum(axis=1))
+
         return {channel: float(np.concatenate(parts).mean()) for channel, parts in sums.items()}
 
     # ---- parts -----------------------------------------------------------------------------------

@@ -129,7 +129,9 @@ def configuration(known: Knowledge, nominal: float) -> str:
         "nominal": _stated(Stated(nominal, known.weight_share * nominal), "N"),
         "minimum": "1 N",
     }
+
     _channels(document, known)
+
     return yaml.safe_dump(
         document,
         sort_keys=False,
@@ -156,27 +158,33 @@ def _soil(soil: dict[str, Stated]) -> dict[str, Any]:
 def _channels(document: dict[str, Any], known: Knowledge) -> None:
     channels = document["channels"]
     channels.pop("motor_temperature", None)
+
     units = {
         "wheel_encoder": ("rad/count", "rad", "count"),
         "carriage_encoder": ("rad/count", "rad", "count"),
         "sinkage_pot": ("m/V", "m", "V"),
         "motor_shunt": ("A/V", "A", "V"),
     }
+
     for name, (scale, offset, raw) in units.items():
         channels[name] |= _calibrated(known.instruments[name], scale, offset)
         channels[name]["noise"] = f"{known.instruments[name].noise!r} {raw}"
+
     if "load" not in known.instruments:
         del channels["wrench"]
         return
+
     wrench = channels["wrench"] | {
         "latency": "1 ms",
         "max_force": "5000 N",
         "max_torque": "1000 N*m",
     }
+
     for name, unit in (("load", "N"), ("drawbar_pull", "N"), ("torque", "N*m")):
         wrench[name] = _calibrated(known.instruments[name], "", unit)
     wrench["force_noise"] = f"{known.instruments['load'].noise!r} N"
     wrench["torque_noise"] = f"{known.instruments['torque'].noise!r} N*m"
+
     channels["wrench"] = wrench
 
 

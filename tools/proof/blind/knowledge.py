@@ -85,11 +85,13 @@ def soil_known(ground: Ground, rng: np.random.Generator) -> dict[str, Stated]:
         "exponent": float(rng.uniform(0.01, 0.03)),
         "modulus": float(rng.uniform(0.03, 0.1)),
     }
+
     known = {}
     for name, share in relative.items():
         true = float(getattr(ground, name))
         error = float(np.clip(rng.standard_normal(), -2.5, 2.5))
         known[name] = Stated(true * max(1.0 + share * error, 0.1), share * true)
+
     return known
 
 
@@ -121,6 +123,7 @@ def knowledge_drawn(
     torque = heaviest * rig.radius
     constant = float(np.round(torque / 3.0, 3))
     volts = 1e-3 * float(rng.choice((1.0, 2.0, 4.0)))
+
     instruments = {
         "wheel_encoder": Instrument(
             Stated(2.0 * np.pi / int(rng.choice((16384, 65536))), 0.0), Stated(0.0, 0.0), 0.35
@@ -131,6 +134,7 @@ def knowledge_drawn(
     }
     if wrench:
         instruments |= _wrench(heaviest, torque, float(rng.uniform(0.5, 2.0)))
+
     return Knowledge(
         rig.radius,
         rig.width,
@@ -182,18 +186,21 @@ def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Convert
     encoder = name.endswith("_encoder")
     share = 0.0 if encoder else float(rng.uniform(0.2, 0.6))
     white = 0.2 if encoder else said.noise * float(np.sqrt(1.0 - share**2))
+
     noise = Noise(
         white,
         share * said.noise,
         float(np.exp(rng.uniform(np.log(0.03), np.log(0.6)))),
         rng.random() < 0.3,
     )
+
     volts = name in ("sinkage_pot", "motor_shunt")
     quantum = (
         1.0 if encoder else 4.8 / 2 ** int(rng.choice((12, 14, 16))) if volts else 0.2 * said.noise
     )
     low, high = (0.1, 4.9) if volts else (-1e12, 1e12)
     scale, offset = _calibrated(said, rng)
+
     return Converter(
         name, scale, offset, noise, quantum, low, high, 0.0 if encoder else 1e-3, 250.0
     )

@@ -64,6 +64,7 @@ def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
         "<h2>What went wrong, case by case</h2>",
         _misses(rows),
     ]
+
     return _document("".join(parts))
 
 
@@ -134,6 +135,7 @@ def _effects(effects: Mapping[str, Any]) -> str:
         "campaign can tell",
         "three, fixed groups",
     )
+
     rows = [
         (
             name,
@@ -143,6 +145,7 @@ def _effects(effects: Mapping[str, Any]) -> str:
         )
         for name, of in effects.items()
     ]
+
     return _table([head, *rows], head=True)
 
 

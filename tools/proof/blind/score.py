@@ -49,6 +49,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
     effects = [row for row in rows if row.truth]
     singles = [row for row in effects if row.stratum in ("single", "absorbed")]
     detectable = [row for row in singles if row.detectability >= DETECTABLE * row.limit]
+
     return {
         "cases": len(rows),
         "failed": _share(row.verdict == "failed" for row in rows),
@@ -177,6 +178,7 @@ def _soil_groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 def _soil(rows: Sequence[Row]) -> dict[str, Any]:
     found = {}
+
     for name in ("c", "tan_phi"):
         before, after = (
             [row.soil[name][when] for row in rows if name in row.soil]
@@ -188,6 +190,7 @@ def _soil(rows: Sequence[Row]) -> dict[str, Any]:
             "after": _quantiles(after),
             "within two sigma after": _share(abs(z) < 2.0 for z in inside if math.isfinite(z)),
         }
+
     return found
 
 

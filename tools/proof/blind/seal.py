@@ -40,13 +40,16 @@ def opened(path: Path, seal: str) -> dict[str, Any]:
         sealed: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise CommandError(f"{path}: found {error}; expected sealed answers", FAILED) from None
+
     if digest(sealed) != seal:
         raise CommandError(
             f"{path}: found other answers than were sealed; expected SHA-256 {seal}", FAILED
         )
+
     for name, expected in sealed["files"].items():
         if sha256(path.parent / name) != expected:
             raise CommandError(f"{path.parent / name}: found another file than was sealed", FAILED)
+
     answers: dict[str, Any] = sealed["answers"]
     return answers
 

@@ -51,6 +51,7 @@ def headline(score: Mapping[str, Any]) -> Table:
         score["unlisted"],
     )
     first, heldout, two = singles["first"], score["heldout"], score["two"]
+
     return [
         ("cases, of which failed", said(score["failed"])),
         ("false alarms", said(alarms["all"])),
@@ -129,10 +130,12 @@ def soil(score: Mapping[str, Any]) -> Table:
         "tan φ after",
         "within 2σ",
     )
+
     rows = [
         (stratum, *_errors(of["c"]), *_errors(of["tan_phi"]))
         for stratum, of in score["soil"].items()
     ]
+
     return [head, *rows]
 
 

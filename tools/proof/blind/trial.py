@@ -90,6 +90,7 @@ def diagnose(spec: Spec) -> dict[str, Any]:
     """
     given, result = spec.folder / "given", spec.folder / "result.json"
     files = sorted(path.name for path in given.glob("*.mcap"))
+
     command = [
         *spec.diagnose,
         *files,
@@ -99,13 +100,16 @@ def diagnose(spec: Spec) -> dict[str, Any]:
         str(result.resolve()),
     ]
     command += ["--jobs", "1"]  # cases run side by side
+
     began = time.monotonic()
     code, said = _run(command, given)
     outcome = {"code": code, "seconds": time.monotonic() - began, "said": said[-2000:]}
     (spec.folder / OUTCOME).write_text(json.dumps(outcome, indent=1), encoding="utf-8")
+
     if not spec.keep:
         for name in files:
             (given / name).unlink()
+
     return outcome
 
 
@@ -124,6 +128,7 @@ def _run(command: list[str], folder: Path) -> tuple[int, str]:
         )
     except subprocess.TimeoutExpired:
         return -1, f"no answer within {PATIENCE:g} s"
+
     return done.returncode, done.stderr
 
 

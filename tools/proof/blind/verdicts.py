@@ -120,6 +120,7 @@ def row(spec: Spec) -> Row:
     answers = seal.opened(spec.answers, spec.seal.read_text(encoding="utf-8").strip())
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
     result, trouble = _result(spec.folder / "result.json", outcome)
+
     return Row(
         number=spec.number,
         stratum=answers["stratum"],
@@ -166,6 +167,7 @@ def _hypotheses(result: Mapping[str, Any]) -> tuple[Said, ...]:
 
 def _soil(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     stated, found = result.get("soil") or {}, {}
+
     for name, true_name in (("c", "cohesion"), ("tan_phi", "tan_phi")):
         true = answers["soil"][true_name]
         before, after = (
@@ -177,6 +179,7 @@ def _soil(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, di
             "z_before": (before[0] - true) / before[1] if before[1] > 0.0 else math.nan,
             "z_after": (after[0] - true) / after[1] if after[1] > 0.0 else math.nan,
         }
+
     return found
 
 
@@ -215,6 +218,7 @@ def _heldout(
     """
     sums: dict[str, list[np.ndarray[Any, Any]]] = {}
     begins = {f"run-{number}": run["begins"] for number, run in enumerate(answers["runs"], start=1)}
+
     for trace in result.get("traces") or ():
         path = spec.answers.with_name(f"{spec.name}.{trace['run']}.npz")
         if path.exists():
@@ -224,6 +228,7 @@ def _heldout(
                         trace, begins[trace["run"]] + truth["time"], truth[trace["channel"]]
                     )
                     sums.setdefault(trace["channel"], []).append(errors)
+
     return {channel: _roots(np.concatenate(parts, axis=1)) for channel, parts in sums.items()}
 
 

@@ -38,6 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     chosen = [p for p in PROOFS if not arguments.only or p.name in arguments.only]
     failed = False
+
     for number, proof in enumerate(chosen, start=1):
         missing = arguments.data / proof.rig
         if not missing.is_dir():
@@ -46,26 +47,31 @@ def main(argv: Sequence[str] | None = None) -> int:
                 "docs/importing.md says where the data are"
             )
             continue
+
         try:
             _prove(proof, arguments.data, arguments.output, f"{number} of {len(chosen)}")
         except CommandError as error:
             print(f"gritd: {proof.name}: {error}", file=sys.stderr)
             failed = True
+
     return FAILED if failed else DONE
 
 
 def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
     """One proof; its section of the page and its figure are written."""
     began = time.monotonic()
+
     with tempfile.TemporaryDirectory(prefix="gritd-proof-") as work, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         bench = Bench(
             data.resolve(), Path(work), lambda what: _step(f"{place}, {proof.name}: {what}", began)
         )
         finding = proof.run(bench)
+
     seconds = time.monotonic() - began
     _tell(proof, finding, seconds)
     figure.draw(folder / f"proof-{proof.name}.png", finding.panels)
+
     target = folder / PAGE
     old = target.read_text(encoding="utf-8") if target.exists() else "# Proofs on real recordings\n"
     target.write_text(
@@ -94,6 +100,7 @@ def _parser() -> Parser:
         prog="python -m gritd.tools.proof.real",
         description="Proofs of diagnose on other laboratories' recordings.",
     )
+
     parser.add_argument(
         "--data", type=_folder, default=DATA, metavar="DIR", help="the public files, a folder a rig"
     )
@@ -104,6 +111,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--output", type=_folder, default=DOCS, metavar="DIR", help="where proof.md and figures go"
     )
+
     return parser
 
 

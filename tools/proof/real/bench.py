@@ -78,15 +78,18 @@ class Bench:
         """What the command printed. Raises CommandError with its one line."""
         shown = (a.replace(f"{self.data}/", "").replace(f"{self.folder}/", "") for a in arguments)
         self.commands.append("gritd " + " ".join(shown))
+
         done = subprocess.run(
             [sys.executable, "-m", "gritd", *arguments],
             cwd=self.folder, env=_environment(), capture_output=True, text=True, check=False,
         )  # fmt: skip
+
         if done.returncode:
             raise CommandError(
                 f"{self.commands[-1]}: exit {done.returncode}: "
                 f"{done.stderr.strip() or 'nothing said'}"
             )
+
         return done.stdout
 
 

@@ -38,32 +38,39 @@ def _run(bench: Bench) -> Finding:
     first = bench.diagnosed(
         list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth"
     )
+
     learnt = bench.folder / "cmu-learnt.yaml"
     learnt.write_text(
         with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.found),
         encoding="utf-8",
     )
+
     fit, held = (
         bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES)
         / "grouser-table"
         for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
     )
     second = bench.diagnosed(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
+
     seen, unseen = (
         _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.found) for f in (fit, held)
     )
+
     rows = [
         (label, f"{speed} mm/s", *(f"{unseen[channel][i, k]:.2f}" for i in (1, 2, 3)))
         for channel, (label, _) in CHANNELS.items() for k, speed in enumerate(HELD)
     ]  # fmt: skip
+
     heads = ("held-out state", "rim speed", "measured", "as if smooth", "with what was found")
     labels = ("measured", "as if smooth", "with what was found; the states between were not seen")
+
     panels = [
         Panel(
             label, _sorted(np.hstack((seen[c], unseen[c]))), "slip [–]", label, labels, points=True
         )
         for c, (label, _) in CHANNELS.items()
     ]
+
     return Finding(
         [first, second],
         _asked(first, second, unseen, smooth / "penetration.csv"),
@@ -80,20 +87,24 @@ def with_soil(text: str, found: dict[str, Any]) -> str:
     """A configuration with the soil that a diagnosis fitted, values and sigmas."""
     document = yaml.safe_load(text)
     after = found["soil"]["after"]
+
     units = {
         "cohesion": ("c", "Pa"),
         "tan_phi": ("tan_phi", ""),
         "shear_modulus": ("k", "m"),
         "exponent": ("n", ""),
     }
+
     for name, (symbol, unit) in units.items():
         document["soil"][name] = {
             key: _written(after[symbol][key], unit) for key in ("value", "sigma")
         }
+
     modulus = after["K"]
     document["soil"]["k_c"] = "0 kN/m^(n+1)"
     document["soil"]["k_phi"] = f"{modulus['value'] / 1e3:.6g} kN/m^(n+2)"
     document["soil"]["modulus_sigma"] = f"{100.0 * modulus['sigma'] / modulus['value']:.4g} %"
+
     return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
 
 
@@ -110,12 +121,14 @@ def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
         judge.predicted(None),
         judge.predicted(found),
     )
+
     out = {}
     for channel, (_, factor) in CHANNELS.items():
         out[channel] = judge.means(
             channel, judge.covariate("slip"), *([run[channel] for run in m] for m in models)
         )
         out[channel][1:] *= factor
+
     return out
 
 
@@ -128,18 +141,22 @@ def moduli(path: Path) -> tuple[float, float]:
     off the depth.
     """
     body = f"plate {PLATE * 1e3:.0f} mm"
+
     with path.open(encoding="utf-8") as stream:
         rows = [
             (float(r["depth_mm"]), float(r["force_N"]))
             for r in csv.DictReader(stream)
             if r["body"] == body
         ]
+
     depth, force = np.array(rows).T
     depth = depth - 1e3 * YIELDS * force
     inside = (depth > DEPTHS[0]) & (depth < DEPTHS[1])
+
     n, log_k = np.polyfit(
         np.log(depth[inside] * 1e-3), np.log(force[inside] / (np.pi * (0.5 * PLATE) ** 2)), 1
     )
+
     return float(n), float(np.exp(log_k))
 
 
@@ -148,6 +165,7 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
     group = listed(sorted(second.group)) or second.found["verdict"]
     differ = "Do grip and sinking differ?"
     named = "Does it name grousers, or a group that holds them?"
+
     asked = [
         _of_modulus(first, pressed),
         Asked(
@@ -160,8 +178,10 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
         Asked(named, "grousers", group, "grousers" in second.group, REASON),
         _of_frame(first, second),
     ]
+
     for channel, (label, _) in CHANNELS.items():
         _, measured, before, after = unseen[channel]
+
         worse, better = rms(before - measured), rms(after - measured)
         question = f"Is the {label} of unseen states predicted better?"
         asked.append(
@@ -173,6 +193,7 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
                 REASON,
             )
         )
+
     return asked
 
 

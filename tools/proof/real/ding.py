@@ -26,14 +26,17 @@ def _run(bench: Bench) -> Finding:
     recordings = sorted(folder.glob("*.mcap"))
     configuration = folder / "ding2011_smooth.yaml"
     said = bench.diagnosed(recordings, configuration, "ding-points")
+
     judge = Judge(recordings, configuration)
     published = bench.imported("table", "published", "--soil-strength", "table", files=["ding"])
+
     models = (
         [r.measured for r in judge.rig.runs],
         Judge(recordings, published / configuration.name).predicted(None),
         judge.predicted(said.found, "before"),
         judge.predicted(said.found),
     )
+
     panels, columns = [], []
     for channel, (label, factor) in CHANNELS.items():
         curves = ([run[channel] for run in model] for model in models)
@@ -41,6 +44,7 @@ def _run(bench: Bench) -> Finding:
         means[1:] *= factor
         panels.append(Panel(label, means[[0, 1, 3, 4]], "slip [–]", label, LABELS, points=True))
         columns.append(means)
+
     return Finding([said], _asked(said), _table(columns), panels)
 
 
@@ -70,10 +74,12 @@ def _asked(said: Said) -> list[Asked]:
     c, tan_phi = (after[n] for n in ("c", "tan_phi"))
     phi = np.degrees(np.arctan(tan_phi["value"]))
     sigma = np.degrees(tan_phi["sigma"] / (1.0 + tan_phi["value"] ** 2))
+
     cohesion, angle = f"{c['value']:.0f} ± {c['sigma']:.0f} Pa", f"{phi:.1f} ± {sigma:.1f}°"
     near = abs(c["value"] - COHESION) <= SIGMAS * c["sigma"], abs(phi - FRICTION) <= SIGMAS * sigma
     grows = "Does it find that sinkage grows with slip, as that paper does?"
     found = listed(said.accepted) or said.found["verdict"]
+
     return [
         Asked("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
         Asked(

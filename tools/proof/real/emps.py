@@ -28,10 +28,12 @@ def _run(bench: Bench) -> Finding:
     folder = bench.imported("emps", "emps", files=["emps"])
     said = bench.diagnosed([folder / "data-emps.mcap"], folder / "emps.yaml", "emps-data")
     fitted, unseen = (_regression(folder / f"data-emps{name}.mcap") for name in ("", "-pulses"))
+
     bare = np.append(
         np.linalg.lstsq(fitted.columns[:, :2], fitted.force, rcond=None)[0], (0.0, 0.0)
     )
     found = stated(said)
+
     rows = [
         (
             name,
@@ -47,6 +49,7 @@ def _run(bench: Bench) -> Finding:
         )
     ]
     rows.append(("published", *(f"{v:.2f}" for v, _ in PUBLISHED.values()), "", "", ""))
+
     heads = (
         "model",
         "M [kg]",
@@ -56,14 +59,17 @@ def _run(bench: Bench) -> Finding:
         "error, DATA_EMPS",
         "error, DATA_EMPS_PULSES",
     )
+
     shown = (unseen.time >= SPAN[0]) & (unseen.time <= SPAN[1])
     curves = np.stack((unseen.time, unseen.force, unseen.columns @ bare, unseen.columns @ found))[
         :, shown
     ]
     labels = ("measured", "inertia and viscous friction", "with what was found")
+
     panel = Panel(
         "DATA_EMPS_PULSES, which the diagnosis did not see", curves, "time [s]", "force [N]", labels
     )
+
     asked = _asked(said, found, unseen.error(bare), unseen.error(found))
     return Finding([said], asked, Table(heads, rows), [panel])
 
@@ -91,15 +97,19 @@ class Regression:
 def _regression(path: Path) -> Regression:
     recording = salvage.read(path)
     settings = config.loads(recording.config_yaml or "", path.name).settings
+
     counts, volts = (recording.arrays(f"/raw/{name}") for name in ("wheel_encoder", "motor_shunt"))
     count = settings.channels["wheel_encoder"].calibration.scale.value
     position = _low_passed(counts["count"] * count, POSITION)
     speed = np.gradient(position, 1.0 / RATE)
+
     columns = np.column_stack(
         (np.gradient(speed, 1.0 / RATE), speed, np.sign(speed), np.ones_like(speed))
     )
+
     force = volts["volts"] * settings.drive.torque_constant.value
     kept = slice(None, None, EVERY)
+
     return Regression(
         (counts["stamp"][kept] - counts["stamp"][0]) * 1e-9,
         _low_passed(columns, COMPARED)[kept],
@@ -131,6 +141,7 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
     first = said.found["hypotheses"][0]["effect"] if said.found["hypotheses"] else "nothing"
     group = listed(sorted(said.group)) or "nothing"
     remains = said.found["remaining"]
+
     asked = [
         Asked(
             "Which friction does it name first?",
@@ -146,18 +157,22 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
             "The drive never stands in this log, so an offset of the voltage is the same thing.",
         ),
     ]
+
     for (name, (value, unit)), estimate in zip(PUBLISHED.items(), found.tolist(), strict=False):
         off = estimate / value - 1.0
         shown = f"{estimate:.2f} {unit} ({off:+.1%})"
         asked.append(
             Asked(f"{name}?", f"{value} {unit} ± {WITHIN:.0%}", shown, abs(off) <= WITHIN, REASON)
         )
+
     asked.append(
         Asked("Does it say that something remains?", "yes", remains, "something remains" in remains)
     )
+
     question = "Is the force of the unseen log predicted better?"
     errors = f"{before:.2%} before, {after:.2%} after"
     asked.append(Asked(question, "error more than halved", errors, after < 0.5 * before))
+
     return asked
 
 

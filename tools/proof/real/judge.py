@@ -60,6 +60,7 @@ class Judge:
         u = self._constants(found, "after")
         acting = effects(found)
         ideal = [e for e in acting if e.stage not in RIG_STAGES]
+
         plain = np.array(
             [
                 0.0 if k.name.startswith(f"{channel}_") else x
@@ -67,6 +68,7 @@ class Judge:
             ]
         )
         added = zip(self.rig.predict(u, acting), self.rig.predict(plain, ideal), strict=True)
+
         return [
             self.measured(n, channel) - (real[channel] - bare[channel])
             for n, (real, bare) in enumerate(added)

@@ -75,10 +75,12 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
     whole = bench.imported("mgst", "judge", *BEGIN, files=["mgst"])
     trials = sorted(seen.glob("*.mcap"))
     said = bench.diagnosed(trials, seen / "mgst.yaml", f"{hidden.name}-all")
+
     held = sorted(
         (h for fold in FOLDS for h in _held(hidden, bench, trials, fold, whole)),
         key=lambda h: h.trial,
     )
+
     rows = [
         (
             h.trial,
@@ -87,6 +89,7 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
         )
         for h in held
     ]
+
     heads = (
         "trial",
         f"concealed [{hidden.unit}]",
@@ -95,11 +98,13 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
         "error before",
         "error after",
     )
+
     label = f"{hidden.read.replace('_', ' ')} [{hidden.unit}]"
     panels = [
         Panel(h.trial, np.stack((h.time, h.true, h.read, h.freed)), "time [s]", label, LABELS)
         for h in (held[n] for n in DRAWN)
     ]
+
     return Finding([said], hidden.ask(said, held), Table(heads, rows), panels)
 
 
@@ -108,15 +113,19 @@ def _held(
 ) -> list[Held]:
     configuration = trials[0].parent / "mgst.yaml"
     others = [t for n, t in enumerate(trials) if n not in fold]
+
     said = bench.diagnosed(
         others, configuration, f"{hidden.name}-without-{'-'.join(str(n + 1) for n in fold)}"
     )
+
     here = [trials[n] for n in fold]
     reads, judge = (
         Judge(here, configuration),
         Judge([whole / t.name for t in here], whole / "mgst.yaml"),
     )
+
     freed = reads.freed(said.found, hidden.read)
+
     return [
         Held(
             t.stem,
@@ -185,6 +194,7 @@ LOST: Mapping[
 def _of_drivetrain(said: Said, held: Sequence[Held]) -> list[Asked]:
     loss = sum(LOST[n](said.values(n)) for n in said.accepted if n in LOST)
     found = f"{loss:.2f} N·m" if loss else "none"
+
     return [
         _differs(said, "torque"),
         _names(said, "a torque loss that does not depend on speed", STEADY_LOSSES, REASON_LOSS),
@@ -240,6 +250,7 @@ DRIVETRAIN = Proof(
 def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:
     taken = float(np.mean([np.nanmean(h.freed - h.read) for h in held]))
     question = "How much drawbar pull does it say is taken, on trials that were held out?"
+
     return [
         _differs(said, "drawbar_pull"),
         _names(said, "the wall's drag", DRAGS, REASON_WALL),

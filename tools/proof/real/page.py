@@ -28,27 +28,36 @@ def _lines(
 ) -> Iterator[str]:
     yield f"### {proof.title}"
     yield ""
+
     yield f"**Concealed.** {flowing(proof.concealed)}"
     yield ""
+
     yield f"**Seen.** {flowing(proof.saw)}"
     yield ""
+
     yield "**Judged.** " + _verdict(finding.asked)
     yield ""
+
     yield from _table(Table(("", "asked", "wanted", "found"), [_row(a) for a in finding.asked]))
     yield ""
     yield from _table(finding.table)
     yield ""
+
     yield f"![{proof.title}](proof-{proof.name}.png)"
     yield ""
+
     yield from _missed([a for a in finding.asked if not a.met])
+
     yield f"**Said**, unedited, in {seconds:.0f} s for all commands of this proof:"
     yield ""
+
     for said in finding.said:
         yield "```"
         yield f"$ {said.command}"
         yield said.text
         yield "```"
         yield ""
+
     others = [c for c in commands if c not in {s.command for s in finding.said}]
     yield "The other commands:"
     yield ""

@@ -32,12 +32,15 @@ def assert_jacobian(
     numeric = np.column_stack(
         [_difference(f, point, index, steps[index]) for index in range(point.size)]
     )
+
     assert analytic.shape == numeric.shape, (
         f"Jacobian has shape {analytic.shape}, expected {numeric.shape}"
     )
+
     scale = np.max(np.abs(numeric * steps), axis=1, keepdims=True)
     error = np.abs(analytic - numeric) * steps
     worst = np.unravel_index(np.argmax(error / (scale + np.finfo(float).tiny)), error.shape)
+
     assert np.all(error <= rtol * scale + atol * steps), (
         f"d f[{worst[0]}] / d x[{worst[1]}]: analytic {analytic[worst]:.12g}, "
         f"differences {numeric[worst]:.12g}"

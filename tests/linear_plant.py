@@ -45,6 +45,7 @@ def readings(settings, truth, schedule, *, seed, rate=50):
     wheel_count, pulley_count = (
         settings.channels[name].calibration.scale.value for name in ENCODERS
     )
+
     for duration, load, slip in schedule:
         theta_1, forces = entry_angle(settings, truth, load, slip)
         volts = (wheel.radius * (1.0 - cos(theta_1)) - pot.offset.value) / pot.scale.value

@@ -91,6 +91,7 @@ def readings_of(
     steps = round(seconds * 250)
     scatter = rng.normal(size=(steps, 2)) * (2e-3 if noise else 0.0)
     readings, held = [], None
+
     for k in range(steps):
         t = k * 0.004
         stamp = start + k * 4_000_000
@@ -105,4 +106,5 @@ def readings_of(
             held = values[name] if held is None else held
             values[name] = held
         readings += [Reading(stamp, channel, value, stamp) for channel, value in values.items()]
+
     return readings

@@ -28,6 +28,7 @@ def recorded():
     sources = {**settings.channels, "wrench": settings.wrench}
     lap = thinned(driven(LAP, 1, 2.0))
     turned = {name: [r.value for r in lap if r.channel == name][-1] for name in ENCODERS}
+
     for number in range(LAPS):
         for reading in lap:
             due, value = reading.received + round(number * LAP * 1e9), reading.value

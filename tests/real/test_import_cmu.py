@@ -128,12 +128,15 @@ def test_penetration_tests_by_body(imported: Path) -> None:
             (row["body"], float(row["depth_mm"]), float(row["force_N"]))
             for row in csv.DictReader(stream)
         ]
+
     plate = np.array([(depth, force) for body, depth, force in points if body == "plate 60 mm"])
     pressure = plate[:, 1] / (np.pi * 0.03**2)
     near = np.abs(plate[:, 0] - 10.0) < 0.5
+
     assert pressure[near].mean() == pytest.approx(9.3e3, rel=0.1), (
         "what config/rig_cmu.yaml says of this sand"
     )
+
     stop = np.array(
         [(depth, force) for body, depth, force in points if body == "rigid stop" and force > 20.0]
     )

@@ -19,12 +19,14 @@ def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
     trial = Physical(tmp_path / "ding2011_smooth.mcap")
     torque = trial.value("motor_shunt") * trial.settings.drive.torque_constant.value
     found = []
+
     for begin in np.arange(6) * 7.0:
         inside = (trial.time("motor_shunt") >= begin) & (trial.time("motor_shunt") < begin + 6.0)
         rim = trial.settings.wheel.radius * trial.speed("wheel_encoder", begin, begin + 6.0)
         slip = 1.0 - trial.speed("carriage_encoder", begin, begin + 6.0) / rim
         found.append((slip, trial.force("fx")[inside].mean(), torque[inside].mean()))
         assert trial.force("fz")[inside] == pytest.approx(80.0)
+
     with (REAL / "ding" / "ding2011_smooth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     columns = ("slip", "meas_drawbar_pull_n", "meas_torque_nm")
@@ -58,6 +60,7 @@ def test_the_drive_keeps_its_published_parameters(tmp_path: Path) -> None:
     assert main(["emps", str(REAL / "emps"), "-o", str(tmp_path)]) == 0
     drive = Physical(tmp_path / "data-emps.mcap")
     assert len(drive.time("wheel_encoder")) == 24841
+
     force = drive.value("motor_shunt") * drive.settings.drive.torque_constant.value
     position = filtfilt(*butter(4, 0.2), drive.value("wheel_encoder"))
     speed = np.gradient(position, 1e-3)
@@ -66,4 +69,5 @@ def test_the_drive_keeps_its_published_parameters(tmp_path: Path) -> None:
         filtfilt(*butter(4, 0.04), values)[..., ::20] for values in (np.array(columns), force)
     )
     mass, viscous, coulomb, _ = np.linalg.lstsq(regressors.T, wanted, rcond=None)[0]
+
     assert (mass, viscous, coulomb) == pytest.approx((95.11, 203.5, 20.39), rel=0.03)

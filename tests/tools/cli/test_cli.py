@@ -253,12 +253,14 @@ def test_slip_resolution_is_what_a_simulated_window_shows(testbed: Settings) -> 
     count = check_config.window_readings(testbed)
     times = np.arange(count) / testbed.rates.tick
     speeds = []
+
     for name, radius, speed in zip(
         ENCODERS, (testbed.wheel.radius, testbed.pulley_radius), (0.02, 0.016), strict=True
     ):
         per_count = noisy[name].calibration.scale.value * radius
         counts = speed / per_count * times + random.normal(0, 0.5, (4000, count))
         speeds.append(np.polyfit(times, (counts * per_count).T, 1)[0])
+
     assert np.std(1 - speeds[1] / speeds[0]) == pytest.approx(
         check_config.slip_sigma(testbed), rel=0.05
     )

@@ -106,11 +106,13 @@ def test_command_prints_and_draws(
         )
         == 0
     )
+
     lines = capsys.readouterr().out.splitlines()
     assert (
         lines[0].split()[:2] == ["run", "torque"] and "[mm]" in lines[0] and "all runs" in lines[3]
     )
     assert any(line.startswith("cohesion c") and "1000 ± 300 Pa" in line for line in lines)
+
     root = ElementTree.fromstring(page.read_text(encoding="utf-8").removeprefix("<!DOCTYPE html>"))
     assert "gritd compare" in "".join(root.itertext()) and ODD in "".join(root.itertext())
     assert len(list(root.iter("figure"))) >= 4
@@ -133,6 +135,7 @@ def test_errors_are_one_line(plain: list[Path], tmp_path: Path) -> None:
     still.write_text("segments:\n  - {duration: 3 s, load: 0 N, slip: 0.1, speed: 20 mm/s}")
     simulate.main(["--schedule", str(still), "-o", str(tmp_path / "lifted.mcap")])
     here = ["--config", str(packaged())]
+
     for arguments, said in (
         (["nowhere.mcap"], "nowhere.mcap"),
         (

@@ -41,12 +41,15 @@ def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
     folder = tmp_path / "run"
     command = [*GRITD, "demo", "--seconds", "5", "--plant", "linear", "--output", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+
     assert done.returncode == 0, done.stdout + done.stderr
+
     lines = done.stdout.splitlines()
     assert any(
         re.match(r" +\d+ s \S+ +slip +-?\d+\.\d% W +\d+\.\d N c +\d+ ± +\d+ Pa tan φ", line)
         for line in lines
     )
+
     for beginning in (
         "c  ",
         "tan φ",
@@ -58,6 +61,7 @@ def test_a_short_demo_runs_reports_draws_and_verifies(tmp_path):
         "log /",
     ):
         assert any(line.startswith(beginning) for line in lines), beginning
+
     counts = [
         int(n)
         for n in re.search(

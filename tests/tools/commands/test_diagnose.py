@@ -74,10 +74,14 @@ def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: 
     RunWriter(empty, (), "a: 1\n", RunInfo()).close()
     cut.write_bytes(run.read_bytes()[:2000])
     line, code = said(empty, "--config", packaged())
+
     assert line.startswith(f"{empty}: found no readings") and code == DAMAGED
+
     line, code = said(cut, "--config", packaged())
     assert line.startswith(f"{cut}: found no readings") and "(" in line and code == DAMAGED
+
     settings = config.load(packaged()).settings
+
     with pytest.raises(
         CommandError, match="found no readings of wheel_encoder; expected both encoders"
     ):

@@ -89,10 +89,12 @@ def test_the_same_on_a_cluster(tmp_path: Path) -> None:
         "host": "127.0.0.1",
         "dashboard_address": None,
     }
+
     with distributed.LocalCluster(processes=True, **options) as cluster:
         found = campaigns.found(tmp_path)
         said = {
             c.folder.name: w
             for c, w in campaigns.diagnosed(found, write_result, 1, cluster.scheduler_address)
         }
+
     assert said["a"] == said["c"] == "consistent" and said["bad"].startswith("not diagnosed")

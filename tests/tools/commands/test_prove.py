@@ -99,12 +99,14 @@ def test_a_batch_that_is_stopped_leaves_nothing_running(tmp_path: Path) -> None:
     code = "import sys; from gritd.tools.commands import prove; "
     code += f"prove.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
     arguments = [*SMALL, "--output", str(tmp_path / "batch")]
+
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], cwd=ROOT, stdout=subprocess.DEVNULL
     ) as process:
         wait_for(lambda: process.poll() is not None or (pid.exists() and pid.read_text()))
         process.terminate()
         assert process.wait(600.0) == 128 + signal.SIGTERM
+
     wait_for(lambda: not Path(f"/proc/{pid.read_text()}").exists())
 
 
@@ -143,6 +145,7 @@ def test_a_diagnosis_that_fails_counts_as_failed(
         str(tmp_path / "b"),
     ]
     assert prove.main(arguments, crash) == 1
+
     out = capsys.readouterr().out
     assert "none → (failed)" in out and "gritd: cannot" in out
 
@@ -175,11 +178,13 @@ def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
         "host": "127.0.0.1",
         "dashboard_address": None,
     }
+
     with distributed.LocalCluster(processes=True, **options) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tcp://127.0.0.1:")
         output = tmp_path / "batch"
         assert prove.main([*SMALL, "--output", str(output), "--scheduler", address], STUB) == 0
+
     here, there = (
         [
             json.loads((folder / "answers" / f"case-000{n}.json").read_text(encoding="utf-8"))[
@@ -189,6 +194,7 @@ def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
         ]
         for folder in (finished, output)
     )
+
     for one, other in zip(here, there, strict=True):
         assert {name: one[name] for name in DRAWN} == {name: other[name] for name in DRAWN}
         assert one["detectability"] == pytest.approx(

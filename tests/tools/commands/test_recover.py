@@ -21,14 +21,17 @@ def test_an_unclosed_recording_becomes_a_closed_one_and_nothing_is_lost(
 ) -> None:
     written = write_sample(tmp_path / "a.mcap", close=False)
     assert main([str(tmp_path / "a.mcap")]) == 0
+
     said = capsys.readouterr()
     assert said.err == "" and said.out.count("\n") == 1
     assert (
         f"saved {len(written)} messages of 8 topics; it was not closed, nothing in it is lost"
         in said.out
     )
+
     recovered = read(tmp_path / "a.recovered.mcap")
     assert recovered.complete and list(recovered.messages()) == written
+
     original = read(tmp_path / "a.mcap")
     assert (recovered.config_yaml, recovered.run) == (original.config_yaml, original.run)
 
@@ -50,10 +53,13 @@ def test_a_damaged_recording_is_saved_in_part(
     data = bytearray((tmp_path / "a.mcap").read_bytes())
     data[data.index(b"\x28\xb5\x2f\xfd", len(data) // 2) + 100] ^= 1  # inside a zstd frame
     (tmp_path / "a.mcap").write_bytes(data)
+
     assert main([str(tmp_path / "a.mcap")]) == 3
+
     said = capsys.readouterr()
     recovered = read(tmp_path / "a.recovered.mcap")
     lost = len(written) - recovered.counts.total()
+
     assert 0 < lost <= 2 * 36 and recovered.complete
     assert (
         f"it was closed, {lost} messages are lost" in said.out
@@ -110,6 +116,7 @@ def test_a_wrong_name_is_usage_and_no_recording_is_damage(
             and streams.err.endswith(f"{said}\n")
             and streams.out == ""
         )
+
     with pytest.raises(SystemExit) as stop:
         main([])
     assert stop.value.code == 2

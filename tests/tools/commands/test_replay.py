@@ -41,6 +41,7 @@ def recorded(tmp_path_factory, configuration):
     state = pipeline.start()
     writer = RunWriter(path, TOPICS, configuration.text, RunInfo(name="test"))
     sent = 0
+
     for _, batch in readings(configuration.settings, TRUTH, SCHEDULE, seed=4, rate=250):
         for stamp, group in groupby(batch, key=lambda reading: reading.stamp):
             consumed = list(group)
@@ -51,7 +52,9 @@ def recorded(tmp_path_factory, configuration):
             sent += 1
             if sent % 50 == 0:
                 writer.flush()
+
     writer.close()
+
     return path
 
 
@@ -78,6 +81,7 @@ def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
     recording = read(recorded)
     writer = RunWriter(changed, TOPICS, configuration.text, recording.run)
     touched = False
+
     for topic, log_time, values in recording.messages():
         if (
             topic == "/raw/motor_shunt"
@@ -86,6 +90,7 @@ def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
         ):
             values, touched = (values[0], values[1] + 1e-12), True
         writer.message(topic, log_time, values)
+
     writer.close()
     assert replay.main([str(changed), "--verify"]) == 1
     assert "ticks differ" in (said := capsys.readouterr().out) and "current: logged" in said
@@ -159,7 +164,9 @@ def test_an_output_that_cannot_be_made_is_refused_before_the_replay(
     (tmp_path / "taken.mcap").write_bytes(b"mine")
     before = recorded.read_bytes()
     target = {"the input": recorded, "its folder": recorded.parent}.get(output, tmp_path / output)
+
     assert cli.main(["replay", str(recorded), "-o", str(target)]) == 2
+
     said = capsys.readouterr()
     assert (
         said.out == ""
@@ -182,6 +189,7 @@ def test_missing_is_usage_and_no_recording_is_damage_wherever_it_stands(recorded
 def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, configuration):
     other = configuration.text.replace("range: [0.1 V, 4.9 V]", "range: [4.8 V, 4.9 V]", 1)
     (tmp_path / "other.yaml").write_text(other, encoding="utf-8")
+
     for output in ([], ["-o", str(tmp_path / "out.mcap")]):
         assert (
             cli.main(["replay", str(recorded), "--config", str(tmp_path / "other.yaml"), *output])
@@ -197,14 +205,17 @@ def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, conf
 def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, configuration):
     writer = RunWriter(tmp_path / "slow.mcap", (), configuration.text, RunInfo())
     recording, kept = read(recorded), {"wheel_encoder": 25, "carriage_encoder": 1, "sinkage_pot": 1}
+
     for channel, step in kept.items():
         rows = recording.arrays(f"/raw/{channel}")[::step]
         for stamp, value in zip(
             rows["stamp"].tolist(), rows[rows.dtype.names[-1]].tolist(), strict=True
         ):
             writer.reading(Reading(stamp, channel, value, stamp))
+
     writer.close()
     assert cli.main(["replay", str(tmp_path / "slow.mcap"), "--engine", "plain"]) == 0
+
     said = capsys.readouterr().err.splitlines()[-1]
     assert (
         "wheel_encoder has 60 readings, never three over half a window of 100 ms; "

@@ -59,8 +59,10 @@ def test_recording_holds_the_truth_through_the_calibration(schedule: Path, tmp_p
         main(["--schedule", str(schedule), "--effect", "coulomb_friction.loss=0.5", "-o", str(out)])
         == 0
     )
+
     settings = config.load(packaged()).settings
     truth, found = np.load(tmp_path / "run.truth.npz"), messages(out)
+
     for name, expected in (
         ("wheel_encoder", truth["wheel_angle"]),
         ("carriage_encoder", truth["carriage_position"] / settings.pulley_radius),
@@ -76,6 +78,7 @@ def test_recording_holds_the_truth_through_the_calibration(schedule: Path, tmp_p
         expected_spread = abs(channel.calibration.scale.value) * channel.noise
         assert np.std(error) == pytest.approx(expected_spread, rel=0.1), name
         assert abs(np.mean(error)) < 5.0 * expected_spread / np.sqrt(raw.size)
+
     wrench = found["/raw/wrench"]
     assert np.mean([m.fz for m in wrench] - truth["sensed_load"]) == pytest.approx(0.0, abs=0.05)  # type: ignore[attr-defined]
     assert np.mean([m.ty for m in wrench] - truth["sensed_torque"]) == pytest.approx(0.0, abs=0.005)  # type: ignore[attr-defined]
@@ -93,6 +96,7 @@ def test_truth_names_soil_effects_and_seed(schedule: Path, tmp_path: Path) -> No
     ]
     main(["--schedule", str(schedule), *options, "-o", str(out)])
     truth = json.loads((tmp_path / "run.truth.json").read_text())
+
     assert truth["effects"] == {"coulomb_friction": {"loss": 1.8}}
     assert truth["soil"]["cohesion"] == 1200.0 and truth["seed"] == 4
 
@@ -123,6 +127,7 @@ def test_motion_follows_the_schedule() -> None:
     schedule = Schedule((Segment(4.0, 50.0, 0.25, 0.02), Segment(4.0, 80.0, -0.2, -0.03)), 0.5)
     motion = motion_of(schedule, 0.1, 100.0)
     early, late = 100, -100
+
     assert motion.wheel_speed[early] == pytest.approx(0.2) and motion.carriage_speed[
         early
     ] == pytest.approx(0.015)
@@ -154,6 +159,7 @@ def test_library_call_gives_readings_in_order_of_receipt() -> None:
         seed=1,
     )
     received = [reading.received for reading in run.readings]
+
     assert received == sorted(received) and len(received) == 5 * 250 + 1
     assert all(reading.received > reading.stamp for reading in run.readings)
 
@@ -291,12 +297,15 @@ def test_a_motion_that_is_missing_or_no_recording_is_told_apart(tmp_path: Path) 
 def test_a_run_too_long_for_memory_is_refused_before_it_is_made(tmp_path: Path) -> None:
     path = tmp_path / "day.yaml"
     path.write_text("segments:\n  - {duration: 24 h, load: 40 N, slip: 0.2, speed: 20 mm/s}")
+
     with pytest.raises(
         CommandError,
         match=r"day\.yaml: found 86400 s, 21600000 samples at 250 Hz; expected at most",
     ):
         main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])
+
     writer = RunWriter(tmp_path / "day.mcap", (), "", RunInfo())
+
     for channel, value in (
         ("wheel_encoder", 1),
         ("carriage_encoder", 1),
@@ -305,6 +314,7 @@ def test_a_run_too_long_for_memory_is_refused_before_it_is_made(tmp_path: Path) 
     ):
         for stamp in (0, 86_400_000_000_000):
             writer.reading(Reading(stamp, channel, value, stamp))
+
     writer.close()
     with pytest.raises(CommandError, match=r"day\.mcap: found 86400 s, 21600000 samples") as error:
         main(["--motion", str(tmp_path / "day.mcap"), "-o", str(tmp_path / "x.mcap")])

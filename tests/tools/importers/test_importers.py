@@ -152,17 +152,22 @@ def test_a_lag_beyond_the_logs_is_refused(tmp_path: Path) -> None:
 def test_a_missing_or_broken_file_is_named(tmp_path: Path) -> None:
     said = complaint("mgst", tmp_path / "none", "-o", tmp_path, code=2)
     assert said.startswith(f"{tmp_path / 'none'}: found nothing there")
+
     for rig in ("mgst", "cmu", "emps", "table"):
         said = complaint(rig, tmp_path, "-o", tmp_path / "out")
         assert said.startswith(f"{tmp_path}") and not re.search(
             r"[\\?|*]", said.removeprefix(f"{tmp_path}")
         )
+
     assert "found no rig log" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+
     mgst_files(tmp_path)
     packed = gzip.compress((tmp_path / RIG).read_bytes())
     (tmp_path / RIG).unlink()
     (tmp_path / f"{RIG}.gz").write_bytes(packed[:-100])
+
     assert f"{RIG}.gz: cannot be read" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+
     (tmp_path / f"{RIG}.gz").write_bytes(packed)
     (tmp_path / SENSOR).unlink()
     assert f"found no sensor log; expected {SENSOR}" in complaint(
@@ -196,7 +201,9 @@ def test_a_table_drives_and_brakes(tmp_path: Path) -> None:
     scale = settings_.channels["wheel_encoder"].calibration.scale.value
     wheel = rows.arrays("/raw/wheel_encoder")["count"] * scale * settings_.wheel.radius
     carriage = rows.arrays("/raw/carriage_encoder")["count"] * 1e-6
+
     assert len(wheel) == 1200
+
     for segment, speeds in ((slice(0, 600), (0.02, 0.016)), (slice(600, 1200), (0.014, 0.02))):
         travelled = (np.ptp(wheel[segment]), np.ptp(carriage[segment]))
         assert travelled == pytest.approx(tuple(speed * 5.99 for speed in speeds), abs=3e-6)

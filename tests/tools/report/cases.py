@@ -44,6 +44,7 @@ def traces(
     time = np.arange(140) / 5.0
     slip = np.repeat([0.1, 0.2, 0.3, 0.45, 0.6], 28)
     still = (time < 1.0) | (time > 27.0)
+
     for load in loads:
         full = {
             "torque": 0.036 * load * (1.0 - np.exp(-6.0 * slip)),
@@ -70,6 +71,7 @@ def traces(
                     SIGMA[channel],
                 )
             )
+
     return tuple(found)
 
 
@@ -83,6 +85,7 @@ def scatter(of: tuple[Trace, ...]) -> Scatter:
         )
         for kind in ("before", "after")
     }
+
     return Scatter(
         "torque",
         "slip",
@@ -112,6 +115,7 @@ def soil(after_c: float, sigma: float, moved: float) -> SoilFit:
         "K": Quantity(1.55e6, 2.1e4, "Pa/m^n"),
     }
     before = after | {"c": Quantity(after_c + moved, sigma, "Pa")} if moved else after
+
     return SoilFit(
         prior, before, after, {"c": moved / 300.0, "tan_phi": 0.1, "k": -0.2, "n": 0.0, "K": 0.2}
     )
@@ -175,6 +179,7 @@ def consistent() -> Diagnosis:
 def explained() -> Diagnosis:
     """One effect, with a rival that the recordings cannot tell from it."""
     drawn = traces(lambda time, slip: 0.13 + 0.1 * slip, LOADS, tuple(SIGMA))
+
     return base(
         verdict="explained",
         summary=(
@@ -255,6 +260,7 @@ def several() -> Diagnosis:
         True,
         "On one stretch of the bed the soil has another cohesion or friction angle.",
     )
+
     return replace(
         explained(),
         hypotheses=(first, patch, second, *rest),
@@ -269,6 +275,7 @@ def unlisted() -> Diagnosis:
         replace(h, probability=p, accepted=False, indistinguishable_from=())
         for h, p in zip(explained().hypotheses, (0.2, 0.1, 0.05, 0.01, 0.0), strict=True)
     )
+
     return base(
         verdict="unlisted",
         summary=(
@@ -306,6 +313,7 @@ def unlisted() -> Diagnosis:
 def insufficient() -> Diagnosis:
     """One short run, no force sensor: most things are unknown."""
     one = traces(None, (70.0,), ("torque", "sinkage"))
+
     return base(
         verdict="insufficient",
         summary=(
@@ -331,6 +339,7 @@ def hostile() -> Diagnosis:
     first = explained()
     best, *others = first.hypotheses
     files = [{"file": evil, "sha256": evil}]
+
     return replace(
         first,
         summary=evil,

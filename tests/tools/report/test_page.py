@@ -60,8 +60,10 @@ def test_page_needs_nothing_from_outside(page: str) -> None:
         for a in e.attrib
         if a in ("src", "href", "action") or a.startswith("on")
     ]
+
     style = "".join(e.text or "" for e in root.iter("style"))
     assert "url(" not in style and "@import" not in style and "@font-face" not in style
+
     policy = next(e.get("content") for e in root.iter("meta") if e.get("http-equiv"))
     assert policy is not None and policy.startswith("default-src 'none'")
 
@@ -70,13 +72,16 @@ def test_every_picture_has_words_and_every_table_its_headings(page: str) -> None
     root = parsed(page)
     pictures = [e for e in root.iter("svg") if e.get("class") == "plot"]
     assert pictures
+
     for picture in pictures:
         assert (
             picture.get("role") == "img"
             and picture[0].tag == "title"
             and len(picture[0].text or "") > 20
         )
+
     assert all(figure.find("figcaption") is not None for figure in root.iter("figure"))
+
     for table in root.iter("table"):
         columns = table.findall("thead/tr/th")
         assert columns and all(th.get("scope") == "col" for th in columns)
@@ -163,6 +168,7 @@ def test_explained_says_everything_it_was_given() -> None:
         "torque scale 0.0040 ± 0.0015",  # a calibration constant that strayed
     ):
         assert text in said, text
+
     assert "sinkage offset" not in said  # it stayed within its uncertainty
 
 
@@ -243,9 +249,12 @@ def test_a_misfit_between_runs_is_drawn_run_by_run_and_once() -> None:
     everywhere = replace(scatter, covariate="constant", x=[1.0] * len(scatter.x))
     page = diagnosis.render(replace(found, scatters=(scatter, everywhere)))
     pictures = [e for e in parsed(page).iter("svg") if "against run" in (e[0].text or "")]
+
     assert len(pictures) == 2  # without and with, not drawn again for the constant
+
     labels = [t.text for t in pictures[0].iter("text")]
     assert all(run in labels for run in ("40 N", "120 N"))
+
     means = [p for p in pictures[0].iter("path") if p.get("class") == "line mean"]
     assert len(means) == len(cases.LOADS)
 
@@ -256,13 +265,17 @@ def test_change_points_are_drawn_and_named() -> None:
     place = replace(found.location[1], changes=(0.3,))
     page = parsed(diagnosis.render(replace(found, location=(place,))))
     lines = [line for line in page.iter("line") if line.get("class") == "change"]
+
     assert len(lines) == 2  # without and with
+
     runs = replace(place, covariate="run", changes=(3.0,))
     scatter = replace(
         found.scatters[0], covariate="run", x=[float(r) for r in found.scatters[0].run]
     )
     page = parsed(diagnosis.render(replace(found, location=(runs,), scatters=(scatter,))))
+
     assert "70 N" in [" ".join(td.itertext()) for td in page.iter("td")]
+
     line = next(line for line in page.iter("line") if line.get("class") == "change")
     labels = {
         t.text: float(t.get("x") or 0) for t in page.iter("text") if t.text in ("55 N", "70 N")

@@ -25,9 +25,12 @@ def test_ticks_are_round_and_inside(low: float, width: float) -> None:
     if not high > low * (1 + 1e-9):
         return
     found = plot.ticks(low, high)
+
     assert 1 <= len(found) <= 5 or width < 1e-9 * abs(low)
+
     slack = 1e-6 * width
     assert all(low - slack <= t <= high + slack for t in found)
+
     steps = np.diff(found)
     if steps.size and width > 1e-6 * abs(low):
         assert np.allclose(steps, steps[0], rtol=1e-3)
@@ -131,6 +134,7 @@ def contrast(one: str, other: str) -> float:
 def test_text_and_curves_stand_out_from_the_paper() -> None:
     found = palettes()
     assert len(found) == 3
+
     for colours in found:
         for name in (
             "ink",

@@ -108,6 +108,7 @@ def test_what_is_no_diagnosis_is_said(tmp_path: Path, text: str) -> None:
 def test_differences_are_named(found: Diagnosis) -> None:
     then = record.Record.of(found)
     assert not list(record.differences(then, then))
+
     now = replace(
         then,
         verdict="unlisted",

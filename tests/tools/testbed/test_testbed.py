@@ -148,6 +148,7 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
             assert process.wait(300) == 0
             elapsed = time.monotonic() - start
             wait_until(lambda: daemon.take() == daemon.take(), 1.0)
+
     if (pause := longest_silence(daemon.readings)) > HELD_UP:
         pytest.skip(
             f"this computer was held up for {pause:.2f} s, which overflows the wires: "
@@ -158,8 +159,10 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
     assert_nearly_all_and_nothing_else(
         by_channel(prepared.run.readings), by_channel(daemon.readings)
     )
+
     ticks = pipeline_over(daemon.settings, daemon.readings)
     assert sum(tick["status"] == Status.TRACKING for tick in ticks) > 500
+
     for name in ("cohesion", "tan_phi"):
         truth, last, before = getattr(prepared.soil, name), ticks[-1], ticks[0]
         assert abs(last[name] - truth) < 3.0 * last[f"{name}_sigma"]
@@ -182,6 +185,7 @@ def pipeline_over(settings, readings):
     state, ticks = pipeline.start(), []
     readings = sorted((r._replace(received=r.stamp) for r in readings), key=lambda r: r.stamp)
     due = 0
+
     for t in range(readings[0].stamp + TICK, readings[-1].stamp, TICK):
         batch = []
         while readings[due].stamp <= t:
@@ -189,6 +193,7 @@ def pipeline_over(settings, readings):
             due += 1
         state, tick = pipeline.step(state, batch, t)
         ticks.append(dict(zip(TICK_NAMES, tick, strict=True)))
+
     return ticks
 
 
@@ -243,6 +248,7 @@ def test_the_linear_plant_carries_the_load_by_eq_21():
     soil = soil_of(settings)
     motion = motion_of(plant.schedule(20.0), settings.wheel.radius, 50.0)
     response = plant.linear_response(settings, soil, motion)
+
     for i in range(100, motion.time.size, 97):
         theta_m = settings.wheel.c1 * response.theta_1[i]
         drop = settings.wheel.radius * (np.cos(theta_m) - np.cos(response.theta_1[i]))
@@ -253,6 +259,7 @@ def test_the_linear_plant_carries_the_load_by_eq_21():
         assert forces.torque * np.sign(motion.wheel_speed[i]) == pytest.approx(
             response.torque[i], rel=1e-6, abs=1e-9
         )
+
     assert not response.overloaded.any()
 
 

@@ -36,6 +36,7 @@ def main(arguments: list[str]) -> int:
         "soil": {"before": soil, "after": soil},
     }  # fmt: skip
     out.write_text(json.dumps(said), encoding="utf-8")
+
     return 0
 
 

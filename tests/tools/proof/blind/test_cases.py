@@ -96,6 +96,7 @@ def test_standstill_tells_friction_from_offset() -> None:
             detector.beside(detector.change([effect]), detector.rivals("current_offset", rng))
             / found
         )
+
     assert left[False] < 0.1 < left[True]
 
 
@@ -103,15 +104,19 @@ def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.Case, tmp_path:
     files = handover.write(null, tmp_path / "given")
     loaded = config.load(tmp_path / "given" / handover.CONFIGURATION)
     true, told = null.trial.world.ground, loaded.settings.soil
+
     assert told.cohesion.value != true.cohesion
     assert abs(told.cohesion.value - float(true.cohesion)) < 3.0 * told.cohesion.sigma
+
     at_rest = read(files[0]).arrays("/raw/motor_shunt")["volts"][:200].mean()
     shunt = loaded.settings.channels["motor_shunt"].calibration
     assert (
         abs(at_rest * shunt.scale.value + shunt.offset.value) < 3.0 * shunt.offset.sigma
     )  # zeroed at rest
+
     recording = read(files[0])
     assert recording.complete and not recording.damage
+
     for topic in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt", "wrench"):
         rows = recording.arrays(f"/raw/{topic}")
         seconds = np.ptp(rows["stamp"]) * 1e-9

@@ -49,6 +49,7 @@ def imported(path: Path) -> set[str]:
             "__import__",
         ):
             pytest.fail(f"{path}: imports by name")
+
     return found
 
 

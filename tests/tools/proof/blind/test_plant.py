@@ -90,7 +90,9 @@ def test_without_effects_it_is_the_papers_wheel() -> None:
         Wheel(RIG.radius, RIG.width), soil, told, (), torque_constant=2.0
     ).sensed
     steady = (np.abs(np.gradient(m.omega, m.step)) < 1e-4) & (np.abs(m.omega) > 0.1)
+
     assert steady.sum() > 200
+
     for name, scale in (("sinkage", 0.01), ("torque", 2.0), ("drawbar_pull", 30.0)):
         mine = {"drawbar_pull": "pull"}.get(name, name)
         difference = np.abs(getattr(felt, mine) - getattr(known, name))[steady]
@@ -119,13 +121,16 @@ def test_an_effect_has_forms_that_differ(name: str) -> None:
     heavier = orders.weight * (1.0 + 0.4 * np.sin(0.8 * orders.time))
     orders = replace(orders, weight=heavier, time=6.0 * orders.time)
     plain, found = drive(WORLD, orders), []
+
     for form in LISTED[name]:
         felt = respond(
             WORLD.with_effects(form.drawn(np.random.default_rng(5), FACTS)), plain.scene.motion
         )
         parts = [(getattr(felt, ch) - getattr(plain, ch)) / FELT[ch] for ch in READ]
         found.append(np.concatenate(parts))
+
     assert len(found) >= 2
+
     for one, other in combinations(found, 2):
         left = one - other * (one @ other) / (other @ other)
         assert np.linalg.norm(left) > 0.005 * np.linalg.norm(one)

@@ -40,6 +40,7 @@ def test_a_name_is_right_by_itself_by_group_or_by_what_the_campaign_can_tell() -
     grouped = single("bed_slope", said("force_crosstalk"))
     stated = single("bed_slope", said("bulldozing", 0.8, "bed_slope"))
     blind = replace(single("bed_slope", said("bulldozing")), inseparable=frozenset(("bulldozing",)))
+
     assert [row.first_right("name") for row in (exact, grouped, stated, blind)] == [
         True,
         False,
@@ -83,6 +84,7 @@ def test_counts_by_stratum_and_level() -> None:
     counted = score.score(rows)
     assert (counted["false_alarms"]["all"]["k"], counted["false_alarms"]["all"]["n"]) == (1, 2)
     assert counted["false_alarms"]["noise as stated"]["k"] == 0
+
     found = counted["detectable_singles"]
     assert (
         found["first"]["name"]["k"],
@@ -91,6 +93,7 @@ def test_counts_by_stratum_and_level() -> None:
     ) == (1, 2, 2)
     assert counted["unlisted"]["recall"]["k"] == 1
     assert counted["confusion"]["grousers"] == {"gear_ripple": 1}
+
     json.dumps(counted, allow_nan=False)
     text = tables.text(counted, rows)
     assert "grousers strong D=60 → gear_ripple p=0.80" in text
@@ -119,9 +122,12 @@ def test_a_seal_holds_only_for_what_was_sealed(tmp_path: Path) -> None:
     closed = seal.close(
         path, {"effect": "bed_slope"}, {"truth.npz": seal.sha256(tmp_path / "truth.npz")}
     )
+
     assert seal.opened(path, closed) == {"effect": "bed_slope"}
+
     again = seal.close(tmp_path / "other.json", {"effect": "bed_slope"})
     assert again != closed  # salted: the same answer cannot be guessed from its seal
+
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("bed_slope", "grousers"), encoding="utf-8")
     with pytest.raises(CommandError, match="other answers than were sealed"):

@@ -95,6 +95,10 @@ def _field(default: float, *rest: Any) -> Any:
     return field(default=default, metadata={"parameter": rest})
 
 
+# covariates that a table of steady states does not have
+COURSE = ("wheel_angle", "position", "time", "heat", "acceleration", "rate", "reversal")
+
+
 class Fingerprint(NamedTuple):
     """Where the effect shows most."""
 
@@ -194,6 +198,13 @@ class Effect:
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
         return tuple(_parameter(f.name, f.default, *f.metadata["parameter"]) for f in fields(cls))
+
+    @classmethod
+    def in_steady_states(cls) -> type[Effect] | None:
+        """The effect as a table of steady states shows it; None where it needs time, place or
+        angle.
+        """
+        return None if cls.fingerprint.covariate in COURSE else cls
 
     @classmethod
     def sentence(cls) -> str:

@@ -47,6 +47,10 @@ class ContactRelaxation(Effect):
     at_start = ()
     confusable_with = told_apart(sensor_latency="speed_step", load_axis_friction="slip_step")
 
+    @classmethod
+    def in_steady_states(cls) -> None:
+        return None
+
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         # at rest the soil's forces fade out, and with them what they lag
         forces = self.forces * np.abs(situation.direction)

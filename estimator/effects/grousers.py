@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.effects.base import Effect, Fingerprint, Parameter, shape, strength, told_apart
 from gritd.estimator.stages.situation import ContactLaw, Reaction, Situation
 from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
+RIPPLE = ("ripple_cos", "ripple_sin", "count")
 HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
 
 
@@ -61,6 +62,10 @@ class Grousers(Effect):
         slip_sinkage="smooth_wheel",
     )
 
+    @classmethod
+    def in_steady_states(cls) -> type[Effect]:
+        return GrousersInMeans
+
     def geometry(self, wheel: Wheel) -> Wheel:
         return replace(wheel, radius=wheel.radius + self.share * self.height)
 
@@ -78,6 +83,16 @@ class Grousers(Effect):
             - ripple * self.height
             + self.digging * _carried(situation.slip),
         )
+
+
+class GrousersInMeans(Grousers):
+    """The lugs of a wheel of which only steady means were measured: no ripple, so no count."""
+
+    fingerprint = Fingerprint("drawbar_pull", "slip", "more pull; deeper at high slip")
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        return tuple(p for p in super().parameters() if p.name not in RIPPLE)
 
 
 def _carried(slip: Scalar) -> Scalar:

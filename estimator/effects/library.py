@@ -2,7 +2,7 @@
 out.
 
 Each module of this package but `base` and this one defines one Effect; the file's name is the
-effect's name. `EFFECTS` finds them.
+effect's name. `EFFECTS` finds them. A subclass of it in the same file is a form of it, not another.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _find() -> dict[str, type[Effect]]:
         own = [
             m
             for m in members
-            if isinstance(m, type) and issubclass(m, Effect) and m.__module__.endswith("." + module)
+            if isinstance(m, type) and Effect in m.__bases__ and m.__module__.endswith("." + module)
         ]
         if len(own) != 1:
             raise TypeError(

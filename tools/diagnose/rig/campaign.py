@@ -82,7 +82,8 @@ def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:
 
 def _at_once(effect: Effect) -> bool:
     """Whether runs may follow one another in one array without touching."""
-    return EFFECTS.get(effect.name) is type(effect) and not effect.by_run
+    listed = EFFECTS.get(effect.name)
+    return listed is not None and isinstance(effect, listed) and not effect.by_run
 
 
 def _filled(motion: Motion) -> Motion:

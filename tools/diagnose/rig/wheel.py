@@ -12,7 +12,7 @@ import numpy as np
 
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.effects import EFFECTS, make
+from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.model.forward import simulate_arrays
@@ -21,6 +21,7 @@ from gritd.estimator.stages.situation import Motion, situation_of
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import ORDER, Campaign, sensed_as
+from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import UNITS, calibration_sigmas, wheel_constants
 from gritd.tools.diagnose.rig.interface import Bools, Foreseen, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
@@ -75,7 +76,7 @@ class WheelRig:
         out = {*LEFT_OUT, *(b.name for b in self.baseline)}
         if not stated:  # the measured load that drives the balance holds its friction already
             out.add("load_axis_friction")
-        self.effects = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in out}
+        self.effects = candidates(signals, out)
 
         self._campaign = Campaign(self._motions, settings, self.channels)
         self._kept: dict[tuple[object, ...], Array] = {}

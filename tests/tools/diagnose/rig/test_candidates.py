@@ -1,0 +1,57 @@
+"""A table of steady states holds no ripple, and no order of time and place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects import EFFECTS
+from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.rig.candidates import candidates, steady_states
+from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+
+def tabled(run: Signals) -> Signals:
+    """The run with silence wherever a speed is changing."""
+    rates = np.gradient(run.wheel_speed, run.time), np.gradient(run.carriage_rate, run.time)
+    changing = np.any([np.abs(r) > 0.1 * np.nanmax(np.abs(r)) for r in rates], axis=0)
+    around = np.convolve(changing, np.ones(5), "same") > 0.0
+    return replace(run, wheel_speed=np.where(around, np.nan, run.wheel_speed))
+
+
+@pytest.fixture(scope="module")
+def driven() -> list[Signals]:
+    return record(plan(seconds=24.0, standstill=False), ())
+
+
+def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:
+    assert not any(map(steady_states, driven))
+    listed = candidates(driven, ("empirical_law",))
+    assert listed.keys() == {n for n, e in EFFECTS.items() if not e.filter_only} - {"empirical_law"}
+    assert all(listed[name] is EFFECTS[name] for name in listed)
+
+
+def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[Signals]) -> None:
+    table = [tabled(run) for run in driven]
+    assert all(map(steady_states, table))
+    left = candidates(table, ())
+    gone = {"gear_ripple", "hub_runout", "soil_patch", "motor_heating", "contact_relaxation"}
+    assert not gone & left.keys()
+    assert {"slip_sinkage", "bulldozing", "coulomb_friction", "rim_friction"} <= left.keys()
+
+
+def test_lugs_dig_and_grip_in_a_table_without_a_count(driven: list[Signals]) -> None:
+    rig = WheelRig([tabled(run) for run in driven], settings())
+    free = [f.parameter.name for f in free_of((rig.effects["grousers"],))]
+    assert free == ["height", "grip", "digging", "share"]
+    lugs = rig.effects["grousers"](digging=5e-3)
+    without = rig.predict(np.zeros(len(rig.constants)), ())
+    dug = rig.predict(np.zeros(len(rig.constants)), (lugs,))
+    assert all(
+        np.max(b["sinkage"] - a["sinkage"]) > 1e-3 for a, b in zip(without, dug, strict=True)
+    )

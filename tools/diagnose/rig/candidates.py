@@ -1,0 +1,43 @@
+"""Which effects the recordings of a wheel can show."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.signals import Signals
+
+TURN = 2.0 * np.pi  # [rad] a recording that goes on for so long is no table
+STEADY = 0.2  # relative range of a speed that does not change
+
+
+def candidates(signals: Sequence[Signals], left_out: Collection[str]) -> dict[str, type[Effect]]:
+    """The effects to look for, by name: of steady states only what they can show."""
+    listed = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in left_out}
+    if not all(steady_states(s) for s in signals):
+        return listed
+    shown = {name: effect.in_steady_states() for name, effect in listed.items()}
+    return {name: effect for name, effect in shown.items() if effect is not None}
+
+
+def steady_states(signals: Signals) -> bool:
+    """Whether a recording is a table of steady states: no speed changes but across a silence, and
+    no stretch lasts a whole turn. Time, place and wheel angle in it mean nothing.
+    """
+    known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
+    stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    return not any(
+        np.ptp(signals.wheel_angle[at]) >= TURN
+        or _changes(signals.wheel_speed[at])
+        or _changes(signals.carriage_rate[at])
+        for at in stretches
+        if at.size
+    )
+
+
+def _changes(speed: Array) -> bool:
+    return float(np.ptp(speed)) > STEADY * float(np.abs(speed).max())

@@ -11,7 +11,8 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import DAMAGED, DONE
 from gritd.tools.commands import recover
-from tests.estimator.recording.test_salvage import HOSTILE, probe, write_sample
+from tests.estimator.recording.hostile import HOSTILE, probe
+from tests.estimator.recording.samples import write_sample
 from tests.scenarios.rig import driven, service
 
 HUGE = "hostile or huge recording"

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.records import ChunkIndex
 
-from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.readings import CHANNELS
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.recording.cdr import BILLION, CODES, STRING, TIME, Codec, Topic, parse_schema
@@ -21,24 +21,8 @@ from gritd.estimator.recording.parts import part_path, parts
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import LOG_TOPIC, RAW_TOPICS
+from tests.estimator.recording.samples import MIXED, T0, mixed_values, reading_of, write_sample
 
-T0 = 1_700_000_000_123_456_789
-MIXED = Topic(
-    "/mixed",
-    "gritd_msgs/msg/Mixed",
-    (
-        ("stamp", TIME, "first"),
-        ("a", "uint8", "one byte, then padding"),
-        ("b", "float64", "[N]"),
-        ("c", "bool", ""),
-        ("d", "uint16", ""),
-        ("later", TIME, "a second time"),
-        ("e", "float32", ""),
-        ("f", "uint8", ""),
-        ("g", "uint64", ""),
-        ("h", "int32", ""),
-    ),
-)
 TICK = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
 
 RANGES = {
@@ -137,51 +121,6 @@ def test_there_is_a_topic_for_every_channel_with_its_fields() -> None:
 
 # --- files ----------------------------------------------------------------------------------------
 # --------------------
-
-
-def reading_of(channel: str, i: int) -> Reading:
-    values: dict[str, object] = {"count": i * 977 - 50, "volts": i / 7.0, "celsius": 20.0 + i / 3.0}
-    value = (
-        tuple(i + k / 3.0 for k in range(6))
-        if channel == "wrench"
-        else values[CHANNELS[channel][0]]
-    )
-    return Reading(T0 + i * 1_000_003, channel, value, T0 + i * 1_000_003 + 250)  # type: ignore[arg-type]
-
-
-def mixed_values(i: int) -> tuple[object, ...]:
-    return (T0 + i, i % 256, i * 0.1, i % 3 == 0, i, T0 - i, i / 4.0, 255 - i % 256, 2**63 + i, -i)
-
-
-def write_sample(
-    path: Path, count: int = 40, close: bool = True, compression: str = "zstd", every: int = 10
-) -> list[tuple[str, int, tuple]]:
-    """Every raw topic, /mixed and /log, several chunks; returns what was written, in order."""
-    writer = RunWriter(
-        path,
-        [MIXED],
-        "wheel: {radius: 0.072}\n",
-        RunInfo("sample", 40.0, notes="ä"),
-        compression=compression,
-    )
-    written: list[tuple[str, int, tuple]] = []
-    for i in range(count):
-        for channel in CHANNELS:
-            reading = reading_of(channel, i)
-            writer.reading(reading)
-            value = reading.value if isinstance(reading.value, tuple) else (reading.value,)
-            written.append((f"/raw/{channel}", reading.received, (reading.stamp, *value)))
-        written.append(("/mixed", T0 + i, mixed_values(i)))
-        writer.message(*written[-1])
-        if i % every == every - 1:
-            written.append(
-                ("/log", T0 + i, (T0 + i, 30, "sync", f"reading {i} late, θ₁", "", "", 7))
-            )
-            writer.message(*written[-1])
-            writer.flush()
-    if close:
-        writer.close()
-    return written
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])

@@ -6,26 +6,22 @@ from __future__ import annotations
 
 import os
 import random
-import struct
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-import zstandard
 from mcap.opcode import Opcode
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, IndexType
 
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import records
-from gritd.estimator.recording.cdr import Codec
 from gritd.estimator.recording.mcapfile import MAGIC, RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import RAW_TOPICS
-from tests.estimator.recording.test_recording import T0, write_sample
+from tests.estimator.recording.hostile import HOSTILE, probe
+from tests.estimator.recording.samples import FOREIGN, T0, write_foreign, write_sample
 
 ENCODER = RAW_TOPICS[0]
 
@@ -148,36 +144,6 @@ def test_a_lying_message_index_changes_nothing(tmp_path: Path) -> None:
 # --- other writers --------------------------------------------------------------------------------
 # --------------------
 
-FOREIGN = "int32 count\nbuiltin_interfaces/Time stamp\nuint8 quality\nfloat32 voltage\n"
-FOREIGN_FIELDS = (
-    ("count", "int32", ""),
-    ("stamp", "builtin_interfaces/Time", ""),
-    ("quality", "uint8", ""),
-    ("voltage", "float32", ""),
-)
-
-
-def write_foreign(path: Path, count: int = 500, schema: str = FOREIGN, **options: object) -> None:
-    """A rig of its own: fields in another order and of other widths, extra topics, the mcap
-    library's writer.
-    """
-    with open(path, "wb") as file:
-        writer = Writer(file, **options)  # type: ignore[arg-type]
-        writer.start()
-        encoder = writer.register_schema("rig/msg/Encoder", "ros2msg", schema.encode())
-        text = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
-        wheel = writer.register_channel("/raw/wheel_encoder", "cdr", encoder)
-        note = writer.register_channel("/note", "cdr", text)
-        blob = writer.register_channel("/blob", "json", 0)
-        codec, string = Codec(FOREIGN_FIELDS), Codec((("data", "string", ""),))
-        for i in range(count):
-            t = T0 + i * 10**6
-            writer.add_message(wheel, t, codec.encode((-i, t - 5, 3, 1.5)) + bytes(i % 4), t)
-            if i % 100 == 0:
-                writer.add_message(note, t, string.encode((f"load {i}",)), t)
-                writer.add_message(blob, t, b'{"a": 1}', t)
-        writer.finish()
-
 
 @pytest.mark.parametrize(
     "options",
@@ -271,89 +237,6 @@ def test_a_contradicting_definition_is_not_followed(tmp_path: Path) -> None:
 
 # --- hostile --------------------------------------------------------------------------------------
 # --------------------
-
-
-def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
-    return struct.pack("<BQ", opcode, len(body) if length is None else length) + body
-
-
-def text(value: str) -> bytes:
-    return struct.pack("<I", len(value)) + value.encode()
-
-
-def chunk(data: bytes, size: int, compression: str = "zstd", stored: int | None = None) -> bytes:
-    head = struct.pack("<QQQI", 0, 0, size, 0) + text(compression)
-    return record(6, head + struct.pack("<Q", len(data) if stored is None else stored) + data)
-
-
-HEADER = MAGIC + record(1, text("") + text("x"))
-HUGE = 2**64 - 1
-ZEROS = zstandard.compress(bytes(20 << 20))
-SMALLEST = record(5, bytes(22)) * 500_000  # messages of channel 0, which does not exist
-UNSIZED = zstandard.ZstdCompressor(write_content_size=False).compress(bytes(1 << 28))
-HOSTILE = {
-    "not mcap": lambda: b"\x7fELF" + bytes(100),
-    "empty": lambda: b"",
-    "magic only": lambda: MAGIC,
-    "huge record": lambda: HEADER + record(6, b"", HUGE),
-    "huge stored": lambda: HEADER + chunk(b"x", 10, stored=HUGE),
-    "huge size": lambda: HEADER + chunk(b"x", HUGE),
-    "bomb": lambda: HEADER + chunk(ZEROS, 20 << 20) * 50,
-    "bomb within the ratio": lambda: HEADER + chunk(ZEROS + os.urandom(40_000), 20 << 20) * 50,
-    "bomb that understates": lambda: HEADER + chunk(ZEROS, 1000) * 500,
-    "bomb without a size": lambda: HEADER + chunk(UNSIZED, 1000),
-    "unknown compression": lambda: HEADER + chunk(b"x" * 100, 100, "brotli"),
-    "endless small messages": lambda: (
-        HEADER + chunk(zstandard.compress(SMALLEST) + bytes(1 << 15), len(SMALLEST)) * 20
-    ),
-    "huge schema": lambda: (
-        HEADER + record(3, struct.pack("<H", 1) + text("a") + text("ros2msg") + b"\xff" * 4)
-    ),
-    "huge metadata": lambda: HEADER + record(12, text("gritd.run") + b"\xff\xff\xff\xff"),
-    "all chunk heads": lambda: HEADER + b"\x06" * (30 << 20),
-    "heads within heads": lambda: HEADER + chunk(b"", 64, stored=0)[:-8] * 100_000,
-    "empty chunks": lambda: HEADER + chunk(b"", 0, "") * 20_000,
-    "footer to nowhere": lambda: HEADER + record(2, struct.pack("<QQI", HUGE, HUGE, 0)) + MAGIC,
-    "footer to itself": lambda: HEADER + record(2, struct.pack("<QQI", len(HEADER), 0, 0)) + MAGIC,
-}
-
-PROBE = r"""
-import re, resource, sys, time
-resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
-from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.salvage import read
-try:
-    recording = read(sys.argv[1])
-    said = f"{sum(1 for _ in recording.messages())} messages, {recording.damage[:1]}"
-except RecordingError as error:
-    said = f"RecordingError: {error}"
-with open("/proc/self/status") as status:  # ru_maxrss would count what the parent held when it forked
-    peak = int(re.search(r"VmHWM:\s+(\d+) kB", status.read())[1])
-print(f"{time.process_time():.2f} s, {peak / 1024:.0f} MB: {said}")
-"""
-
-
-def probe(path: Path) -> tuple[float, float, str]:
-    """Seconds of processor time, peak MB and what was said, in a process of its own whose address
-    space is bounded.
-    """
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(Path(__file__).parents[3]),
-        "OPENBLAS_NUM_THREADS": "1",
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", PROBE, str(path)],
-        capture_output=True,
-        text=True,
-        timeout=600,
-        env=environment,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    numbers, said = done.stdout.split(": ", 1)
-    seconds, _, memory, _ = numbers.replace(",", "").split()
-    return float(seconds), float(memory), said
 
 
 @pytest.mark.parametrize("name", sorted(HOSTILE))

@@ -22,7 +22,7 @@ from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.syncer import Syncer
 from gritd.estimator.recording.writer import WriterStatus, WriterThread
-from tests.estimator.recording.test_recording import MIXED, T0, mixed_values
+from tests.estimator.recording.samples import MIXED, T0, mixed_values
 
 REPOSITORY = Path(__file__).parents[3]
 

@@ -12,8 +12,7 @@ from gritd.estimator.recording.blocks import records
 from gritd.estimator.recording.salvage import read
 from gritd.tools import main as cli
 from gritd.tools.commands.recover import main
-from tests.estimator.recording.test_recording import write_sample
-from tests.estimator.recording.test_salvage import write_foreign
+from tests.estimator.recording.samples import write_foreign, write_sample
 
 
 def test_an_unclosed_recording_becomes_a_closed_one_and_nothing_is_lost(

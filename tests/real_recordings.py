@@ -14,7 +14,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording import salvage
 
-REAL = Path(__file__).parents[3] / "shared" / "real"
+REAL = Path(__file__).parents[2] / "shared" / "real"
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.commands.import_rig import main
-from tests.real.data import REAL, Physical, needs
+from tests.real_recordings import REAL, Physical, needs
 
 pytestmark = needs("mgst")
 

@@ -16,8 +16,8 @@ from gritd.tools.diagnose.rig.signals import drive_series
 from gritd.tools.proof.real import cmu, ding, emps, mgst
 from gritd.tools.proof.real.bench import Bench
 from gritd.tools.proof.real.proof import Asked, Finding, Proof
-from tests.real.data import REAL, needs
-from tests.tools.diagnose.rig.test_drive import fitted
+from tests.real_recordings import REAL, needs
+from tests.tools.diagnose.rig.drives import fitted
 
 
 def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Asked]]:

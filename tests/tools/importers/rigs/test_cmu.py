@@ -10,7 +10,7 @@ import pytest
 
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands.import_rig import main
-from tests.real.data import REAL, Physical, needs
+from tests.real_recordings import REAL, Physical, needs
 
 pytestmark = needs("cmu")
 

@@ -14,6 +14,7 @@ from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.workers import workers
 from gritd.tools.proof.blind import batch, page, score, tables, trial
+from gritd.tools.proof.blind.plant.worlds import FOREIGN, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import STRATA
 from gritd.tools.proof.blind.verdicts import Row, row
 
@@ -46,18 +47,22 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
 
 
 def _started(arguments: argparse.Namespace) -> batch.Batch:
-    chosen = _strata(arguments.strata)
+    chosen = _some_of("--strata", arguments.strata, STRATA)
+    worlds = _some_of("--worlds", arguments.worlds, WORLDS)
+    if "foreign" in chosen and worlds == (PAPER,):
+        reason = f"--worlds {PAPER}: found no foreign world for the stratum foreign; expected"
+        raise CommandError(f"{reason} one of {','.join(FOREIGN)}", USAGE)
     arguments.output.mkdir(parents=True, exist_ok=True)
-    return batch.started(arguments.output, arguments.cases, chosen, arguments.seed)
+    return batch.started(arguments.output, arguments.cases, chosen, arguments.seed, worlds)
 
 
-def _strata(text: str) -> tuple[str, ...]:
-    chosen = tuple(text.split(",")) if text else STRATA
-    unknown = [name for name in chosen if name not in STRATA]
+def _some_of(option: str, text: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of a list, all of them where nothing is said. Raises CommandError."""
+    chosen = tuple(text.split(",")) if text else known
+    unknown = [name for name in chosen if name not in known]
     if unknown:
-        raise CommandError(
-            f"--strata {text}: found '{unknown[0]}'; expected some of {','.join(STRATA)}", USAGE
-        )
+        reason = f"found '{unknown[0]}'; expected some of {','.join(known)}"
+        raise CommandError(f"{option} {text}: {reason}", USAGE)
     return chosen
 
 
@@ -110,6 +115,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--strata", default="", metavar="A,B", help=f"some of {','.join(STRATA)}; default: all"
+    )
+    parser.add_argument(
+        "--worlds",
+        default="",
+        metavar="A,B",
+        help=f"of the strata foreign and pair, some of {','.join(WORLDS)}; default: all",
     )
     parser.add_argument(
         "--output", type=Path, default=OUTPUT, metavar="DIR", help=f"default {OUTPUT}"

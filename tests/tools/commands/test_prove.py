@@ -17,6 +17,16 @@ from gritd.tools.proof.blind import batch, trial
 ROOT = Path(__file__).resolve().parents[4]
 STUB = (sys.executable, "-m", "tests.tools.proof.blind.stub")
 DRAWN = ("case", "seed", "stratum", "effects", "soil", "habits", "runs", "chain", "noise_factor")
+ENVIRONMENT = {
+    "PATH",
+    "HOME",
+    "LANG",
+    "TMPDIR",
+    "PYTHONPATH",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "LC_CTYPE",
+}
 SMALL = ["--cases", "2", "--seed", "3", "--jobs", "1", "--strata", "none"]
 
 
@@ -33,10 +43,26 @@ def test_the_diagnosis_sees_recordings_and_configuration_only(finished: Path) ->
         said = json.loads(result.read_text(encoding="utf-8"))
         runs = [name for name in said["seen"] if name.startswith("run-")]
         assert runs and set(said["seen"]) - set(runs) == {"testbed.yaml", "testbed.dbc"}
-        assert set(said["environment"]) <= {
-            "PATH", "HOME", "LANG", "TMPDIR", "PYTHONPATH", "OMP_NUM_THREADS",
-            "OPENBLAS_NUM_THREADS", "LC_CTYPE",
-        }  # fmt: skip
+        assert set(said["environment"]) <= ENVIRONMENT
+
+
+def test_a_pair_is_asked_for_with_its_reference(tmp_path: Path) -> None:
+    arguments = ["--cases", "2", "--seed", "3", "--jobs", "1", "--output", str(tmp_path)]
+    arguments += ["--strata", "pair", "--worlds", "paper,strips"]
+    assert prove.main(arguments, STUB) == 0
+    for result in tmp_path.glob("cases/*/result.json"):
+        said = json.loads(result.read_text(encoding="utf-8"))
+        assert {"reference", "new", "testbed.yaml", "testbed.dbc"} == {
+            name.split("/")[0] for name in said["seen"]
+        }
+        asked = said["asked"]
+        before, after = asked.index("--reference"), asked.index("--config")
+        assert all(name.startswith("new/run-") for name in asked[:before])
+        assert all(name.startswith("reference/run-") for name in asked[before + 1 : after])
+        assert asked[asked.index("--bed") + 1] in ("same", "prepared")
+        assert len([name for name in said["seen"] if name.endswith(".mcap")]) == after - 1
+    counted = json.loads((tmp_path / "score.json").read_text(encoding="utf-8"))
+    assert counted["cases"] == 2
 
 
 def test_seals_are_told_before_and_hold_after(finished: Path) -> None:

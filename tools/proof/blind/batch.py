@@ -15,6 +15,7 @@ import numpy as np
 
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.proof.blind import seal, strata, trial
+from gritd.tools.proof.blind.plant.worlds import WORLDS
 from gritd.tools.proof.blind.trial import Spec
 
 BATCH, SECRET = "batch.json", "answers/batch.json"
@@ -30,13 +31,13 @@ class Batch:
     output: Path
     cases: int
     strata: tuple[str, ...]
+    worlds: tuple[str, ...]
     secret: str
     sealed: str
 
     def specs(self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE) -> list[Spec]:
         rng = np.random.default_rng(_number(self.secret, "assignments"))
-        drawn = strata.assignments(self.cases, rng, self.strata)
-
+        drawn = strata.assignments(self.cases, rng, self.strata, self.worlds)
         return [
             Spec(
                 number,
@@ -55,18 +56,25 @@ def _number(secret: str, purpose: str) -> int:
     return int.from_bytes(hashlib.sha256(f"{secret}/{purpose}".encode()).digest()[:8], "big") >> 1
 
 
-def started(output: Path, cases: int, chosen: tuple[str, ...], seed: int | None) -> Batch:
+def started(
+    output: Path,
+    cases: int,
+    chosen: tuple[str, ...],
+    seed: int | None,
+    worlds: tuple[str, ...] = WORLDS,
+) -> Batch:
     """A new batch, from the operating system's randomness or from a seed. Raises CommandError where
     one is there.
     """
     if (output / BATCH).exists():
         raise CommandError(f"{output}: found a batch; expected a new folder, or --resume", USAGE)
     secret = secrets.token_hex(32) if seed is None else f"seed {seed}"
-    sealed = seal.close(output / SECRET, {"secret": secret, "cases": cases, "strata": list(chosen)})
+    told = {"cases": cases, "strata": list(chosen), "worlds": list(worlds)}
+    sealed = seal.close(output / SECRET, {"secret": secret, **told})
     (output / "answers").chmod(0o700)
-    public = {"cases": cases, "strata": list(chosen), "seal": sealed}
+    public = {**told, "seal": sealed}
     (output / BATCH).write_text(json.dumps(public, indent=1), encoding="utf-8")
-    return Batch(output, cases, chosen, secret, sealed)
+    return Batch(output, cases, chosen, worlds, secret, sealed)
 
 
 def resumed(output: Path) -> Batch:
@@ -79,7 +87,12 @@ def resumed(output: Path) -> Batch:
         ) from None
     answers = seal.opened(output / SECRET, public["seal"])
     return Batch(
-        output, answers["cases"], tuple(answers["strata"]), answers["secret"], public["seal"]
+        output,
+        answers["cases"],
+        tuple(answers["strata"]),
+        tuple(answers["worlds"]),
+        answers["secret"],
+        public["seal"],
     )
 
 

@@ -58,6 +58,7 @@ class Habits:
     second_pass: bool | None = None
     speeds: bool | None = None
     wrench: bool | None = None
+    weighed: bool = False  # runs do not state their load, the wrench tells it
 
 
 def habits_drawn(rng: np.random.Generator, fixed: Habits | None = None) -> Habits:

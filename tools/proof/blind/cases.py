@@ -12,10 +12,13 @@ import numpy as np
 from gritd.tools.proof.blind import campaign, detect, knowledge
 from gritd.tools.proof.blind.detect import Detector, Trial
 from gritd.tools.proof.blind.groups import NEEDED
+from gritd.tools.proof.blind.plant import worlds
 from gritd.tools.proof.blind.plant.concealed import LISTED
 from gritd.tools.proof.blind.plant.concealed import drawn as effect_drawn
+from gritd.tools.proof.blind.plant.contact import Ground
 from gritd.tools.proof.blind.plant.effect import Effect
 from gritd.tools.proof.blind.plant.respond import World
+from gritd.tools.proof.blind.plant.scene import Rig
 from gritd.tools.proof.blind.strata import LEVELS, Assignment
 
 ATTEMPTS = 25  # campaigns tried until one shows the effect as strongly as wanted
@@ -28,6 +31,7 @@ CHANNELS = {
     "torque": "axle_torque",
 }
 HEAVIEST = 400.0  # [N]
+TALL = 0.4  # stated noise over true where the true is 2.5 times the stated
 WRONG_NOISE = {
     True: 0.5,
     False: 0.3,
@@ -44,6 +48,7 @@ class Case:
     family: str
     habits: campaign.Habits
     trial: Trial  # its world holds the concealed effects
+    reference: Trial | None  # the campaign before, without them
     noise_factor: float  # stated noise over true
     detectability: float  # D of all concealed effects together
     single: tuple[float, ...]  # D of each
@@ -63,8 +68,7 @@ class Case:
 
     def answers(self) -> dict[str, Any]:
         """As JSON types."""
-        ground = self.trial.world.ground
-
+        world, before = self.trial.world, self.reference
         return {
             "case": self.number,
             "seed": self.seed,
@@ -75,22 +79,28 @@ class Case:
             "inseparable": self.inseparable,
             "oracle_variance": self.oracle_variance,
             "concealed": [
-                {
-                    "name": e.name,
-                    "form": type(e).__name__,
-                    **asdict(e),
-                    "coinciding": e.coinciding(),
-                }
-                for e in self.effects
+                _told(effect) | {"coinciding": effect.coinciding()} for effect in self.effects
             ],
+            "world_habits": [_told(effect) for effect in world.habits],
+            "world_bed": {"form": type(world.bed).__name__, **vars(world.bed)},
             "soil_family": self.family,
-            "soil": {name: float(value) for name, value in asdict(ground).items()},
+            "soil": _soil(self.trial),
+            "reference_soil": None if before is None else _soil(before),
             "habits": asdict(self.habits),
             "noise_factor": self.noise_factor,
             "runs": [asdict(run) for run in self.trial.runs],
+            "reference_runs": [asdict(run) for run in before.runs] if before else [],
             "chain": asdict(self.trial.chain),
-            "rig": asdict(self.trial.world.rig),
+            "rig": asdict(world.rig),
         }
+
+
+def _told(effect: Effect) -> dict[str, Any]:
+    return {"name": effect.name, "form": type(effect).__name__, **asdict(effect)}
+
+
+def _soil(trial: Trial) -> dict[str, float]:
+    return {name: float(value) for name, value in asdict(trial.world.ground).items()}
 
 
 def drawn(number: int, seed: int, assignment: Assignment) -> Case:
@@ -114,7 +124,7 @@ def _attempt(
     number: int, seed: int, assignment: Assignment, wanted: float, rng: np.random.Generator
 ) -> Case:
     habits = campaign.habits_drawn(rng, _fixed(assignment))
-    family, trial = _trial(habits, rng)
+    family, trial, reference = _trials(habits, assignment, rng)
     detector = Detector(trial)
     facts = detector.facts()
 
@@ -128,8 +138,9 @@ def _attempt(
         assignment=assignment,
         family=family,
         habits=habits,
-        trial=replace(trial, world=replace(trial.world, effects=effects)),
-        noise_factor=noise_factor(not effects, rng),
+        trial=replace(trial, world=trial.world.with_effects(*effects)),
+        reference=reference,
+        noise_factor=TALL if assignment.noise == "tall" else noise_factor(not effects, rng),
         detectability=detector.detectability(effects) if effects else 0.0,
         single=tuple(found for _, found in fitted),
         inseparable={},
@@ -144,26 +155,59 @@ def _fixed(assignment: Assignment) -> campaign.Habits:
     return campaign.Habits(**fixed)
 
 
-def _trial(habits: campaign.Habits, rng: np.random.Generator) -> tuple[str, Trial]:
-    """Soil, rig, knowledge, sensors and campaign, in this order; campaigns that would bog the wheel
-    are not driven.
-    """
+def _trials(
+    habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
+) -> tuple[str, Trial, Trial | None]:
+    """Soil family, the campaign, and the reference campaign before it, if any."""
+    family, trial = _trial(habits, assignment, rng)
+    if not assignment.pair:
+        return family, trial, None
+    runs = _runs(trial.world.rig, trial.world.ground, habits, rng)
+    reference = replace(trial, runs=runs)
+    if assignment.bed == "prepared":
+        ground = knowledge.prepared(trial.world.ground, rng)
+        trial = replace(trial, world=replace(trial.world, ground=ground))
+    return family, trial, reference
+
+
+def _trial(
+    habits: campaign.Habits, assignment: Assignment, rng: np.random.Generator
+) -> tuple[str, Trial]:
+    """Soil, rig, world, knowledge, sensors and campaign."""
     while True:
         family, ground = knowledge.ground_drawn(rng)
         rig = knowledge.rig_drawn(rng)
         runs = campaign.campaign(rig, ground, habits, rng)
-
-        heaviest = max(run.weight for run in runs)
-        if (
-            min(run.weight for run in runs) >= 4.0
-            and heaviest <= HEAVIEST
-            and campaign.deepest(rig, ground, heaviest) < 1.15
-        ):
+        if _drivable(rig, ground, runs):
             break
-
+    heaviest = max(run.weight for run in runs)
     known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
     rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
-    return family, Trial(World(rig, ground), known, knowledge.chain_drawn(known, rng), runs)
+    bed, own = worlds.drawn(assignment.world, rng, worlds.Size(heaviest, rig.radius))
+    chain = knowledge.chain_drawn(known, rng)
+    if assignment.noise == "slow":
+        chain = knowledge.slowed(chain)
+    return family, Trial(World(rig, ground, bed=bed, habits=own), known, chain, runs)
+
+
+def _runs(
+    rig: Rig, ground: Ground, habits: campaign.Habits, rng: np.random.Generator
+) -> tuple[campaign.Run, ...]:
+    """Another campaign of the same rig."""
+    while True:
+        runs = campaign.campaign(rig, ground, habits, rng)
+        if _drivable(rig, ground, runs):
+            return runs
+
+
+def _drivable(rig: Rig, ground: Ground, runs: tuple[campaign.Run, ...]) -> bool:
+    """Whether no load bogs the wheel, nor is too small or too large for a testbed."""
+    weights = [run.weight for run in runs]
+    return (
+        min(weights) >= 4.0
+        and max(weights) <= HEAVIEST
+        and campaign.deepest(rig, ground, max(weights)) < 1.15
+    )
 
 
 def noise_factor(nothing: bool, rng: np.random.Generator) -> float:

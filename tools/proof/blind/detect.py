@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular, toeplitz
+from scipy.linalg import cho_solve
 
 from gritd.tools.proof.blind import campaign
 from gritd.tools.proof.blind.knowledge import Knowledge
@@ -26,11 +26,21 @@ from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.respond import World, responses
 from gritd.tools.proof.blind.plant.scene import Felt, Motion
-from gritd.tools.proof.blind.plant.sensors import Chain, Converter
+from gritd.tools.proof.blind.plant.sensors import Chain
 from gritd.tools.proof.blind.plant.servo import summed
+from gritd.tools.proof.blind.whitening import (
+    INSTRUMENT,
+    RATE,
+    Signals,
+    channels,
+    held_out,
+    less,
+    noise_roots,
+    one_by_one,
+    scaled,
+    whitened,
+)
 
-RATE = 5.0  # [Hz]
-FLOOR, FLOOR_TIME = 0.003, 1.0  # of the channel's root mean square; [s]
 SMALL = 0.02  # of a prior sigma: step of the differences
 LIMIT = 5.0  # D at the detection limit: five sigma
 NEAR = 3.0  # two effects that differ by less than this D cannot be told apart in a campaign
@@ -51,9 +61,6 @@ class Trial:
         return self.chain.wrench is not None
 
 
-Signals = list[dict[str, Array]]  # a dict of channels for every run, SI
-
-
 class Detector:
     """What one campaign can see."""
 
@@ -62,8 +69,9 @@ class Detector:
         self._motions = [_motion(run, trial) for run in trial.runs]
         bare = trial.world.with_effects()
         self._bare = responses([(bare, motion) for motion in self._motions], damped=False)
-        self._roots = [_roots(trial, felt) for felt in self._bare]
-        self._nuisance = [*self._soil(), *self._weights(), *self._calibration()]
+        self._roots = [noise_roots(trial.chain, felt) for felt in self._bare]
+        self._own = self._misfit(())  # a leaking sensor misleads without concealed effects, too
+        self._nuisance = [*self._soil_and_weights(), *self._calibration()]
         self._columns = np.stack([self._whitened(column) for column in self._nuisance], axis=1)
         self._factor = np.linalg.cholesky(
             self._columns.T @ self._columns + np.eye(self._columns.shape[1])
@@ -128,8 +136,7 @@ class Detector:
             *self._nuisance,
             *(self._strength(effects, place) for place in range(len(effects))),
         ]
-
-        held = _held_out([motion.time.size for motion in self._motions])
+        held = held_out([motion.time.size for motion in self._motions])
         sums: dict[str, list[Array]] = {}
 
         for run, inside in held:
@@ -139,9 +146,6 @@ class Detector:
                 sums.setdefault(channel, []).append(((rows @ covariance) * rows).sum(axis=1))
 
         return {channel: float(np.concatenate(parts).mean()) for channel, parts in sums.items()}
-
-    # ---- parts -----------------------------------------------------------------------------------
-    # --------------------
 
     def _covariance(self, columns: Sequence[Signals], run: int, inside: Array) -> Array:
         """Of the columns' amplitudes after a fit to everything but these samples of a run, unit
@@ -162,21 +166,22 @@ class Detector:
         step = 0.05
         moved = list(effects)
         moved[place] = replace(effects[place], strength=effects[place].strength * (1.0 + step))
-        return _scaled(_less(self._changes(moved), self._changes(effects)), 1.0 / step)
+        return scaled(less(self._changes(moved), self._changes(effects)), 1.0 / step)
 
     def _left(self, change: Array) -> float:
         shadow = self._columns.T @ change
         return float(change @ change - shadow @ cho_solve((self._factor, True), shadow))
 
     def _changes(self, effects: Sequence[Effect]) -> Signals:
+        """What the effects change in what is read beyond what is predicted."""
+        return less(self._misfit(effects), self._own)
+
+    def _misfit(self, effects: Sequence[Effect]) -> Signals:
         """Read with the effects, less predicted without from the motion and load that were read."""
         world = self._trial.world.with_effects(*effects)
         near = [bare.scene for bare in self._bare]
         felt = responses([(world, motion) for motion in self._motions], False, near)
-        return [
-            {name: read[name] - expected[name] for name in read}
-            for read, expected in zip(map(self._read, felt), self._expected(felt), strict=True)
-        ]
+        return less([self._read(one) for one in felt], self._expected(felt))
 
     def _read(self, felt: Felt) -> dict[str, Array]:
         return channels(felt, self._trial.wrench)
@@ -192,46 +197,36 @@ class Detector:
         return found
 
     def _whitened(self, signals: Signals) -> Array:
-        return np.concatenate(
-            [
-                solve_triangular(roots[name], values, lower=True)
-                for run, roots in zip(signals, self._roots, strict=True)
-                for name, values in run.items()
-            ]
-        )
+        return whitened(signals, self._roots)
 
-    def _soil(self) -> list[Signals]:
-        """One sigma of each soil parameter."""
-        ground = self._trial.world.ground
-        moved = [
-            replace(ground, **{name: float(getattr(ground, name)) + SMALL * stated.sigma})
-            for name, stated in self._trial.known.soil.items()
-        ]
-        return [_scaled(self._moved(ground=other), 1.0 / SMALL) for other in moved]
-
-    def _weights(self) -> list[Signals]:
-        """One sigma of the weights, half of it alike in all runs, half each run's own; and of the
-        carriage's travel.
+    def _soil_and_weights(self) -> list[Signals]:
+        """One sigma of each soil parameter; of the weights, half of it alike in all runs, half each
+        run's own; and of the carriage's travel.
         """
-        half = self._trial.known.weight_share / np.sqrt(2.0)
-        alike = _scaled(self._moved(heavier=SMALL * half), 1.0 / SMALL)
-        carriage = self._trial.known.instruments["carriage_encoder"].scale
-        faster = SMALL * carriage.sigma / carriage.value
-        return [alike, *_one_by_one(alike), _scaled(self._moved(faster=faster), 1.0 / SMALL)]
+        known, ground = self._trial.known, self._trial.world.ground
+        soils = [
+            replace(ground, **{name: float(getattr(ground, name)) + SMALL * stated.sigma})
+            for name, stated in known.soil.items()
+        ]
+        half = known.weight_share / float(np.sqrt(2.0))
+        carriage = known.instruments["carriage_encoder"].scale
+        faster = carriage.sigma / carriage.value
+        moved = [(soil, 0.0, 0.0) for soil in soils]
+        moved += [(ground, SMALL * half, 0.0), (ground, 0.0, SMALL * faster)]
+        *found, alike, driven = (scaled(change, 1.0 / SMALL) for change in self._moved(moved))
+        return [*found, alike, *one_by_one(alike), driven]
 
-    def _moved(
-        self, ground: Ground | None = None, heavier: float = 0.0, faster: float = 0.0
-    ) -> Signals:
-        """Change by another soil, heavier weights or a faster carriage, either by a share."""
-        trial = self._trial
-        world = replace(trial.world, ground=ground or trial.world.ground, effects=())
-        told = [
-            replace(m, weight=m.weight * (1.0 + heavier), speed=m.speed * (1.0 + faster))
+    def _moved(self, variants: Sequence[tuple[Ground, float, float]]) -> list[Signals]:
+        """Changes by another soil, heavier weights or a faster carriage, either by a share."""
+        asked = [
+            (replace(self._trial.world, ground=ground, effects=()), _faster(m, heavier, faster))
+            for ground, heavier, faster in variants
             for m in self._motions
         ]
-        near = [bare.scene for bare in self._bare]
-        felt = responses([(world, motion) for motion in told], False, near)
-        return _less([self._read(one) for one in felt], [self._read(bare) for bare in self._bare])
+        near = [bare.scene for bare in self._bare] * len(variants)
+        felt = [self._read(one) for one in responses(asked, False, near)]
+        bare, runs = [self._read(one) for one in self._bare], len(self._motions)
+        return [less(felt[k : k + runs], bare) for k in range(0, len(felt), runs)]
 
     def _calibration(self) -> list[Signals]:
         """One sigma of offset and gain of each channel, the torque constant's in the current's."""
@@ -258,54 +253,6 @@ class Detector:
         ]
 
 
-def _less(one: Signals, other: Signals) -> Signals:
-    return [{name: a[name] - b[name] for name in a} for a, b in zip(one, other, strict=True)]
-
-
-def _scaled(signals: Signals, factor: float) -> Signals:
-    return [{name: factor * values for name, values in run.items()} for run in signals]
-
-
-def _one_by_one(signals: Signals) -> list[Signals]:
-    """The change in one run alone, for every run."""
-    return [
-        _scaled_by(signals, [float(n == place) for n in range(len(signals))])
-        for place in range(len(signals))
-    ]
-
-
-def _scaled_by(signals: Signals, factors: Sequence[float]) -> Signals:
-    return [_scaled([run], factor)[0] for run, factor in zip(signals, factors, strict=True)]
-
-
-def _held_out(sizes: Sequence[int]) -> list[tuple[int, Array]]:
-    """What is held out in turn: a run and a mask (n,) of its samples. Whole runs, or thirds of a
-    single one.
-    """
-    if len(sizes) > 1:
-        return [(run, np.ones(size, dtype=bool)) for run, size in enumerate(sizes)]
-    third = np.arange(sizes[0]) * 3 // sizes[0]
-    return [(0, third == part) for part in range(3)]
-
-
-INSTRUMENT = {
-    "sinkage": "sinkage_pot",
-    "current": "motor_shunt",
-    "pull": "drawbar_pull",
-    "load": "load",
-    "torque": "torque",
-}
-
-
-def channels(felt: Felt, wrench: bool) -> dict[str, Array]:
-    """Every analogue channel that the campaign records; a lifted wheel's sinkage says nothing."""
-    down = felt.scene.motion.weight > 1.0
-    found = {"sinkage": felt.sinkage * down, "current": felt.current}
-    return (
-        found | {"pull": felt.pull, "load": felt.load, "torque": felt.torque} if wrench else found
-    )
-
-
 def _told(felt: Felt, trial: Trial) -> Motion:
     """The motion and load that an engineer sees: the encoders' and the force sensor's."""
     motion = felt.scene.motion
@@ -318,6 +265,16 @@ def _told(felt: Felt, trial: Trial) -> Motion:
     return replace(motion, **changed) if changed else motion
 
 
+def _faster(motion: Motion, heavier: float, faster: float) -> Motion:
+    """The same run with weights and travel larger by a share."""
+    return replace(
+        motion,
+        weight=motion.weight * (1.0 + heavier),
+        speed=motion.speed * (1.0 + faster),
+        travel=motion.travel[0] + (motion.travel - motion.travel[0]) * (1.0 + faster),
+    )
+
+
 def _motion(run: campaign.Run, trial: Trial) -> Motion:
     orders = campaign.orders(run, trial.known.radius, RATE)
     step = 1.0 / RATE
@@ -325,35 +282,6 @@ def _motion(run: campaign.Run, trial: Trial) -> Motion:
     return Motion(
         orders.time, turn, orders.omega, travel, orders.speed, orders.weight, orders.passes
     )
-
-
-def _roots(trial: Trial, felt: Felt) -> dict[str, Array]:
-    """Cholesky factor of each channel's noise covariance at RATE, in SI (n, n)."""
-    converters = {c.channel: c for c in (*trial.chain.converters, *(trial.chain.wrench or ()))}
-    read = channels(felt, trial.wrench)
-    sizes = {name: float(np.sqrt(np.mean(values**2))) for name, values in read.items()}
-    return {
-        name: _root(converters[INSTRUMENT[name]], values.size, sizes[name])
-        for name, values in read.items()
-    }
-
-
-def _root(converter: Converter, count: int, size: float) -> Array:
-    noise, apart = converter.noise, np.arange(count) / RATE
-    white = np.zeros(count)
-    white[0] = (noise.white**2 + converter.quantum**2 / 12.0) * RATE / converter.rate
-    times = (0.1 * noise.time, noise.time, 10.0 * noise.time) if noise.pink else (noise.time,)
-    slow = sum((_mean_square(t) * np.exp(-apart / t) for t in times), start=np.zeros(count))
-    own = abs(converter.scale) ** 2 * (white + noise.colour**2 / len(times) * slow)
-    covariance = toeplitz(own + (FLOOR * size) ** 2 * np.exp(-apart / FLOOR_TIME))
-    root: Array = np.linalg.cholesky(covariance + 1e-12 * covariance[0, 0] * np.eye(count))
-    return root
-
-
-def _mean_square(time: float) -> float:
-    """Variance of the mean over one interval of unit noise with this correlation time [s]."""
-    x = 1.0 / (RATE * time)
-    return float(2.0 * (x - 1.0 + np.exp(-x)) / x**2)
 
 
 def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Effect, float]:

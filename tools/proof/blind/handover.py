@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -16,38 +16,81 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.proof.blind import campaign
 from gritd.tools.proof.blind.cases import Case
+from gritd.tools.proof.blind.detect import Trial
 from gritd.tools.proof.blind.knowledge import Instrument, Knowledge, Stated
 from gritd.tools.proof.blind.plant.quadrature import Array
-from gritd.tools.proof.blind.plant.respond import drive
+from gritd.tools.proof.blind.plant.respond import Orders, drives
 from gritd.tools.proof.blind.plant.scene import Felt
 from gritd.tools.proof.blind.plant.sensors import readings
 
 NS = 1_000_000_000
 FIRST = 1_790_000_000 * NS  # [ns since the epoch] about when campaigns begin
+DAY = 86_400 * NS  # from a reference campaign to the new one
 CONFIGURATION = "testbed.yaml"
+REFERENCE, NEW = "reference", "new"  # folders of a pair's recordings
 TRUTH_RATE = 50.0  # [Hz] of the noiseless channels that judge held-out errors
 
 
-def write(case: Case, folder: Path) -> list[Path]:
-    """testbed.yaml, its CAN database and run-1.mcap … in a new folder. Returns the recordings.
-    Raises OSError.
+class Driven(NamedTuple):
+    """A campaign as it was driven: the concealed truth, without noise."""
+
+    folder: str  # in which its recordings are handed over; none where there is one campaign alone
+    trial: Trial
+    begins: tuple[int, ...]  # of each run [ns since the epoch]
+    felt: list[Felt]  # of each run
+
+    def name(self, number: int) -> str:
+        """Of a run, counted from 0, as its recording tells it."""
+        return f"{self.folder or 'run'}-{number + 1}"
+
+
+def driven(case: Case) -> list[Driven]:
+    """The campaigns of a case, the reference first."""
+    alone = not case.reference
+    found = [] if case.reference is None else [_driven(case, case.reference, REFERENCE, 0)]
+    return [*found, _driven(case, case.trial, "" if alone else NEW, 0 if alone else DAY)]
+
+
+def _driven(case: Case, trial: Trial, folder: str, later: int) -> Driven:
+    begun = FIRST + case.seed % 10_000_000 * NS + later
+    begins = tuple(begun + round(run.begins * NS) for run in trial.runs)
+    return Driven(
+        folder, trial, begins, drives(trial.world, [_orders(case, run) for run in trial.runs])
+    )
+
+
+def _orders(case: Case, run: campaign.Run) -> Orders:
+    """What is told to the controllers, under the weights as they truly are."""
+    orders = campaign.orders(run, case.trial.known.radius)
+    share = 1.0 + _weight_error(case, run.weight)
+    return campaign.with_weight(orders, orders.weight * share)
+
+
+def write(case: Case, campaigns: Sequence[Driven], folder: Path) -> list[Path]:
+    """testbed.yaml, its CAN database and run-1.mcap … of each campaign in a new folder. Returns the
+    recordings. Raises OSError.
     """
     folder.mkdir(parents=True)
     text = configuration(case.stated(), case.trial.runs[0].weight)
     (folder / CONFIGURATION).write_text(text, encoding="utf-8")
     shutil.copyfile(packaged("testbed.dbc"), folder / "testbed.dbc")
     rng = np.random.default_rng((case.seed, 1))
-    return [_record(case, number, text, folder, rng) for number in range(len(case.trial.runs))]
+    return [
+        _record(case, one, number, text, folder / one.folder, rng)
+        for one in campaigns
+        for number in range(len(one.felt))
+    ]
 
 
-def _record(case: Case, number: int, text: str, folder: Path, rng: np.random.Generator) -> Path:
-    run = case.trial.runs[number]
-    sent = readings(
-        case.trial.chain, driven(case, number), case.trial.known.pulley, begins(case, number), rng
-    )
+def _record(
+    case: Case, one: Driven, number: int, text: str, folder: Path, rng: np.random.Generator
+) -> Path:
+    run, trial = one.trial.runs[number], one.trial
+    sent = readings(trial.chain, one.felt[number], trial.known.pulley, one.begins[number], rng)
+    load = None if case.habits.weighed else run.weight
+    folder.mkdir(exist_ok=True)
     path = folder / f"run-{number + 1}.mcap"
-    info = RunInfo(f"run-{number + 1}", run.weight, run.passes, run.start)
-    _written(path, text, info, sent)
+    _written(path, text, RunInfo(one.name(number), load, run.passes, run.start), sent)
     return path
 
 
@@ -60,20 +103,6 @@ def _written(path: Path, text: str, info: RunInfo, sent: Sequence[Reading]) -> N
         writer.close()
 
 
-def begins(case: Case, number: int) -> int:
-    """When a run begins [ns since the epoch]."""
-    day = case.seed % 10_000_000
-    return FIRST + day * NS + round(case.trial.runs[number].begins * NS)
-
-
-def driven(case: Case, number: int) -> Felt:
-    """One run of the concealed truth, without noise."""
-    trial, run = case.trial, case.trial.runs[number]
-    orders = campaign.orders(run, trial.known.radius)
-    share = 1.0 + _weight_error(case, run.weight)
-    return drive(trial.world, campaign.with_weight(orders, orders.weight * share))
-
-
 def _weight_error(case: Case, weight: float) -> float:
     """Relative error of the weights, within their sigma: half the carriage's, half the plates'."""
     sources = ((case.seed, 2), (case.seed, 3, round(weight * 1e3)))
@@ -84,11 +113,11 @@ def _weight_error(case: Case, weight: float) -> float:
     return case.trial.known.weight_share * sum(drawn) / float(np.sqrt(2.0))
 
 
-def truth(case: Case, number: int) -> dict[str, Array]:
+def truth(one: Driven, number: int) -> dict[str, Array]:
     """One run's noiseless channels as the configured calibration shows them, SI, at TRUTH_RATE;
     time from its start.
     """
-    felt, known, chain = driven(case, number), case.trial.known, case.trial.chain
+    felt, known, chain = one.felt[number], one.trial.known, one.trial.chain
     every = round(campaign.RATE / TRUTH_RATE)
     true = {c.channel: c for c in (*chain.converters, *(chain.wrench or ()))}
 
@@ -112,9 +141,6 @@ def truth(case: Case, number: int) -> dict[str, Array]:
             for name, values in wrench
         }
     return told
-
-
-# --- configuration ---
 
 
 def configuration(known: Knowledge, nominal: float) -> str:

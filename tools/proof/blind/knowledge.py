@@ -30,6 +30,15 @@ SPREAD = {
     "exponent": 0.04,
     "modulus": 0.25,
 }
+# Relative standard deviations from one preparation of the bed to the next.
+REPEATABILITY = {
+    "cohesion": 0.04,
+    "tan_phi": 0.01,
+    "shear_modulus": 0.04,
+    "exponent": 0.005,
+    "modulus": 0.04,
+}
+SLOW, SLOW_SHARE = 1.95, 0.9  # [s] correlation 0.95 over 0.1 s; share of the noise that is slow
 
 
 @dataclass(frozen=True)
@@ -204,6 +213,33 @@ def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Convert
     return Converter(
         name, scale, offset, noise, quantum, low, high, 0.0 if encoder else 1e-3, 250.0
     )
+
+
+def slowed(chain: Chain) -> Chain:
+    """The same sensors with noise as large, nine tenths of it correlated over SLOW."""
+    wrench = chain.wrench
+    if wrench is not None:
+        pull, load, torque = wrench
+        wrench = (_slowed(pull), _slowed(load), _slowed(torque))
+    return replace(chain, converters=tuple(_slowed(one) for one in chain.converters), wrench=wrench)
+
+
+def _slowed(one: Converter) -> Converter:
+    if one.channel.endswith("_encoder"):
+        return one
+    total = float(np.hypot(one.noise.white, one.noise.colour))
+    white = total * float(np.sqrt(1.0 - SLOW_SHARE**2))
+    return replace(one, noise=Noise(white, SLOW_SHARE * total, SLOW))
+
+
+def prepared(ground: Ground, rng: np.random.Generator) -> Ground:
+    """The soil after the bed was prepared anew, within its repeatability."""
+    drawn = {
+        name: getattr(ground, name)
+        * (1.0 + share * float(np.clip(rng.standard_normal(), -2.5, 2.5)))
+        for name, share in REPEATABILITY.items()
+    }
+    return replace(ground, **drawn)
 
 
 def _calibrated(said: Instrument, rng: np.random.Generator) -> tuple[float, float]:

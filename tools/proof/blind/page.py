@@ -9,6 +9,7 @@ from html import escape
 from typing import Any
 
 from gritd.tools.proof.blind import tables
+from gritd.tools.proof.blind.plant.concealed import UNLISTED as CONCEALED
 from gritd.tools.proof.blind.verdicts import FAILED, INSUFFICIENT, NOTHING, UNLISTED, Row
 
 STYLE = """
@@ -19,16 +20,17 @@ STYLE = """
     --hit: 90, 190, 150; --miss: 226, 120, 84; }
 }
 * { box-sizing: border-box; }
-body { margin: 2rem auto; max-width: 72rem; padding: 0 1rem; background: var(--paper);
-       color: var(--ink); font: 1rem/1.5 Georgia, "Times New Roman", serif; }
+body { margin: 2rem auto; max-width: 72rem; padding: 0 1rem;
+       background: var(--paper); color: var(--ink);
+       font: 1rem/1.5 Georgia, "Times New Roman", serif; }
 h1 { font-size: 1.7rem; line-height: 1.2; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 p, li { max-width: 44rem; } code { font-size: 0.88em; overflow-wrap: anywhere; }
 td.inset { padding-left: 1.8rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font: 0.85rem/1.4 system-ui, sans-serif;
         font-variant-numeric: tabular-nums; }
-th, td { border-bottom: 1px solid var(--rule); padding: 0.25rem 0.6rem; text-align: left;
-         white-space: nowrap; }
+th, td { border-bottom: 1px solid var(--rule); padding: 0.25rem 0.6rem;
+         text-align: left; white-space: nowrap; }
 thead th { color: var(--faint); font-weight: 600; }
 .matrix td { text-align: center; padding: 0.1rem 0.3rem; min-width: 1.7rem;
              border: 1px solid var(--rule); }
@@ -38,26 +40,23 @@ thead th { color: var(--faint); font-weight: 600; }
 .faint { color: var(--faint); }
 @media print { body { margin: 0; max-width: none; font-size: 10pt; } .wide { overflow: visible; } }
 """
+FIGURES = "Figures"  # the table without a head
 OTHERS = (NOTHING, UNLISTED, INSUFFICIENT, FAILED, "(one of them)", "(another)")
 
 
 def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
     """The whole page."""
+    drawn = (
+        f"<p>{score['cases']} cases, drawn and simulated by an independent plant. The answers were "
+        "sealed before the first diagnosis; SHA-256 of the batch:<br>"
+        f"<code>{escape(seal)}</code></p>"
+    )
     parts = [
         "<h1>Blind trials of <code>gritd diagnose</code></h1>",
-        f"<p>{score['cases']} cases, drawn and simulated by an independent plant. "
-        "The answers were sealed before the "
-        f"first diagnosis; SHA-256 of the batch:<br><code>{escape(seal)}</code></p>",
-        "<h2>Figures</h2>",
-        _table(tables.headline(score)),
-        "<h2>By stratum and strength</h2>",
-        _table(tables.strata(score), head=True),
-        "<h2>Stated probability, and how often it was right</h2>",
-        _table(tables.reliability(score), head=True),
-        "<h2>Soil</h2>",
-        _table(tables.soil(score), head=True),
-        "<h2>Confusion matrix</h2><p>Rows: what was concealed. Columns: what was named first. "
-        "A filled cell on its own name is a hit; shading is the share of the row.</p>",
+        drawn,
+        *(_section(heading, table) for heading, table in tables.all_tables(score).items()),
+        "<h2>Confusion matrix</h2><p>Rows: what was concealed. Columns: what was named first. A "
+        "filled cell on its own name is a hit; shading is the share of the row.</p>",
         _matrix(score["confusion"]),
         "<h2>By effect</h2><p>Single effects at all strengths, whether detectable or not.</p>",
         _effects(score["effects"]),
@@ -66,6 +65,10 @@ def page(score: Mapping[str, Any], rows: Sequence[Row], seal: str) -> str:
     ]
 
     return _document("".join(parts))
+
+
+def _section(heading: str, table: tables.Table) -> str:
+    return f"<h2>{escape(heading)}</h2>{_table(table, head=heading != FIGURES)}"
 
 
 def _document(body: str) -> str:
@@ -112,17 +115,19 @@ def _matrix_row(truth: str, row: Mapping[str, int], names: Iterable[str]) -> str
 
 
 def _hit(truth: str, name: str) -> bool:
-    if truth.startswith("unlisted: "):
-        return name == UNLISTED
+    """`truth` as in `score.confusion`: a stratum and a colon may stand before it."""
+    _, _, concealed = truth.rpartition(": ")
     right = {"(none)": NOTHING, "(two effects)": "(one of them)"}
-    return name == right.get(truth, truth)
+    right |= dict.fromkeys(CONCEALED, UNLISTED)
+    return name == right.get(concealed, concealed)
 
 
 def _cell(count: int, total: int, hit: bool) -> str:
     if not count:
         return "<td></td>"
-    colour, opacity = "--hit" if hit else "--miss", 0.15 + 0.6 * count / total
-    return f'<td style="background: rgba(var({colour}), {opacity:.2f})">{count}</td>'
+    colour = "--hit" if hit else "--miss"
+    shade = f"rgba(var({colour}), {0.15 + 0.6 * count / total:.2f})"
+    return f'<td style="background: {shade}">{count}</td>'
 
 
 def _effects(effects: Mapping[str, Any]) -> str:

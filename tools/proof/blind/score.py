@@ -7,96 +7,86 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
-from gritd.tools.proof.blind.strata import LEVELS, STRATA
-from gritd.tools.proof.blind.verdicts import Row
+from gritd.tools.proof.blind import score_worlds
+from gritd.tools.proof.blind.shares import counted, quantiles
+from gritd.tools.proof.blind.strata import AWKWARD, LEVELS, STRATA
+from gritd.tools.proof.blind.verdicts import Row, Said
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
-DETECTABLE = 0.9 * LEVELS["weak"]  # times the detection limit
+SURE = 0.9  # stated probability from which a name is meant to be relied on
 BY = ("name", "table", "engine", "plant")  # how a name counts as right
-
-
-@dataclass(frozen=True)
-class Share:
-    """k of n, with the 95 % interval of Clopper and Pearson (1934)."""
-
-    k: int
-    n: int
-    low: float
-    high: float
-
-    @property
-    def value(self) -> float:
-        return self.k / self.n if self.n else math.nan
-
-
-def share(outcomes: Iterable[bool]) -> Share:
-    given = list(outcomes)
-    k, n = sum(given), len(given)
-    low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
-    high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
-    return Share(k, n, low, high)
+AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair"))
+ONE = ("single", "absorbed", "confounded")  # strata with one listed effect
 
 
 def score(rows: Sequence[Row]) -> dict[str, Any]:
-    """Everything, as JSON types."""
-    effects = [row for row in rows if row.truth]
+    """Everything, as JSON types. What is not said to be of foreign worlds or pairs is of campaigns
+    alone in the paper's world.
+    """
+    home = [row for row in rows if row.stratum in AT_HOME]
+    effects = [row for row in home if row.truth]
     singles = [row for row in effects if row.stratum in ("single", "absorbed")]
-    detectable = [row for row in singles if row.detectability >= DETECTABLE * row.limit]
-
+    detectable = [row for row in singles if row.detectable]
     return {
         "cases": len(rows),
-        "failed": _share(row.verdict == "failed" for row in rows),
-        "false_alarms": _false_alarms(
-            [row for row in rows if not row.truth and row.verdict != "failed"]
-        ),
+        "failed": counted(row.verdict == "failed" for row in rows),
+        "false_alarms": _false_alarms([row for row in home if not row.truth]),
         "detectable_singles": _names(detectable),
+        "companions": _companions([row for row in effects if row.stratum != "unlisted"]),
         "strata": _strata(rows),
         "effects": {
             name: _names([r for r in singles if r.truth == (name,)])
             for name in sorted(_true_names(singles))
         },
-        "two": _two([row for row in rows if row.stratum == "two"]),
-        "unlisted": _unlisted([row for row in rows if row.stratum == "unlisted"]),
-        "calibration": calibration(rows),
-        "soil": {name: _soil(of) for name, of in _soil_groups(rows).items()},
+        "two": _two([row for row in home if row.stratum == "two"]),
+        "unlisted": unlisted([row for row in home if row.stratum == "unlisted"]),
+        "calibration": calibration(home),
+        "accepted": accepted(home),
+        "soil": {name: score_worlds.soil(of) for name, of in _soil_groups(rows).items()},
         "parameters": _coverage(row.parameters for row in effects),
-        "heldout": {name: _heldout(of) for name, of in _heldout_groups(rows, detectable).items()},
+        "heldout": {name: heldout(of) for name, of in _heldout_groups(home, detectable).items()},
+        "foreign": score_worlds.foreign([row for row in rows if row.stratum == "foreign"]),
+        "pairs": score_worlds.pairs([row for row in rows if row.pair]),
         "confusion": confusion(rows),
-        "seconds": _quantiles([row.seconds for row in rows]),
+        "seconds": quantiles([row.seconds for row in rows]),
+        "seconds of pairs": quantiles([row.seconds for row in rows if row.pair]),
     }
-
-
-def _share(outcomes: Iterable[bool]) -> dict[str, Any]:
-    return asdict(share(outcomes))
 
 
 def _true_names(rows: Iterable[Row]) -> set[str]:
     return {name for row in rows for name in row.truth}
 
 
-def _false_alarms(nulls: Sequence[Row]) -> dict[str, Any]:
+def _false_alarms(given: Sequence[Row]) -> dict[str, Any]:
+    nulls = [row for row in given if row.verdict != "failed"]
+    usual = [row for row in nulls if row.stratum == "none"]
+    ways = {one.level: [row for row in nulls if row.level == one.level] for one in AWKWARD}
     return {
-        "all": _share(row.alarmed for row in nulls),
-        "noise as stated": _share(row.alarmed for row in nulls if row.noise_factor == 1.0),
-        "noise misstated": _share(row.alarmed for row in nulls if row.noise_factor != 1.0),
-        "insufficient": _share(row.verdict == "insufficient" for row in nulls),
+        "all": counted(row.alarmed for row in nulls),
+        "noise as stated": counted(row.alarmed for row in usual if row.noise_factor == 1.0),
+        "noise misstated": counted(row.alarmed for row in usual if row.noise_factor != 1.0),
+        "awkward": {way: counted(row.alarmed for row in of) for way, of in ways.items()},
+        "insufficient": counted(row.verdict == "insufficient" for row in nulls),
     }
 
 
 def _names(rows: Sequence[Row]) -> dict[str, Any]:
     return {
-        "detected": _share(row.alarmed for row in rows),
-        "first": {by: _share(row.first_right(by) for row in rows) for by in BY},
-        "three": {by: _share(row.three_right(by) for row in rows) for by in BY},
-        "given": {by: _quantiles([row.given(by) for row in rows]) for by in BY},
+        "detected": counted(row.alarmed for row in rows),
+        "first": {by: counted(row.first_right(by) for row in rows) for by in BY},
+        "three": {by: counted(row.three_right(by) for row in rows) for by in BY},
+        "given": {by: quantiles([row.given(by) for row in rows]) for by in BY},
     }
+
+
+def _companions(rows: Sequence[Row]) -> dict[str, Any]:
+    """Campaigns with one or two listed effects: a further name accepted that is not there."""
+    return {by: counted(row.false_companion(by) for row in rows) for by in ("table", "engine")}
 
 
 def _strata(rows: Sequence[Row]) -> dict[str, Any]:
@@ -104,41 +94,41 @@ def _strata(rows: Sequence[Row]) -> dict[str, Any]:
     found = {}
     for stratum in STRATA:
         inside = [row for row in rows if row.stratum == stratum]
-        for level in ("", *LEVELS):
+        levels = sorted({row.level for row in inside}, key=_order)
+        for level in ("", *(levels if len(levels) > 1 else ())):
             chosen = [row for row in inside if level in ("", row.level)]
-            if chosen and (not level or len({row.level for row in inside}) > 1):
-                found[f"{stratum} {level}".strip()] = _names(chosen)
-    return found
+            found[f"{stratum} {level}".strip()] = _names(chosen)
+    return {name: of for name, of in found.items() if of["detected"]["n"]}
+
+
+def _order(level: str) -> tuple[int, str]:
+    """Levels of strength from weak to strong, others by name."""
+    return (list(LEVELS).index(level) if level in LEVELS else -1, level)
 
 
 def _two(rows: Sequence[Row]) -> dict[str, Any]:
-    def accepted(row: Row) -> list[str]:
-        return (
-            [said.effect for said in row.hypotheses if said.accepted]
-            if row.verdict == "explained"
-            else []
-        )
-
     return {
-        "one named": _share(
-            any(row.right(name, "table") for name in accepted(row)) for row in rows
+        "one named": counted(
+            any(row.said_right(said, "table") for said in row.accepted) for row in rows
         ),
-        "both named": _share(set(row.truth) <= set(accepted(row)) for row in rows),
-        "a wrong one accepted": _share(
-            any(not row.right(name, "table") for name in accepted(row)) for row in rows
+        "both named": counted(row.both_named() for row in rows),
+        "both named by group": counted(row.both_named("table") for row in rows),
+        "a wrong one accepted": counted(
+            any(not row.said_right(said, "table") for said in row.accepted) for row in rows
         ),
     }
 
 
-def _unlisted(rows: Sequence[Row]) -> dict[str, Any]:
-    detectable = [row for row in rows if row.detectability >= DETECTABLE * row.limit]
+def unlisted(rows: Sequence[Row]) -> dict[str, Any]:
+    """Of campaigns with physics outside the list that one who knows all else would see."""
+    seen = [row for row in rows if row.detectable]
     return {
-        "recall": _share(row.verdict == "unlisted" for row in detectable),
-        "recall of those alarmed": _share(
-            row.verdict == "unlisted" for row in detectable if row.alarmed
+        "recall": counted(row.verdict == "unlisted" for row in seen),
+        "recall of those alarmed": counted(
+            row.verdict == "unlisted" for row in seen if row.alarmed
         ),
-        "listed name above one half": _share(
-            row.first is not None and row.first.probability > 0.5 for row in detectable
+        "listed name above one half": counted(
+            row.first is not None and row.first.probability > 0.5 for row in seen
         ),
     }
 
@@ -148,57 +138,46 @@ def calibration(rows: Sequence[Row]) -> dict[str, Any]:
     was right.
     """
     spoken = [(row, row.first) for row in rows if row.first is not None]
+    return {by: _reliable(spoken, by) for by in ("name", "engine")}
+
+
+def accepted(rows: Sequence[Row]) -> dict[str, Any]:
+    """The same of all names that are accepted, and of those that are stated as sure."""
+    spoken = [(row, said) for row in rows for said in row.accepted]
+    sure = [(row, said) for row, said in spoken if said.probability >= SURE]
+    return {
+        by: _reliable(spoken, by)
+        | {"sure": counted(row.said_right(said, by) for row, said in sure)}
+        for by in ("name", "table", "engine")
+    }
+
+
+def _reliable(spoken: Sequence[tuple[Row, Said]], by: str) -> dict[str, Any]:
     stated = np.array([said.probability for _, said in spoken])
-    found: dict[str, Any] = {}
-    for by in ("name", "engine"):
-        right = np.array([row.first_right(by) for row, _ in spoken], dtype=float)
-        table = [_bin(stated, right, low, high) for low, high in pairwise(BINS)]
-        brier = float(np.mean((stated - right) ** 2)) if spoken else None
-        found[by] = {"table": table, "brier": brier}
-    return found
+    right = np.array([row.said_right(said, by) for row, said in spoken], dtype=float)
+    table = [_bin(stated, right, low, high) for low, high in pairwise(BINS)]
+    return {"table": table, "brier": float(np.mean((stated - right) ** 2)) if spoken else None}
 
 
 def _bin(stated: Any, right: Any, low: float, high: float) -> dict[str, Any]:
     inside = (stated >= low) & ((stated < high) | ((high == 1.0) & (stated <= 1.0)))
     mean = float(stated[inside].mean()) if inside.any() else None
-    return {
-        "from": low,
-        "to": high,
-        "stated": mean,
-        "right": _share(bool(value) for value in right[inside]),
-    }
+    share = counted(bool(value) for value in right[inside])
+    return {"from": low, "to": high, "stated": mean, "right": share}
 
 
 def _soil_groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    return {
-        name: [row for row in rows if row.stratum == name]
-        for name in ("none", "single", "absorbed")
-    }
-
-
-def _soil(rows: Sequence[Row]) -> dict[str, Any]:
-    found = {}
-
-    for name in ("c", "tan_phi"):
-        before, after = (
-            [row.soil[name][when] for row in rows if name in row.soil]
-            for when in ("before", "after")
-        )
-        inside = [row.soil[name]["z_after"] for row in rows if name in row.soil]
-        found[name] = {
-            "before": _quantiles(before),
-            "after": _quantiles(after),
-            "within two sigma after": _share(abs(z) < 2.0 for z in inside if math.isfinite(z)),
-        }
-
-    return found
+    """By what is concealed; of foreign worlds and pairs all together."""
+    groups = {"none": ("none",), "awkward": ("awkward",), "one effect": ONE}
+    groups |= {name: (name,) for name in ("absorbed", "two", "unlisted", "foreign", "pair")}
+    return {name: [row for row in rows if row.stratum in of] for name, of in groups.items()}
 
 
 def _coverage(parameters: Iterable[Mapping[str, float]]) -> dict[str, Any]:
     z = [value for found in parameters for value in found.values() if math.isfinite(value)]
     return {
-        "within one sigma": _share(abs(v) < 1.0 for v in z),
-        "within two sigma": _share(abs(v) < 2.0 for v in z),
+        "within one sigma": counted(abs(v) < 1.0 for v in z),
+        "within two sigma": counted(abs(v) < 2.0 for v in z),
     }
 
 
@@ -211,9 +190,10 @@ def _heldout_groups(rows: Sequence[Row], detectable: Sequence[Row]) -> dict[str,
     }
 
 
-def _heldout(rows: Sequence[Row]) -> dict[str, Any]:
+def heldout(rows: Sequence[Row]) -> dict[str, Any]:
+    """Held-out errors over the oracle's."""
     return {
-        f"over {oracle}": _quantiles([row.excess(oracle) for row in rows])
+        f"over {oracle}": quantiles([row.excess(oracle) for row in rows])
         for oracle in ("fitted", "truth")
     }
 
@@ -222,22 +202,20 @@ def confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
     """truth → what was said first → how often; two effects count under both names joined."""
     counts: dict[str, Counter[str]] = {}
     for row in rows:
-        truth = " + ".join(row.truth) or "(none)"
-        truth = f"unlisted: {truth}" if row.stratum == "unlisted" else truth
-        truth = "(two effects)" if len(row.truth) > 1 else truth
-        counts.setdefault(truth, Counter())[_heard(row)] += 1
-    return {truth: dict(counted) for truth, counted in sorted(counts.items())}
+        counts.setdefault(_heading(row), Counter())[_heard(row)] += 1
+    return {truth: dict(of) for truth, of in sorted(counts.items())}
+
+
+def _heading(row: Row) -> str:
+    if len(row.truth) > 1:
+        return "(two effects)"
+    truth = " + ".join(row.truth) or "(none)"
+    if row.stratum in ("unlisted", "foreign", "pair"):
+        truth = f"{row.stratum}: {truth}"
+    return truth
 
 
 def _heard(row: Row) -> str:
     if len(row.truth) > 1 and row.first is not None:
         return "(one of them)" if row.first_right("table") else "(another)"
     return row.spoken
-
-
-def _quantiles(values: Sequence[float]) -> dict[str, Any]:
-    finite = [value for value in values if math.isfinite(value)]
-    if not finite:
-        return {"n": 0, "quarter": None, "median": None, "three quarters": None}
-    quarter, median, most = np.quantile(finite, (0.25, 0.5, 0.75)).tolist()
-    return {"n": len(finite), "quarter": quarter, "median": median, "three quarters": most}

@@ -3,44 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
 
 from gritd.tools.proof.blind.groups import CONFOUNDED, alike
 from gritd.tools.proof.blind.plant.concealed import ABSORBED, LISTED, UNLISTED
+from gritd.tools.proof.blind.plant.worlds import PAPER, WORLDS, concealable
 
 Item = TypeVar("Item")
 
-STRATA = ("none", "single", "absorbed", "confounded", "two", "unlisted")
 SHARES = {
-    "none": 0.32,
-    "single": 0.32,
-    "absorbed": 0.09,
-    "confounded": 0.06,
-    "two": 0.08,
-    "unlisted": 0.13,
+    "none": 0.13,
+    "awkward": 0.10,
+    "single": 0.20,
+    "absorbed": 0.05,
+    "confounded": 0.03,
+    "two": 0.06,
+    "unlisted": 0.08,
+    "foreign": 0.12,
+    "pair": 0.23,
 }
+STRATA = tuple(SHARES)
 LEVELS = {"weak": 1.5, "medium": 4.0, "strong": 12.0}  # times the detection limit
+PLAIN = ("medium", "strong")  # levels in foreign worlds and of what is new
+# What one case in so many conceals, in foreign worlds and as what is new: one of the list,
+# nothing, or physics outside the list.
+FOREIGN_KINDS = ("nothing", "listed", "listed")
+PAIR_KINDS = ("nothing", "nothing", "listed", "listed", "listed", "unlisted")
+BEDS = ("same", "prepared")
+PAIR_RUNS = (2, 3, 4)  # of each campaign of a pair
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """What one case conceals: nothing, or effects at a level."""
+    """What one case conceals: nothing, or effects at a level; where, and how it is recorded."""
 
     stratum: str
     effects: tuple[str, ...] = ()
-    level: str = ""
+    level: str = ""  # of an awkward campaign: what is awkward
     without: tuple[tuple[str, bool | int], ...] = ()  # habits that are fixed
+    world: str = PAPER
+    bed: str = ""  # of BEDS where a reference campaign comes first; else there is none
+    noise: str = ""  # "tall": 2.5 times what is stated; "slow": correlated 0.95 from 0.1 s to 0.1 s
+
+    @property
+    def pair(self) -> bool:
+        return bool(self.bed)
+
+
+AWKWARD = (
+    Assignment("awkward", level="load measured", without=(("wrench", True), ("weighed", True))),
+    Assignment("awkward", level="noise x 2.5", noise="tall"),
+    Assignment("awkward", level="correlated 0.95", noise="slow"),
+    Assignment("awkward", level="no wrench", without=(("wrench", False),)),
+    Assignment("awkward", level="one run", without=(("runs", 1),)),
+)
 
 
 def assignments(
-    cases: int, rng: np.random.Generator, strata: tuple[str, ...] = STRATA
+    cases: int,
+    rng: np.random.Generator,
+    strata: tuple[str, ...] = STRATA,
+    worlds: tuple[str, ...] = WORLDS,
 ) -> list[Assignment]:
-    """As many as cases, strata by their shares, effects and levels in turn, the order of chance."""
+    """As many as cases, strata by their shares, effects and levels in turn, the order of chance.
+
+    `worlds`: those of foreign campaigns and of pairs; the other strata are at home in the paper's.
+    """
     counts = _counts(cases, strata)
-    drawn = [item for stratum, count in counts.items() for item in _of(stratum, count, rng)]
+    drawn = [item for stratum, count in counts.items() for item in _of(stratum, count, worlds, rng)]
     return [drawn[place] for place in rng.permutation(len(drawn))]
 
 
@@ -55,25 +89,36 @@ def _counts(cases: int, strata: tuple[str, ...]) -> dict[str, int]:
     return counts
 
 
-def _of(stratum: str, count: int, rng: np.random.Generator) -> list[Assignment]:
+def _of(
+    stratum: str, count: int, worlds: tuple[str, ...], rng: np.random.Generator
+) -> list[Assignment]:
     if stratum == "none":
         return [Assignment("none")] * count
+    if stratum == "awkward":
+        return _shuffled(AWKWARD, count, rng)
     if stratum == "two":
         return [_two(rng) for _ in range(count)]
     if stratum == "confounded":
-        return [
-            _confounded(number, rng) for number in _shuffled(range(len(CONFOUNDED)), count, rng)
-        ]
+        numbers = _shuffled(range(len(CONFOUNDED)), count, rng)
+        return [_confounded(number, rng) for number in numbers]
+    if stratum == "foreign":
+        foreign = tuple(world for world in worlds if world != PAPER)
+        return _in_worlds("foreign", count, foreign, FOREIGN_KINDS, rng)
+    if stratum == "pair":
+        return [_paired(one, rng) for one in _in_worlds("pair", count, worlds, PAIR_KINDS, rng)]
     names = {"single": tuple(LISTED), "absorbed": ABSORBED, "unlisted": tuple(UNLISTED)}[stratum]
-    return [Assignment(stratum, (name,), level) for name, level in _at_levels(names, count, rng)]
+    leveled = _at_levels(names, count, tuple(LEVELS), rng)
+    return [Assignment(stratum, (name,), level) for name, level in leveled]
 
 
-def _at_levels(names: Iterable[str], count: int, rng: np.random.Generator) -> list[tuple[str, str]]:
+def _at_levels(
+    names: Iterable[str], count: int, levels: tuple[str, ...], rng: np.random.Generator
+) -> list[tuple[str, str]]:
     """Names in turn, each at its levels in turn, where it begins by chance."""
-    begun = {name: int(rng.integers(len(LEVELS))) for name in names}
+    begun = {name: int(rng.integers(len(levels))) for name in names}
     found = []
     for name in _shuffled(begun, count, rng):
-        found.append((name, list(LEVELS)[begun[name] % len(LEVELS)]))
+        found.append((name, levels[begun[name] % len(levels)]))
         begun[name] += 1
     return found
 
@@ -99,3 +144,38 @@ def _confounded(number: int, rng: np.random.Generator) -> Assignment:
     first, second, without = CONFOUNDED[number]
     chosen = first if rng.random() < 0.5 else second
     return Assignment("confounded", (chosen,), "strong", tuple(without.items()))
+
+
+def _in_worlds(
+    stratum: str,
+    count: int,
+    worlds: tuple[str, ...],
+    kinds: tuple[str, ...],
+    rng: np.random.Generator,
+) -> list[Assignment]:
+    """Worlds and kinds in turn; names in turn, those left out that a world has of its own."""
+    waiting = {
+        "listed": _at_levels(tuple(LISTED), 2 * count, PLAIN, rng),
+        "unlisted": _at_levels(tuple(UNLISTED), 2 * count, PLAIN, rng),
+    }
+    found = []
+    for world, kind in _shuffled(product(worlds, kinds), count, rng):
+        fixed = (("second_pass", False),) if world == "strips" else ()
+        one = Assignment(stratum, without=fixed, world=world)
+        if kind != "nothing":
+            name, level = _next(waiting[kind], world)
+            one = replace(one, effects=(name,), level=level)
+        found.append(one)
+    return found
+
+
+def _next(waiting: list[tuple[str, str]], world: str) -> tuple[str, str]:
+    """The first that can be new in a world, taken from those that wait."""
+    allowed = concealable(world, tuple(name for name, _ in waiting))
+    place = next(place for place, (name, _) in enumerate(waiting) if name in allowed)
+    return waiting.pop(place)
+
+
+def _paired(one: Assignment, rng: np.random.Generator) -> Assignment:
+    runs = int(rng.choice(PAIR_RUNS))
+    return replace(one, without=(*one.without, ("runs", runs)), bed=str(rng.choice(BEDS)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from gritd.tools.proof.blind.plant.concealed import UNLISTED
 from gritd.tools.proof.blind.verdicts import Row
 
 Table = list[tuple[str, ...]]  # rows of cells, all as long as the first
@@ -13,9 +14,26 @@ GAP = "  "
 
 def text(score: Mapping[str, Any], rows: Sequence[Row]) -> str:
     """All tables, then what went wrong, case by case."""
-    parts = [aligned(table(score)) for table in (headline, strata, reliability, soil)]
+    parts = [aligned(table) for table in all_tables(score).values()]
     wrong = [f"  {row.number:4}  {explained(row)}" for row in rows if missed(row)]
     return "\n\n".join([*parts, "\n".join(["what went wrong", *wrong])] if wrong else parts)
+
+
+def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
+    """By heading; those without a row beside their head are left out."""
+    found = {
+        "Figures": headline(score),
+        "By stratum and strength": strata(score),
+        "Stated probability, and how often it was right": reliability(score),
+        "All accepted names": accepted(score),
+        "Soil: median error": soil(score),
+        "Soil: how often sigma covers the truth": coverage(score["soil"]),
+        "A reference campaign, then a new one": pairs(score["pairs"]),
+        "Soil of the new campaign": coverage({n: of["soil"] for n, of in score["pairs"].items()}),
+        "Campaigns alone in foreign worlds": foreign(score["foreign"]),
+        "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
+    }
+    return {heading: table for heading, table in found.items() if len(table) > 1}
 
 
 def aligned(table: Table) -> str:
@@ -33,10 +51,8 @@ def said(share: Mapping[str, Any]) -> str:
     if not share["n"]:
         return "–"
     value = share["k"] / share["n"]
-    return (
-        f"{share['k']}/{share['n']} {value:.0%} "
-        f"({100 * share['low']:.0f}–{100 * share['high']:.0f})"
-    )
+    bounds = f"({100 * share['low']:.0f}–{100 * share['high']:.0f})"
+    return f"{share['k']}/{share['n']} {value:.0%} {bounds}"
 
 
 def number(value: float | None, form: str = ".2f") -> str:
@@ -44,41 +60,64 @@ def number(value: float | None, form: str = ".2f") -> str:
 
 
 def headline(score: Mapping[str, Any]) -> Table:
-    """What a batch comes to."""
-    alarms, singles, unlisted = (
-        score["false_alarms"],
-        score["detectable_singles"],
-        score["unlisted"],
-    )
-    first, heldout, two = singles["first"], score["heldout"], score["two"]
-
+    """What a batch comes to. Foreign worlds and pairs have tables of their own."""
     return [
         ("cases, of which failed", said(score["failed"])),
+        *_alarms(score["false_alarms"]),
+        *_named(score),
+        ("parameters within two sigma", said(score["parameters"]["within two sigma"])),
+        *_held_out(score["heldout"]),
+        ("Brier score, by name", number(score["calibration"]["name"]["brier"], ".3f")),
+        ("  by the group it states", number(score["calibration"]["engine"]["brier"], ".3f")),
+        ("a diagnosis takes, median", f"{number(score['seconds']['median'], '.0f')} s"),
+        ("  of a pair", f"{number(score['seconds of pairs']['median'], '.0f')} s"),
+    ]
+
+
+def _alarms(alarms: Mapping[str, Any]) -> Table:
+    return [
         ("false alarms", said(alarms["all"])),
         ("  noise as stated", said(alarms["noise as stated"])),
         ("  noise off by two", said(alarms["noise misstated"])),
+        *((f"  {way}", said(of)) for way, of in alarms["awkward"].items()),
+    ]
+
+
+def _named(score: Mapping[str, Any]) -> Table:
+    singles, two, unlisted = score["detectable_singles"], score["two"], score["unlisted"]
+    first, companions, sure = singles["first"], score["companions"], score["accepted"]
+    return [
         ("detectable single effects: detected", said(singles["detected"])),
         ("  first name right", said(first["name"])),
         ("  … by the fixed groups", said(first["table"])),
         ("  … by the group it states", said(first["engine"])),
         ("  … by what the campaign can tell", said(first["plant"])),
         ("  among the first three, by the fixed groups", said(singles["three"]["table"])),
-        ("unlisted: recall", said(unlisted["recall"])),
-        ("  given a listed name above 0.5", said(unlisted["listed name above one half"])),
+        ("a further name that is not there, by the fixed groups", said(companions["table"])),
+        ("  … nor in the group it is stated with", said(companions["engine"])),
+        ("names stated with 0.9 or more that are right", said(sure["name"]["sure"])),
+        ("  … by the fixed groups", said(sure["table"]["sure"])),
+        ("  … by the group it states", said(sure["engine"]["sure"])),
         ("two effects: one named", said(two["one named"])),
         ("  both named", said(two["both named"])),
-        ("parameters within two sigma", said(score["parameters"]["within two sigma"])),
-        (
-            "held-out error over oracle, median",
-            number(heldout["detectable"]["over fitted"]["median"]),
-        ),
-        ("  where nothing is concealed", number(heldout["none"]["over fitted"]["median"])),
-        ("  where the name is right", number(heldout["named right"]["over fitted"]["median"])),
-        ("  … over the noiseless truth", number(heldout["named right"]["over truth"]["median"])),
-        ("Brier score, by name", number(score["calibration"]["name"]["brier"], ".3f")),
-        ("  by the group it states", number(score["calibration"]["engine"]["brier"], ".3f")),
-        ("a diagnosis takes, median", f"{number(score['seconds']['median'], '.0f')} s"),
+        ("  both named, by the fixed groups", said(two["both named by group"])),
+        ("strangers called unlisted", said(unlisted["recall"])),
+        ("  given a listed name above 0.5", said(unlisted["listed name above one half"])),
     ]
+
+
+def _held_out(heldout: Mapping[str, Any]) -> Table:
+    right = heldout["named right"]
+    return [
+        ("held-out error over oracle, median", _median(heldout["detectable"]["over fitted"])),
+        ("  where nothing is concealed", _median(heldout["none"]["over fitted"])),
+        ("  where the name is right", _median(right["over fitted"])),
+        ("  … over the noiseless truth", _median(right["over truth"])),
+    ]
+
+
+def _median(of: Mapping[str, Any]) -> str:
+    return number(of["median"])
 
 
 def strata(score: Mapping[str, Any]) -> Table:
@@ -117,52 +156,136 @@ def reliability(score: Mapping[str, Any]) -> Table:
     return [("stated probability", "mean", "name right", "stated group right"), *rows]
 
 
-def soil(score: Mapping[str, Any]) -> Table:
-    """Median relative error of c and tan φ before and after, and how often two sigma cover the
-    truth after.
-    """
-    head = (
-        "soil, median error",
-        "c before",
-        "c after",
-        "within 2σ",
-        "tan φ before",
-        "tan φ after",
-        "within 2σ",
-    )
-
+def accepted(score: Mapping[str, Any]) -> Table:
+    """The same of every name that is accepted, first or not."""
+    kinds = [score["accepted"][by]["table"] for by in ("name", "table", "engine")]
     rows = [
-        (stratum, *_errors(of["c"]), *_errors(of["tan_phi"]))
-        for stratum, of in score["soil"].items()
+        (
+            f"{bins[0]['from']:.1f}-{bins[0]['to']:.1f}",
+            number(bins[0]["stated"]),
+            *(said(one["right"]) for one in bins),
+        )
+        for bins in zip(*kinds, strict=True)
+    ]
+    return [("stated probability", "mean", "name right", "fixed groups", "stated group"), *rows]
+
+
+def soil(score: Mapping[str, Any]) -> Table:
+    """Median relative error of c and tan φ before and after."""
+    head = ("concealed", "c before", "c after", "tan φ before", "tan φ after")
+    rows = [
+        (group, *_errors(of["c"]), *_errors(of["tan_phi"]))
+        for group, of in score["soil"].items()
+        if of["c"]["after"]["n"]
     ]
 
     return [head, *rows]
 
 
-def _errors(of: Mapping[str, Any]) -> tuple[str, str, str]:
+def _errors(of: Mapping[str, Any]) -> tuple[str, str]:
     before, after = (number(of[when]["median"], ".1%") for when in ("before", "after"))
-    return before, after, said(of["within two sigma after"])
+    return before, after
+
+
+def coverage(groups: Mapping[str, Any]) -> Table:
+    """How often one and two sigma cover c and tan φ; what is said to be unknown counts apart."""
+    head = ("", "", "1σ before", "2σ before", "1σ after", "2σ after", "unknown after")
+    rows = [
+        (group, symbol, *_covered(of[name]))
+        for group, of in groups.items()
+        for name, symbol in (("c", "c"), ("tan_phi", "tan φ"))
+        if of[name]["unknown after"]["n"]
+    ]
+    return [head, *rows]
+
+
+def _covered(of: Mapping[str, Any]) -> tuple[str, ...]:
+    within = (
+        said(of[f"within {many} sigma {when}"])
+        for when in ("before", "after")
+        for many in ("one", "two")
+    )
+    return (*within, said(of["unknown after"]))
+
+
+def pairs(groups: Mapping[str, Any]) -> Table:
+    """What is said to be new: alarms where nothing is, names where an effect is."""
+    head = (
+        "world",
+        "false alarms",
+        "detected",
+        "first, fixed groups",
+        "first, stated group",
+        "further name not there",
+        "strangers unlisted",
+        "over truth",
+    )
+    return [head, *((name, *_new(of)) for name, of in groups.items())]
+
+
+def _new(of: Mapping[str, Any]) -> tuple[str, ...]:
+    shares = (
+        of["false alarms"],
+        of["detected"],
+        of["first"]["table"],
+        of["first"]["engine"],
+        of["false companion"],
+        of["unlisted"],
+    )
+    return (*map(said, shares), _median(of["over truth"]))
+
+
+def foreign(groups: Mapping[str, Any]) -> Table:
+    """Verdicts in foreign worlds, and how true the names are that were given there."""
+    head = (
+        "world",
+        "consistent",
+        "explained",
+        "unlisted",
+        "first name true",
+        "further name not there",
+        "concealed effect first",
+    )
+    return [head, *((name, *_alone(of)) for name, of in groups.items())]
+
+
+def _alone(of: Mapping[str, Any]) -> tuple[str, ...]:
+    verdicts = (of["verdicts"][said_] for said_ in ("consistent", "explained", "unlisted"))
+    rest = (of["first name true"], of["false companion"], of["concealed first"])
+    return tuple(map(said, (*verdicts, *rest)))
 
 
 def missed(row: Row) -> bool:
     """Not what should have been said: an alarm without cause, or a cause without its name."""
+    if row.verdict == "failed":
+        return True
     if not row.truth:
-        return row.alarmed or row.verdict == "failed"
-    if row.stratum == "unlisted":
+        return row.alarmed and not row.held
+    if row.truth[0] in UNLISTED:
         return row.verdict != "unlisted"
     return not (row.first_right("table") or row.first_right("engine"))
 
 
 def explained(row: Row) -> str:
     """One line: truth and strength, what was said, and why it may be."""
-    truth = " + ".join(row.truth) or "none"
-    strength = f" {row.level} D={row.detectability:.0f}" if row.truth else ""
-    stated = f"{row.spoken} p={row.first.probability:.2f}" if row.first else row.spoken
-    near = (
-        f"; the campaign cannot tell it from {', '.join(sorted(row.inseparable))}"
+    parts = [
+        f"{_truth(row)} → {_spoken(row)}",
+        f"the campaign cannot tell it from {', '.join(sorted(row.inseparable))}"
         if row.inseparable
-        else ""
-    )
-    noise = f"; stated noise × {row.noise_factor:g}" if row.noise_factor != 1.0 else ""
-    note = f"; {row.note[:160]}" if row.verdict in ("failed", "insufficient") and row.note else ""
-    return f"{truth}{strength} → {stated}{near}{noise}{note}"
+        else "",
+        f"stated noise × {row.noise_factor:g}" if row.noise_factor != 1.0 else "",
+        row.note[:160] if row.verdict in ("failed", "insufficient") else "",
+    ]
+    return "; ".join(part for part in parts if part)
+
+
+def _truth(row: Row) -> str:
+    truth = " + ".join(row.truth) or "none"
+    strength = f" {row.level} D={row.detectability:.0f}" if row.truth else f" {row.level}".rstrip()
+    where = f" in {row.world}" if row.stratum in ("foreign", "pair") else ""
+    new = f", new on the {row.bed} bed" if row.pair else ""
+    return f"{truth}{strength}{where}{new}"
+
+
+def _spoken(row: Row) -> str:
+    return f"{row.spoken} p={row.first.probability:.2f}" if row.first else row.spoken

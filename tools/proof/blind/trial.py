@@ -24,7 +24,7 @@ from gritd.tools.proof.blind.strata import Assignment
 ROOT = Path(gritd.__file__).parents[1]  # of the checkout, or site-packages
 DIAGNOSE = (sys.executable, "-m", "gritd", "diagnose")
 PATIENCE = 1200.0  # [s] after which a diagnosis is given up and counts as failed
-OUTCOME = "outcome.json"
+GIVEN, RESULT, OUTCOME = "given", "result.json", "outcome.json"
 
 
 @dataclass(frozen=True)
@@ -67,19 +67,20 @@ def prepare(spec: Spec) -> str:
         return spec.seal.read_text(encoding="utf-8").strip()
     shutil.rmtree(spec.folder, ignore_errors=True)
     case = cases.drawn(spec.number, spec.seed, spec.assignment)
-    handover.write(case, spec.folder / "given")
-    sealed = seal.close(spec.answers, case.answers(), _truth(spec, case))
+    campaigns = handover.driven(case)
+    handover.write(case, campaigns, spec.folder / GIVEN)
+    sealed = seal.close(spec.answers, case.answers(), _truth(spec, campaigns[-1]))
     spec.seal.write_text(sealed + "\n", encoding="utf-8")
     return sealed
 
 
-def _truth(spec: Spec, case: cases.Case) -> dict[str, str]:
+def _truth(spec: Spec, judged: handover.Driven) -> dict[str, str]:
     """The noiseless channels, beside the answers; hashes by file name."""
     spec.answers.parent.mkdir(parents=True, exist_ok=True)
     found = {}
-    for number in range(len(case.trial.runs)):
-        path = spec.answers.with_name(f"{spec.name}.run-{number + 1}.npz")
-        np.savez_compressed(path, **handover.truth(case, number))  # type: ignore[arg-type]
+    for number in range(len(judged.felt)):
+        path = spec.answers.with_name(f"{spec.name}.{judged.name(number)}.npz")
+        np.savez_compressed(path, **handover.truth(judged, number))  # type: ignore[arg-type]
         found[path.name] = seal.sha256(path)
     return found
 
@@ -88,29 +89,33 @@ def diagnose(spec: Spec) -> dict[str, Any]:
     """Run the diagnosis in a process of its own, in a folder that holds nothing but what was handed
     over.
     """
-    given, result = spec.folder / "given", spec.folder / "result.json"
-    files = sorted(path.name for path in given.glob("*.mcap"))
-
-    command = [
-        *spec.diagnose,
-        *files,
-        "--config",
-        handover.CONFIGURATION,
-        "--json",
-        str(result.resolve()),
-    ]
-    command += ["--jobs", "1"]  # cases run side by side
-
+    given = spec.folder / GIVEN
     began = time.monotonic()
-    code, said = _run(command, given)
+    code, said = _run(_command(spec), given)
     outcome = {"code": code, "seconds": time.monotonic() - began, "said": said[-2000:]}
     (spec.folder / OUTCOME).write_text(json.dumps(outcome, indent=1), encoding="utf-8")
 
     if not spec.keep:
-        for name in files:
-            (given / name).unlink()
-
+        for path in given.rglob("*.mcap"):
+            path.unlink()
     return outcome
+
+
+def _command(spec: Spec) -> list[str]:
+    """What an engineer would type in the folder of what was handed over."""
+    result = str((spec.folder / RESULT).resolve())
+    told = ["--config", handover.CONFIGURATION, "--json", result]
+    told += ["--jobs", "1"]  # cases run side by side
+    if not spec.assignment.pair:
+        return [*spec.diagnose, *_recordings(spec, ""), *told]
+    told += ["--bed", spec.assignment.bed]
+    before = ["--reference", *_recordings(spec, handover.REFERENCE)]
+    return [*spec.diagnose, *_recordings(spec, handover.NEW), *before, *told]
+
+
+def _recordings(spec: Spec, folder: str) -> list[str]:
+    given = spec.folder / GIVEN
+    return sorted(str(path.relative_to(given)) for path in (given / folder).glob("*.mcap"))
 
 
 def _run(command: list[str], folder: Path) -> tuple[int, str]:

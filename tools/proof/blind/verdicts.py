@@ -7,17 +7,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gritd.tools.proof.blind import seal
+from gritd.tools.proof.blind import heldout, seal
 from gritd.tools.proof.blind.groups import alike
-from gritd.tools.proof.blind.trial import OUTCOME, Spec
+from gritd.tools.proof.blind.plant.worlds import HELD
+from gritd.tools.proof.blind.strata import LEVELS
+from gritd.tools.proof.blind.trial import OUTCOME, RESULT, Spec
 
 NOTHING, UNLISTED, INSUFFICIENT, FAILED = "(nothing)", "(unlisted)", "(insufficient)", "(failed)"
+DETECTABLE = 0.9 * LEVELS["weak"]  # times the detection limit
 SPOKEN = {"consistent": NOTHING, "unlisted": UNLISTED, "insufficient": INSUFFICIENT}
 
 
@@ -39,6 +42,9 @@ class Row:
     number: int
     stratum: str
     level: str
+    world: str
+    bed: str  # of a pair; empty for a campaign alone
+    held: frozenset[str]  # names that are true of the world itself; none for what is new
     truth: tuple[str, ...]
     detectability: float
     limit: float
@@ -48,7 +54,8 @@ class Row:
     hypotheses: tuple[Said, ...]
     seconds: float
     note: str
-    soil: Mapping[str, Mapping[str, float]]  # c, tan_phi: relative error before and after, z after
+    # c, tan_phi: relative error, and error over sigma, before and after; NaN: said to be unknown
+    soil: Mapping[str, Mapping[str, float]]
     parameters: Mapping[str, float]  # where parameterisations coincide: error over stated sigma
     heldout: Mapping[
         str, tuple[float, float, float]
@@ -56,6 +63,23 @@ class Row:
     refit: Mapping[
         str, float
     ]  # channel: variance that an oracle adds which must fit all but the form of the effect
+    reference_verdict: str = ""  # what is said of the reference campaign itself
+
+    @property
+    def pair(self) -> bool:
+        return bool(self.bed)
+
+    @property
+    def detectable(self) -> bool:
+        """Whether one who knows all else would see every effect that is concealed."""
+        return bool(self.truth) and self.detectability >= DETECTABLE * self.limit
+
+    @property
+    def accepted(self) -> tuple[Said, ...]:
+        """What it says is there, first names first."""
+        if self.verdict != "explained":
+            return ()
+        return tuple(said for said in self.hypotheses if said.accepted)
 
     @property
     def alarmed(self) -> bool:
@@ -74,37 +98,44 @@ class Row:
         """Whether a name is that of a concealed effect, or of its group by `table`, or in this
         campaign by `plant`.
         """
+        true = self.held.union(self.truth)
         if by == "table":
-            return any(name in alike(true) for true in self.truth)
+            return any(name in alike(one) for one in true)
         if by == "plant":
-            return name in self.truth or name in self.inseparable
-        return name in self.truth
+            return name in true or name in self.inseparable
+        return name in true
+
+    def said_right(self, said: Said, by: str = "name") -> bool:
+        """The same of a hypothesis; by `engine`, whether a true one is in its stated group."""
+        if by == "engine":
+            return bool(said.group & self.held.union(self.truth))
+        return self.right(said.effect, by)
+
+    def false_companion(self, by: str = "table") -> bool:
+        """Whether a second or third name is accepted that is not there."""
+        return any(not self.said_right(said, by) for said in self.accepted[1:])
+
+    def both_named(self, by: str = "name") -> bool:
+        """Whether every concealed effect is accepted, by its name or within a group."""
+        said = self.accepted
+        return all(
+            any(replace(self, truth=(t,)).said_right(s, by) for s in said) for t in self.truth
+        )
 
     def first_right(self, by: str = "name") -> bool:
-        if self.first is None:
-            return False
-        if by == "engine":
-            return bool(self.first.group & set(self.truth))
-        return self.right(self.first.effect, by)
+        return self.first is not None and self.said_right(self.first, by)
 
     def three_right(self, by: str = "name") -> bool:
         first = self.hypotheses[:3] if self.alarmed else ()
-        if by == "engine":
-            return any(said.group & set(self.truth) for said in first)
-        return any(self.right(said.effect, by) for said in first)
+        return any(self.said_right(said, by) for said in first)
 
     def given(self, by: str = "name") -> float:
         """Probability given to the truth."""
-        if by == "engine":
-            return max(
-                (s.probability for s in self.hypotheses if s.group & set(self.truth)), default=0.0
-            )
-        return min(
-            sum(said.probability for said in self.hypotheses if self.right(said.effect, by)), 1.0
-        )
+        true = [said.probability for said in self.hypotheses if self.said_right(said, by)]
+        return max(true, default=0.0) if by == "engine" else min(sum(true), 1.0)
 
     def excess(self, oracle: str) -> float:
-        """Held-out error over the oracle's (`fitted` or `truth`), geometric mean over channels."""
+        """Held-out error over an oracle's (`fitted`, `truth`), geometric mean over the channels."""
         ratios = []
         for channel, (_, after, truth) in self.heldout.items():
             best = math.sqrt(
@@ -116,15 +147,17 @@ class Row:
 
 
 def row(spec: Spec) -> Row:
-    """Open the answers, check their seal, and read the diagnosis. Raises CommandError."""
+    """Open the answers, check their seal, and read what was said. Raises CommandError."""
     answers = seal.opened(spec.answers, spec.seal.read_text(encoding="utf-8").strip())
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
-    result, trouble = _result(spec.folder / "result.json", outcome)
-
+    result, trouble = _result(spec.folder / RESULT, outcome)
     return Row(
         number=spec.number,
         stratum=answers["stratum"],
         level=answers["level"],
+        world=answers["world"],
+        bed=answers["bed"],
+        held=frozenset() if answers["bed"] else frozenset(HELD[answers["world"]]),
         truth=tuple(answers["effects"]),
         detectability=min(answers["detectability_single"], default=0.0),
         limit=answers["detection_limit"],
@@ -136,8 +169,9 @@ def row(spec: Spec) -> Row:
         note=trouble or str(result.get("summary", "")),
         soil=_soil(result, answers),
         parameters=_parameters(result, answers),
-        heldout=_heldout(result, answers, spec),
+        heldout=heldout.errors(result, answers, spec),
         refit=answers["oracle_variance"],
+        reference_verdict=str((result.get("reference") or {}).get("verdict", "")),
     )
 
 
@@ -205,46 +239,3 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
             if sigma > 0.0:
                 found[f"{effect['name']}.{name}"] = (value - true) / sigma
     return found
-
-
-# --- held-out error against the oracle ---
-
-
-def _heldout(
-    result: Mapping[str, Any], answers: Mapping[str, Any], spec: Spec
-) -> dict[str, tuple[float, float, float]]:
-    """Root mean square errors on the diagnosis' own held-out samples, beside those of the noiseless
-    truth on them.
-    """
-    sums: dict[str, list[np.ndarray[Any, Any]]] = {}
-    begins = {f"run-{number}": run["begins"] for number, run in enumerate(answers["runs"], start=1)}
-
-    for trace in result.get("traces") or ():
-        path = spec.answers.with_name(f"{spec.name}.{trace['run']}.npz")
-        if path.exists():
-            with np.load(path) as truth:
-                if trace["channel"] in truth:
-                    errors = _errors(
-                        trace, begins[trace["run"]] + truth["time"], truth[trace["channel"]]
-                    )
-                    sums.setdefault(trace["channel"], []).append(errors)
-
-    return {channel: _roots(np.concatenate(parts, axis=1)) for channel, parts in sums.items()}
-
-
-def _errors(trace: Mapping[str, Any], time: Any, truth: Any) -> np.ndarray[Any, Any]:
-    """Squared errors (3, n) of before, after and oracle, where the diagnosis used the sample."""
-    at, measured, before, after, used = (
-        np.array([math.nan if value is None else value for value in trace[name]], dtype=float)
-        for name in ("time", "measured", "before", "after", "used")
-    )
-    squares = (measured - np.stack((before, after, np.interp(at, time, truth)))) ** 2
-    kept: np.ndarray[Any, Any] = squares[:, (used > 0.5) & np.isfinite(squares).all(axis=0)]
-    return kept
-
-
-def _roots(squares: np.ndarray[Any, Any]) -> tuple[float, float, float]:
-    if not squares.shape[1]:
-        return math.nan, math.nan, math.nan
-    before, after, oracle = np.sqrt(squares.mean(axis=1)).tolist()
-    return before, after, oracle

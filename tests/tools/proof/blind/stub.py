@@ -12,12 +12,23 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
+
+
+def hypothesis(name: str, probability: float, *like: str, accepted: bool = False) -> dict[str, Any]:
+    return {
+        "effect": name,
+        "probability": probability,
+        "accepted": accepted,
+        "parameters": {},
+        "indistinguishable_from": list(like),
+    }
 
 
 def main(arguments: list[str]) -> int:
     files = [name for name in arguments if name.endswith(".mcap")]
     out = Path(arguments[arguments.index("--json") + 1])
-    seen = sorted(path.name for path in Path.cwd().iterdir())
+    seen = sorted(str(path.relative_to(Path.cwd())) for path in Path.cwd().rglob("*"))
     if not files or any(not Path(name).exists() for name in files):
         return 2
     quantity = {"value": 1000.0, "sigma": 100.0}
@@ -26,15 +37,14 @@ def main(arguments: list[str]) -> int:
         "verdict": "explained",
         "summary": "stub",
         "seen": seen,
+        "asked": arguments,
         "environment": sorted(os.environ),
         "hypotheses": [
-            {"effect": "coulomb_friction", "probability": 0.7, "accepted": True, "parameters": {},
-             "indistinguishable_from": ["current_offset"]},
-            {"effect": "bed_slope", "probability": 0.2, "parameters": {},
-                "indistinguishable_from": []},
+            hypothesis("coulomb_friction", 0.7, "current_offset", accepted=True),
+            hypothesis("bed_slope", 0.2),
         ],
         "soil": {"before": soil, "after": soil},
-    }  # fmt: skip
+    }
     out.write_text(json.dumps(said), encoding="utf-8")
 
     return 0

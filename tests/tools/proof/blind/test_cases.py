@@ -9,12 +9,13 @@ import yaml
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.salvage import read
-from gritd.tools.proof.blind import cases, detect, handover, strata
+from gritd.tools.proof.blind import cases, detect, handover, knowledge, strata
 from gritd.tools.proof.blind.detect import Detector
 from gritd.tools.proof.blind.groups import CONFOUNDED, GROUPS, alike
 from gritd.tools.proof.blind.plant.concealed import ABSORBED, LISTED, UNLISTED
 from gritd.tools.proof.blind.plant.concealed.friction import BristleFriction
 from gritd.tools.proof.blind.plant.concealed.zeros import BentOffset
+from gritd.tools.proof.blind.plant.worlds import HELD, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import Assignment
 
 
@@ -29,14 +30,40 @@ def null() -> cases.Case:
 def test_a_batch_holds_every_stratum_in_its_share() -> None:
     drawn = strata.assignments(300, np.random.default_rng(1))
     counts = {name: sum(a.stratum == name for a in drawn) for name in strata.STRATA}
-    assert len(drawn) == 300 and counts["none"] >= 90
+    assert len(drawn) == 300 and all(counts.values())
+    assert sum(not a.effects for a in drawn) >= 100  # nothing new
     singles = [a for a in drawn if a.stratum == "single"]
     assert {a.effects[0] for a in singles} == set(LISTED)
     assert {a.level for a in singles} == set(strata.LEVELS)
     assert {a.effects[0] for a in drawn if a.stratum == "absorbed"} == set(ABSORBED)
     assert {a.effects[0] for a in drawn if a.stratum == "unlisted"} == set(UNLISTED)
+    assert {a.level for a in drawn if a.stratum == "awkward"} == {a.level for a in strata.AWKWARD}
     for a in drawn:
         assert a.stratum != "two" or a.effects[1] not in alike(a.effects[0])
+        assert a.world == PAPER or a.stratum in ("foreign", "pair")
+
+
+def test_pairs_are_in_every_world_and_a_third_has_nothing_new() -> None:
+    pairs = strata.assignments(108, np.random.default_rng(2), ("pair",))
+    for world in WORLDS:
+        inside = [a for a in pairs if a.world == world]
+        assert len(inside) == 18
+        assert sum(not a.effects for a in inside) == 6
+        assert any(name in UNLISTED for a in inside for name in a.effects)
+    assert all(a.pair and a.bed in strata.BEDS for a in pairs)
+    assert len({name for a in pairs for name in a.effects}) > 30
+
+
+def test_what_a_world_has_of_its_own_is_not_new_in_it() -> None:
+    for a in strata.assignments(300, np.random.default_rng(3), ("foreign", "pair")):
+        assert not set(a.effects) & set(HELD[a.world])
+        assert "multipass" not in a.effects or a.world != "strips"
+
+
+def test_worlds_can_be_chosen() -> None:
+    drawn = strata.assignments(40, np.random.default_rng(4), worlds=("strips", PAPER))
+    assert {a.world for a in drawn if a.stratum == "foreign"} == {"strips"}
+    assert {a.world for a in drawn if a.stratum == "pair"} == {"strips", PAPER}
 
 
 def test_the_groups_name_effects_that_exist() -> None:
@@ -100,8 +127,12 @@ def test_standstill_tells_friction_from_offset() -> None:
     assert left[False] < 0.1 < left[True]
 
 
+def handed_over(case: cases.Case, folder: Path) -> list[Path]:
+    return handover.write(case, handover.driven(case), folder)
+
+
 def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.Case, tmp_path: Path) -> None:
-    files = handover.write(null, tmp_path / "given")
+    files = handed_over(null, tmp_path / "given")
     loaded = config.load(tmp_path / "given" / handover.CONFIGURATION)
     true, told = null.trial.world.ground, loaded.settings.soil
 
@@ -125,22 +156,70 @@ def test_what_is_handed_over_reads_as_a_testbeds_own(null: cases.Case, tmp_path:
 
 
 def test_what_is_handed_over_does_not_tell(tmp_path: Path) -> None:
+    without = (("wrench", True), ("runs", 2))
     case = cases.drawn(
-        1, 9, Assignment("single", ("bed_slope",), "strong", (("wrench", True), ("runs", 1)))
+        1, 9, Assignment("pair", ("bed_slope",), "strong", without, "relaxation", "prepared")
     )
-    handover.write(case, tmp_path / "given")
+    files = handed_over(case, tmp_path / "given")
     text = (tmp_path / "given" / handover.CONFIGURATION).read_text(encoding="utf-8")
-    info = read(tmp_path / "given" / "run-1.mcap").run
-    for word in ("bed_slope", "single", "strong", "weak", case.family):
-        assert word not in text and word not in str(info)
+    for info in (read(file).run for file in files):
+        for word in ("bed_slope", "relaxation", "prepared", "strong", "weak", case.family):
+            assert word not in text and word not in str(info)
     assert set(yaml.safe_load(text)["effects"]) == {"stress_linearisation"}
 
 
+def test_a_pair_is_two_campaigns_of_one_rig(tmp_path: Path) -> None:
+    """The reference knows nothing of what is new, and calibration errors are the same."""
+    without = (("wrench", True), ("runs", 2), ("lifted", False))
+    assignment = Assignment("pair", ("current_offset",), "strong", without, bed="prepared")
+    case = cases.drawn(1, 9, assignment)
+    before, after = handover.driven(case)
+    assert (before.folder, after.folder) == (handover.REFERENCE, handover.NEW)
+    assert not before.trial.world.effects and after.trial.world.effects
+    assert before.trial.chain is after.trial.chain and before.trial.known is after.trial.known
+    assert before.begins[-1] < after.begins[0] and before.trial.runs != after.trial.runs
+    one, other = before.trial.world.ground, after.trial.world.ground
+    assert one != other
+    assert float(other.tan_phi) == pytest.approx(float(one.tan_phi), rel=0.03)
+
+    files = handover.write(case, [before, after], tmp_path / "given")
+    places = [str(file.relative_to(tmp_path / "given")) for file in files]
+    assert places == [f"{f}/run-{n}.mcap" for f in ("reference", "new") for n in (1, 2)]
+    assert len({read(file).run.name for file in files}) == 4
+
+
+def test_on_the_same_bed_the_soil_is_the_same() -> None:
+    case = cases.drawn(1, 9, Assignment("pair", without=(("runs", 2),), bed="same"))
+    assert case.reference is not None
+    assert case.reference.world.ground is case.trial.world.ground
+
+
+def test_a_load_that_is_weighed_is_not_stated(tmp_path: Path) -> None:
+    (assignment,) = (a for a in strata.AWKWARD if a.level == "load measured")
+    case = cases.drawn(1, 9, assignment)
+    infos = [read(file).run for file in handed_over(case, tmp_path / "given")]
+    assert all(info.nominal_load is None for info in infos)
+
+
+def test_slow_noise_is_as_large_and_correlated(null: cases.Case) -> None:
+    (before,) = (c for c in null.trial.chain.converters if c.channel == "sinkage_pot")
+    (after,) = (
+        c for c in knowledge.slowed(null.trial.chain).converters if c.channel == "sinkage_pot"
+    )
+    drawn = after.noise.drawn(np.random.default_rng(1), 250_000, 4e-3)
+    assert np.std(drawn) == pytest.approx(
+        np.hypot(before.noise.white, before.noise.colour), rel=0.1
+    )
+    means = drawn.reshape(-1, 25).mean(axis=1)
+    assert np.corrcoef(means[1:], means[:-1])[0, 1] == pytest.approx(0.95, abs=0.02)
+
+
 def test_the_truth_is_the_recording_without_its_noise(null: cases.Case, tmp_path: Path) -> None:
-    recording = read(handover.write(null, tmp_path / "given")[0])
+    (alone,) = handover.driven(null)
+    recording = read(handover.write(null, [alone], tmp_path / "given")[0])
     said = config.load(tmp_path / "given" / handover.CONFIGURATION).settings.channels["sinkage_pot"]
-    truth, rows = handover.truth(null, 0), recording.arrays("/raw/sinkage_pot")
-    at = (rows["stamp"].astype(np.int64) - handover.begins(null, 0)) * 1e-9 - said.latency
+    truth, rows = handover.truth(alone, 0), recording.arrays("/raw/sinkage_pot")
+    at = (rows["stamp"].astype(np.int64) - alone.begins[0]) * 1e-9 - said.latency
     read_off = rows["volts"] * said.calibration.scale.value + said.calibration.offset.value
     residual = read_off - np.interp(at, truth["time"], truth["sinkage"])
     noise = null.trial.known.instruments["sinkage_pot"].noise * said.calibration.scale.value

@@ -1,0 +1,107 @@
+"""The plant's bed of strips beside Project Chrono's SCM terrain, on the motion that was recorded.
+
+    python -m gritd.tools.dev.strips_beside_chrono --data ../shared/real/chrono
+
+Nothing is fitted: soil and wheel are those of the recordings, the strips' recovery is a middling
+one. Steady stretches only: 2 s after slip or speed changed, to the next change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gritd.tools.proof.blind.plant.contact import Ground
+from gritd.tools.proof.blind.plant.quadrature import Array
+from gritd.tools.proof.blind.plant.respond import World, responses
+from gritd.tools.proof.blind.plant.scene import Felt, Motion, Rig
+from gritd.tools.proof.blind.plant.servo import Servo
+from gritd.tools.proof.blind.plant.strips import StripBed
+
+WEIGHTS = (31.3, 46.8, 78.6, 101.6, 30.9, 52.1)  # [N], runs 0-5
+RIG = Rig(0.072, 0.071, 1.0, Servo(1.0, 1.0, 1.0), Servo(1.0, 1.0, 1.0), 0.01)
+GROUND = Ground(1000.0, float(np.tan(np.radians(30.0))), 0.025, 1.1, 1523400.0 + 900.0 / 0.071)
+EVERY = 5  # of 250 Hz
+SETTLED = 2.0  # [s] after a change
+
+
+class Steady(NamedTuple):
+    """Means over one steady stretch: slip, then sinkage [m], torque [N·m], pull [N] of each."""
+
+    weight: float
+    slip: float
+    chrono: tuple[float, float, float]
+    strips: tuple[float, float, float]
+    paper: tuple[float, float, float]
+
+
+def stretches(folder: Path) -> Iterator[Steady]:
+    """All steady stretches of the reference campaign."""
+    recorded = [_read(folder / f"base_{run}.csv.gz") for run in range(len(WEIGHTS))]
+    motions = [_motion(*each) for each in zip(recorded, WEIGHTS, strict=True)]
+    strips = responses([(World(RIG, GROUND, bed=StripBed()), motion) for motion in motions])
+    paper = responses([(World(RIG, GROUND), motion) for motion in motions])
+    for run, known in enumerate(recorded):
+        told = np.stack((known["z"], -known["T"], known["DP"]))
+        for slip, inside in _steady(known):
+            means = tuple(told[:, inside].mean(axis=1).tolist())
+            yield Steady(
+                WEIGHTS[run], slip, means, _means(strips[run], inside), _means(paper[run], inside)
+            )
+
+
+def _read(path: Path) -> dict[str, Array]:
+    table = np.genfromtxt(path, delimiter=",", names=True)[::EVERY]
+    return {name: np.asarray(table[name], dtype=float) for name in table.dtype.names or ()}
+
+
+def _motion(known: dict[str, Array], weight: float) -> Motion:
+    heavy = np.full(known["t"].size, weight)
+    return Motion(known["t"], known["angle"], known["omega"], known["x"], known["v"], heavy, 1)
+
+
+def _steady(known: dict[str, Array]) -> Iterator[tuple[float, Array]]:
+    """Slip and samples of each stretch of one slip and speed."""
+    rim = RIG.radius * known["omega"]
+    slip = np.round(1.0 - known["v"] / np.maximum(np.abs(rim), 1e-4), 2)
+    changed = (np.abs(np.diff(rim, prepend=0.0)) > 1e-5) | (np.diff(slip, prepend=0.0) != 0.0)
+    edges = [*np.flatnonzero(changed).tolist(), rim.size]
+    for begin, end in pairwise(edges):
+        inside = (known["t"] > known["t"][begin] + SETTLED) & (np.arange(rim.size) < end)
+        if inside.sum() * EVERY > 250 and rim[begin] > 1e-3:
+            yield float(slip[begin]), inside
+
+
+def _means(felt: Felt, inside: Array) -> tuple[float, float, float]:
+    sinkage, torque, pull = (
+        float(values[inside].mean()) for values in (felt.sinkage, felt.torque, felt.pull)
+    )
+    return sinkage, torque, pull
+
+
+def main(argv: Sequence[str]) -> int:
+    """Print the table in Markdown."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
+    parser.add_argument("--data", type=Path, required=True, metavar="DIR")
+    found = sorted(stretches(parser.parse_args(argv).data))
+    print("| W [N] | slip | sinkage [mm]: SCM, strips, paper | T [N·m] | DP [N] |")
+    print("|---|---|---|---|---|")
+    for one in found:
+        three = list(zip(one.chrono, one.strips, one.paper, strict=True))
+        sinkage = ", ".join(f"{1e3 * value:.1f}" for value in three[0])
+        torque, pull = (
+            ", ".join(f"{v:.2f}" for v in three[1]),
+            ", ".join(f"{v:.1f}" for v in three[2]),
+        )
+        print(f"| {one.weight:g} | {one.slip:.0%} | {sinkage} | {torque} | {pull} |")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,72 @@
+"""What a world has of its own: there in every campaign of it, and not what is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gritd.tools.proof.blind.plant.concealed.friction import lugre
+from gritd.tools.proof.blind.plant.concealed.travel import relaxed, steps_of
+from gritd.tools.proof.blind.plant.contact import Rim
+from gritd.tools.proof.blind.plant.effect import Effect
+from gritd.tools.proof.blind.plant.memory import lagged
+from gritd.tools.proof.blind.plant.quadrature import Array
+from gritd.tools.proof.blind.plant.scene import Felt, Scene
+
+
+@dataclass(frozen=True)
+class BottomPeak(Effect):
+    """Stress peaks near the bottom, θₘ/θ₁ = strength + slope √i, and the soil springs back."""
+
+    slope: float = 0.1
+    rebound: float = 0.1  # share of the sinkage
+
+    def contact(self, rim: Rim, scene: Scene) -> Rim:
+        peak = self.strength + self.slope * np.sqrt(np.clip(scene.slip, 0.0, 1.0))
+        return replace(rim, peak=peak, rebound=self.rebound)
+
+
+@dataclass(frozen=True)
+class Relaxation(Effect):
+    """Torque and pull follow over `strength` [m] of travel, the sinkage over as much and more."""
+
+    deeper: float = 1.5  # length of the sinkage over that of the forces
+
+    def forces(self, scene: Scene) -> Scene:
+        way = steps_of(scene)
+        late = relaxed(scene, lambda values: lagged(values, way, self.strength))
+        slow = relaxed(scene, lambda values: lagged(values, way, self.strength * self.deeper))
+        return replace(late, sinkage=slow.sinkage)
+
+
+@dataclass(frozen=True)
+class WornGear(Effect):
+    """The gear takes a share of the torque (`strength`) and a level, and its teeth are felt."""
+
+    level: float = 0.1  # [N·m]
+    ripple: float = 0.05  # [N·m]
+    order: int = 30
+    phase: float = 0.0
+
+    def loss(self, scene: Scene) -> Array:
+        motion, angle = scene.motion, self.order * scene.motion.turn + self.phase
+        teeth = self.ripple * (np.cos(angle) + 0.4 * np.cos(3.0 * angle + 1.0)) * scene.moving
+        level = self.level + self.strength * np.abs(scene.torque)
+        return np.asarray(lugre(motion.omega, level, motion.step) + teeth)
+
+
+@dataclass(frozen=True)
+class LeakingSensor(Effect):
+    """Load and torque leak into the pull, the pull into load and torque; `strength`: the load's."""
+
+    torque: float = 0.0  # of the torque into the pull [1/m]
+    back: float = 0.0  # of the pull into the load
+    lever: float = 0.0  # of the pull into the torque [m]
+
+    def sensed(self, felt: Felt) -> Felt:
+        return felt.read(
+            pull=felt.pull + self.strength * felt.load + self.torque * felt.torque,
+            load=felt.load + self.back * felt.pull,
+            torque=felt.torque + self.lever * felt.pull,
+        )

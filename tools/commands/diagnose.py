@@ -34,6 +34,7 @@ from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, read_all
 from gritd.tools.report import record
+from gritd.tools.report import reference as references
 
 
 def main(argv: Sequence[str]) -> int:
@@ -58,9 +59,15 @@ def main(argv: Sequence[str]) -> int:
             USAGE,
         )
     configuration, seed = config.load(arguments.config), arguments.seed or 0
-    named = [*map(str, arguments.files), "--config", str(arguments.config), "--seed", str(seed)]
+    reference = references.given(arguments.reference, arguments.bed)
+    named = [*map(str, arguments.files)]
+    if arguments.reference:
+        named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
+    named += ["--config", str(arguments.config), "--seed", str(seed)]
     command = shlex.join(["gritd", "diagnose", *named])
-    found, damage = of_files(arguments.files, configuration, seed, _said, arguments.jobs, command)
+    found, damage = of_files(
+        arguments.files, configuration, seed, _said, arguments.jobs, command, reference
+    )
     _write(arguments, found, configuration)
     print(text(found))
     return DAMAGED if damage else DONE
@@ -77,7 +84,13 @@ def _again(arguments: argparse.Namespace) -> int:
     record.check(then)
     configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
     found, _ = of_files(
-        list(then.files), configuration, then.seed, _said, arguments.jobs, then.command
+        list(then.files),
+        configuration,
+        then.seed,
+        _said,
+        arguments.jobs,
+        then.command,
+        then.reference,
     )
     _write(arguments, found, configuration)
     differs = list(record.differences(then, record.Record.of(found)))
@@ -155,17 +168,20 @@ def of_files(
     step: object = None,
     jobs: int = 1,
     command: str = "",
+    reference: references.Given = references.NONE,
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
-    recordings, hashes = read_all(files), distinct(files)
-    rig, rate = rig_of(recordings, configuration.settings)
+    hashes = distinct([*files, *reference.files])
+    recordings, known = read_all(files), read_all(reference.files)
+    rig, rate = rig_of(recordings, configuration.settings, known, reference.bed)
     if not rig.channels:
         raise CommandError(
             f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
         )
     needed = {
         **({"command": command} if command else {}),
-        "files": hashes,
+        "files": {str(path): hashes[str(path)] for path in files},
+        **reference.kept(hashes),
         "configuration": configuration.text,
         "grid_hz": rate,
         "versions": versions(),
@@ -174,7 +190,9 @@ def of_files(
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
         found = with_innovations(found, configuration, recordings, soil=found.soil is not None)
-    damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
+    if reference.files:
+        found = references.told(found, rig, reference)
+    damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
     said = [
         *provenance.remarks(recordings, configuration.settings),
         *(f"Damaged: {line}" for line in damage),
@@ -189,6 +207,21 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
     parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
+    parser.add_argument(
+        "--reference",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="REF",
+        help="recordings of the same rig with nothing new, or the JSON of an earlier diagnosis:"
+        " then what is named is what is new",
+    )
+    parser.add_argument(
+        "--bed",
+        choices=("same", "prepared"),
+        default="prepared",
+        help="with --reference: the soil is the same, or was prepared anew; default: prepared",
+    )
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument(
@@ -275,5 +308,5 @@ def text(found: Diagnosis) -> str:
         lines.append(f"  on-line filter: {found.fit.innovation_note}")
     if found.next_experiment is not None:
         lines.append(f"  next: {found.next_experiment.action}{_foreseen(found.next_experiment)}")
-    lines += [found.remaining, *(f"note: {c}" for c in found.caveats)]
+    lines += [found.remaining_words, *(f"note: {c}" for c in found.caveats)]
     return "\n".join(map(visible, lines))

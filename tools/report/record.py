@@ -8,7 +8,7 @@ import html
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.explain.result import Diagnosis, plain
 from gritd.tools.diagnose.rig.signals import sha256
+from gritd.tools.diagnose.rig.wheel import Bed
+from gritd.tools.report.reference import Given
 
 EMBEDDED = "redo"  # id of the element of a report that holds what is needed
 ELEMENT = re.compile(rf'<pre id="{EMBEDDED}"[^>]*>(.*?)</pre>', re.DOTALL)
@@ -36,6 +38,13 @@ class Record:
     verdict: str
     accepted: tuple[str, ...]
     probability: Mapping[str, float]
+    known: Mapping[Path, str] = field(default_factory=dict)  # the reference's, with their SHA-256
+    bed: Bed = "prepared"
+
+    @property
+    def reference(self) -> Given:
+        """The campaign that it was held against."""
+        return Given(tuple(self.known), self.bed)
 
     @classmethod
     def of(cls, found: Diagnosis) -> Record:
@@ -45,6 +54,7 @@ class Record:
     def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
         """Of the JSON; its files are looked for in a folder. Raises KeyError, …"""
         redo, hypotheses = document["redo"], document["hypotheses"]
+        reference = redo.get("reference", {})
 
         return cls(
             folder,
@@ -56,6 +66,8 @@ class Record:
             str(document["verdict"]),
             tuple(str(h["effect"]) for h in hypotheses if h["accepted"]),
             {str(h["effect"]): float(h["probability"]) for h in hypotheses},
+            {_within(folder, Path(n)): str(v) for n, v in reference.get("files", {}).items()},
+            "same" if reference.get("bed") == "same" else "prepared",
         )
 
 
@@ -111,7 +123,7 @@ def read(path: Path, data: Path | None = None) -> Record:
 
 def check(record: Record) -> None:
     """Raises CommandError for the first file that is missing or not the one that was diagnosed."""
-    for path, expected in record.files.items():
+    for path, expected in {**record.files, **record.known}.items():
         if not _lies_in(record.folder, path):
             raise CommandError(
                 f"{path}: found no such file there; expected the recording that was diagnosed"

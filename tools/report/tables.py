@@ -120,8 +120,8 @@ def held_out(found: Diagnosis) -> Markup | None:
         )
     if fit.innovation_note:
         notes.append(tag("p", fit.innovation_note))
-    if found.remaining:
-        notes.append(tag("p", sentence(named(found, found.remaining))))
+    if found.remaining_words:
+        notes.append(tag("p", sentence(named(found, found.remaining_words))))
 
     return section(
         "Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note")

@@ -9,11 +9,14 @@ import numpy as np
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
+from gritd.tools.diagnose.explain.doubts import doubts
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.locate import locate, unmoved
+from gritd.tools.diagnose.explain.remainder import discrepancies, remainders
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
+    Explanation,
     Fit,
     Hypothesis,
     Location,
@@ -32,34 +35,42 @@ from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.verdict.decision import Decision
 
 SHOWN = 12  # hypotheses
+SLIGHT = 1e-3  # probability below which an explanation does not count for the soil
 
 
 def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diagnosis:
     """The result object of a search that was decided. redo: what doing it again needs."""
     problem, rig, base = search.problem, search.problem.stack.rig, search.base
     folds = run_folds(problem.stack)
-    accepted = decision.best if decision.verdict == "explained" else base
-    before, after = held_out(base.fitted, folds), held_out(accepted.fitted, folds)
+    accepted = decision.best
+    whole = decision.beside.model if decision.beside is not None else accepted
+    before, after = held_out(base.fitted, folds), held_out(whole.fitted, folds)
 
     location = _located(search, accepted, before)
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
-    if law is not None:
-        after = law.held
     hypotheses = _hypotheses(search, decision, folds)
     return Diagnosis(
         verdict=decision.verdict,
-        summary=_summary(decision, location, search.first.p),
+        summary=_summary(decision, location, search.first.p, _subject(rig)),
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
-        soil=_soil(rig, base.fitted, law.fitted if law else accepted.fitted),
+        soil=_soil(rig, base.fitted, decision),
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
-        caveats=tuple(_caveats(rig)),
-        remaining=_remaining(decision),
+        caveats=(*_caveats(rig), *doubts(rig, whole)),
+        share=decision.share,
+        remaining=remainders(problem, accepted),
+        remaining_words=_remaining(decision),
+        discrepancy=discrepancies(problem, accepted),
         nuisance=_constants(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
+        reference=None,
+        explanations=tuple(
+            Explanation(w.names, w.nameless, w.evidence, w.probability) for w in decision.weighed
+        ),
+        candidates=len(rig.effects),
         baseline=tuple(e.name for e in rig.baseline),
         traces=traces(problem, before, after),
         scatters=scatters(problem, location, before, after),
@@ -67,9 +78,9 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
     )
 
 
-def _test(screen: Screen) -> Test:
-    first, surprise = screen.largest
-    return Test(label(first), surprise, screen.threshold, screen.p, LEVEL, len(screen.nulls))
+def _test(found: Screen) -> Test:
+    first, surprise = found.largest
+    return Test(label(first), surprise, found.threshold, found.p, LEVEL, len(found.nulls))
 
 
 def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
@@ -78,8 +89,8 @@ def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location
     """
     if not search.first.alarmed:
         return ()
-    if accepted is search.base:
-        return locate(search.screening, accepted, before.predicted)
+    if not accepted.names:
+        return locate(search.screening, search.base, before.predicted)
     held = unmoved(search.screening, accepted)
     return locate(search.screening, held, held.fitted.predicted)
 
@@ -89,7 +100,6 @@ def _hypotheses(
 ) -> tuple[Hypothesis, ...]:
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
-
     ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
     out = []
     for name, probability in ranked[:SHOWN]:
@@ -139,13 +149,15 @@ def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]])
 def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
     """Fitted values of an effect, in what its units mean for the rig."""
     sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
-    quantities = {}
-    for free, x, s in zip(fitted.free, fitted.x, sigma, strict=False):
-        if free.name == name:
-            p, factor = free.parameter, rig.unit_factor(free.parameter.unit)
-            value, spread = free.value(float(x)) * factor, float(s) * p.sigma * factor
-            quantities[p.name] = Quantity(value, spread, p.unit)
-    return quantities
+    return {
+        p.name: Quantity(
+            f.value(float(x)) * rig.unit_factor(p.unit),
+            float(s) * p.sigma * rig.unit_factor(p.unit),
+            p.unit,
+        )
+        for f, x, s in zip(fitted.free, fitted.x, sigma, strict=False)
+        if f.name == name and (p := f.parameter)
+    }
 
 
 # ---- constants, fit and noise ------------------------------------------------------------------
@@ -160,13 +172,41 @@ def _constants(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
     }
 
 
-def _soil(rig: Rig, before: Fitted, after: Fitted) -> SoilFit | None:
+def _soil(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
     soil = [k for k in rig.constants if k.soil]
     if not soil:
         return None
     strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
     prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
-    return SoilFit(prior, _constants(rig, before, True), _constants(rig, after, True), strain)
+    return SoilFit(prior, _constants(rig, before, True), _averaged(rig, decision), strain)
+
+
+def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
+    """The soil of one explanation."""
+    mean, spread = model.constants()
+    sigma = np.sqrt(np.diag(spread))
+    return {
+        k.name: Quantity(k.of(float(u)), k.spread(float(u), float(s)), k.unit)
+        for k, u, s in zip(rig.constants, mean, sigma, strict=True)
+        if k.soil
+    }
+
+
+def _averaged(rig: Rig, decision: Decision) -> dict[str, Quantity]:
+    """The soil, averaged over all explanations by their probabilities: which of them is true is
+    part of what is not known.
+    """
+    every = [(w.model, w.probability) for w in decision.weighed if w.probability > SLIGHT]
+    told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
+    total = sum(share for _, share in told)
+    out = {}
+    for name, first in told[0][0].items():
+        mean = sum(share * soil[name].value for soil, share in told) / total
+        square = sum(
+            share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
+        )
+        out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
+    return out
 
 
 def _fit(problem: Problem, before: HeldOut, after: HeldOut) -> Fit:
@@ -187,6 +227,11 @@ def _noise(problem: Problem) -> dict[str, dict[str, float]]:
 # ---- in words ----------------------------------------------------------------------------------
 
 
+def _subject(rig: Rig) -> str:
+    """What is compared."""
+    return "Model and recordings" if all(rig.new) else "Reference and new campaign"
+
+
 def _caveats(rig: Rig) -> list[str]:
     sentences = list(rig.caveats)
     if len(rig.runs) == 1:
@@ -198,15 +243,19 @@ def _caveats(rig: Rig) -> list[str]:
 
 
 def _remaining(decision: Decision) -> str:
-    if not decision.left_significant:
+    if decision.beside is None:
         return "Nothing above the noise remains."
-    left = f"{decision.left:.0f} nats more"
-    return f"Functions without a name would gain {left}: something remains."
+    names = ", ".join(dict.fromkeys(label(f.shape.family) for f in decision.beside.functions))
+    return (
+        f"Something without a name remains: {names}. Functions for it gain"
+        f" {decision.beside.gain:.0f} nats."
+    )
 
 
-def _summary(decision: Decision, location: Sequence[Location], p: float) -> str:
+def _summary(decision: Decision, location: Sequence[Location], p: float, subject: str) -> str:
+    differ = f"{subject} differ (p = {p:.2g})"
     if decision.verdict == "consistent":
-        return f"Model and recordings agree (p = {p:.2g})."
+        return f"{subject} agree (p = {p:.2g})."
     if decision.verdict == "insufficient":
         return (
             f"No mismatch shows (p = {p:.2g}), but these recordings could not show most effects"
@@ -214,7 +263,6 @@ def _summary(decision: Decision, location: Sequence[Location], p: float) -> str:
         )
 
     where = f" {location[0].where}." if location else ""
-    differ = f"Model and recordings differ (p = {p:.2g})"
     if decision.verdict == "unlisted":
         return f"{differ} in a way no listed effect explains.{where}"
 

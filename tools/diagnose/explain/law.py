@@ -23,14 +23,15 @@ from gritd.tools.diagnose.explain.result import Law, Location, Quantity
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
 from gritd.tools.diagnose.fit.heldout import HeldOut, held_out, run_folds
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import WIDE, Fitted, FreeParameter, Maker, Problem
+from gritd.tools.diagnose.fit.problem import WIDE, Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import LawForm, Stack
 from gritd.tools.diagnose.screen.scans import in_step
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import Search
-from gritd.tools.diagnose.verdict.nameless import nameless_functions, remaining
+from gritd.tools.diagnose.verdict.decide import taken_share
+from gritd.tools.diagnose.verdict.nameless import nameless_functions
 
 PAYS = 3.0  # [nats] a term must gain
 INSIDE = (0.005, 0.995)  # quantiles of a covariate between which its domain lies
@@ -80,7 +81,7 @@ def find_law(search: Search, model: Model, location: Sequence[Location]) -> Fitt
         start = replace(start, fitted=_with_terms(start, terms, form, domain))
 
     law = _law(search, model, start, prefix, terms, domain)
-    return FittedLaw(law, start.fitted, held_out(start.fitted, run_folds(stack), start.columns))
+    return FittedLaw(law, start.fitted, held_out(start.fitted, run_folds(stack)))
 
 
 # ---- steps and waves ---------------------------------------------------------------------------
@@ -103,7 +104,6 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
     """Every step and wave, with its size in the channel's unit."""
     taken = start.fitted.slack[len(start.fitted.slack) - start.columns.shape[1] :]
     ends = np.cumsum([0, *(s.columns.shape[1] for s in start.functions)])
-
     for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
         added = start.columns[:, first:last] @ taken[first:last]
         acting = added[added != 0.0]
@@ -117,9 +117,7 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
 # ---- terms -------------------------------------------------------------------------------------
 
 
-def _terms(
-    start: Start, form: LawForm, names: list[str], domain: Domain
-) -> tuple[FreeParameter, ...]:
+def _terms(start: Start, form: LawForm, names: list[str], domain: Domain) -> tuple[Free, ...]:
     """Terms of slip, sinkage and speed that pay."""
     fitted, parameters = start.fitted, {p.name: p for p in form.effect.parameters()}
     edges = _edges(form.effect, domain)
@@ -132,7 +130,7 @@ def _terms(
     strengths = [p.name for p in parameters.values() if p.role == "strength"]
     columns = whiten(start.problem.noise, made.columns[:, [strengths.index(n) for n in names]])
     kept = _forward(fitted, columns)
-    return tuple(FreeParameter(form.effect, parameters[names[i]], form.effect.name) for i in kept)
+    return tuple(Free(form.effect, parameters[names[i]], form.effect.name) for i in kept)
 
 
 def _forward(fitted: Fitted, columns: Array) -> list[int]:
@@ -140,7 +138,6 @@ def _forward(fitted: Fitted, columns: Array) -> list[int]:
     a, b = fitted.projection().project(columns)
     kept: list[int] = []
     best = 0.0
-
     while len(kept) < len(b):
         tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
         i = max(tried, key=lambda k: tried[k])
@@ -154,9 +151,7 @@ def _value(a: Array, b: Array, index: list[int]) -> float:
     return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
 
 
-def _with_terms(
-    start: Start, free: tuple[FreeParameter, ...], form: LawForm, domain: Domain
-) -> Fitted:
+def _with_terms(start: Start, free: tuple[Free, ...], form: LawForm, domain: Domain) -> Fitted:
     """Full fit of the chosen terms; the domain's edges stay."""
     effect, fitted = partial(form.effect, **_edges(form.effect, domain)), start.fitted
     free = tuple(replace(f, effect=effect) for f in free)
@@ -188,38 +183,31 @@ def _law(
     model: Model,
     start: Start,
     prefix: str,
-    free: tuple[FreeParameter, ...],
+    free: tuple[Free, ...],
     domain: Domain,
 ) -> Law:
     fitted, stack = start.fitted, search.problem.stack
     form = stack.rig.law
     assert form is not None
-    channel, quantities = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
-    terms = [
-        f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in quantities.items()
-    ]
+    channel, found = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
+    terms = [f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in found.items()]
     parts = [f"{channel} {' '.join(terms)}, {form.note}"] if terms else []
     parts += _words(stack, start)
-
-    gained = 0.5 * (model.fitted.objective - fitted.objective)
-    left, _ = remaining(search, Model(fitted, (*model.names, form.effect.name)))
 
     along = sorted({f.shape.along[0] for f in start.functions})
     covariates = {n: stack.covariate(n) for n in along}
     ranges = {n: (float(np.min(x)), float(np.max(x))) for n, x in covariates.items()}
-    edges = _stated_edges(form.effect, domain) if quantities else {}
+    edges = _stated_edges(form.effect, domain) if found else {}
     return Law(
         channel,
         "; ".join(parts),
-        {**(domain if quantities else {}), **ranges},
-        gained / max(gained + left, 1e-9),
-        {**quantities, **edges},
+        {**(domain if found else {}), **ranges},
+        taken_share(search, Model(fitted)),
+        {**found, **edges},
     )
 
 
-def _quantities(
-    fitted: Fitted, before: int, free: tuple[FreeParameter, ...]
-) -> dict[str, Quantity]:
+def _quantities(fitted: Fitted, before: int, free: tuple[Free, ...]) -> dict[str, Quantity]:
     first = len(fitted.u) + before
     sigma = np.sqrt(np.diag(fitted.covariance()))[first : first + len(free)]
     return {

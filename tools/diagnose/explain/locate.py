@@ -77,7 +77,8 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
         alone,
         u=np.zeros_like(fit.u),
         jacobian=np.zeros_like(alone.jacobian),
-        residual=alone.residual - screening.problem.tolerance @ fit.slack,
+        residual=alone.residual
+        - screening.problem.tolerance @ fit.slack[: screening.problem.tolerance.shape[1]],
     )
     return Model(held)
 

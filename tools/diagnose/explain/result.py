@@ -164,6 +164,52 @@ class NextExperiment:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What the accepted names leave of a channel beyond its noise, root mean square."""
+
+    rms: float
+    unit: str
+    where: str  # in words
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """How far the form of the model may be off in a channel, one standard deviation."""
+
+    size: float
+    unit: str
+    learnt_from: str  # prior, reference or recordings
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The campaign that a new one is held against: then names, places and fit speak of what is new.
+
+    verdict: of its own diagnosis, where one was given; covered: share of the new campaign's values
+        that lie where the reference was driven; outside: where the others lie.
+    """
+
+    files: tuple[str, ...]
+    verdict: str | None
+    bed: str
+    covered: float
+    outside: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One of those that compete: listed effects, the discrepancy of form alone where there are
+    none, functions without a name beside them where `nameless`. evidence: [nats] above the
+    discrepancy alone.
+    """
+
+    names: tuple[str, ...]
+    nameless: bool
+    evidence: float
+    probability: float
+
+
+@dataclass(frozen=True)
 class Trace:
     """One channel of one run on the analysis grid, each list (n,). Predictions are for the run held
     out.
@@ -211,13 +257,19 @@ class Diagnosis:
     law: Law | None
     next_experiment: NextExperiment | None
     caveats: tuple[str, ...]
-    remaining: str  # what remains above the noise floor after the best explanation, in words
+    share: float  # of the misfit that the accepted names take
+    remaining: Mapping[str, Remainder]  # channel -> what they leave
+    remaining_words: str
+    discrepancy: Mapping[str, Discrepancy]  # channel -> how far the form of the model may be off
     nuisance: Mapping[
         str, Quantity
     ]  # calibration constants that floated, fitted with the accepted effects
     noise: Mapping[
         str, Mapping[str, float]
     ]  # channel -> sigma of a grid value, correlation time [s], configured sigma
+    reference: Reference | None  # the campaign in which nothing is new
+    explanations: tuple[Explanation, ...]  # all that were weighed
+    candidates: int  # listed effects that were considered
     baseline: tuple[str, ...]  # effects the configuration already held
     traces: tuple[Trace, ...]
     scatters: tuple[Scatter, ...]

@@ -35,7 +35,7 @@ def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
         size = size_of(stack, channel)
 
         for along, columns in _families(stack):
-            kept = _scaled(np.where(own[:, None], columns, 0.0), own, size)
+            kept = _scaled(np.where((own & stack.new)[:, None], columns, 0.0), own, size)
             if kept.shape[1]:
                 signatures.append(Signature(Shape(channel, along), kept, (0,) * kept.shape[1], {}))
 

@@ -31,7 +31,7 @@ class HeldOut:
 
 
 def run_folds(stack: Stack) -> list[Bools]:
-    """Each run, marked (N,); where there are fewer than three, the thirds of each run in time."""
+    """Each run; where there are fewer than three, the thirds of each run in time."""
     runs = np.unique(stack.run)
     if len(runs) >= 3:
         return [stack.run == r for r in runs]
@@ -40,7 +40,7 @@ def run_folds(stack: Stack) -> list[Bools]:
 
 
 def condition_folds(stack: Stack) -> list[Bools]:
-    """Bands of load and of slip, marked (N,), as far as they vary."""
+    """Bands of load and of slip, as far as they vary."""
     folds = []
     for name in ("load", "slip"):
         if name in stack.rig.runs[0].covariates:
@@ -65,28 +65,23 @@ def _thirds(time: Array, run: Index) -> Index:
     return out
 
 
-def held_out(fitted: Fitted, folds: Sequence[Bools], beside: Array | None = None) -> HeldOut:
-    """Density and prediction of every fold by the model fitted to the others.
-
-    beside: (N, m) functions that stand last in the fit's tolerance and are predicted too, in the
-        channels' units.
+def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
+    """Density and prediction of every fold by the model fitted to the others; the discrepancies
+    that it learnt are predicted too.
     """
-    own = np.zeros((fitted.predicted.size, 0)) if beside is None else beside
+    own = fitted.carried
     last = fitted.jacobian.shape[1] - own.shape[1]
-
     j, r = fitted.jacobian, fitted.residual
     size = len(fitted.u) + len(fitted.x)
     centre = np.concatenate(
         (fitted.u, fitted.x, np.zeros_like(fitted.slack))
     )  # r is the residual without tolerance
     penalty = fitted.penalty**2
-    gram, slope = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
-
+    gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
     density, predicted = [], fitted.predicted.copy()
-
     for fold in folds:
         inside = j[fold]
-        less, pulled = gram - inside.T @ inside, slope - inside.T @ r[fold]
+        less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]
         step = np.linalg.solve(less, pulled)
         predicted[fold] = (
             fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
@@ -104,6 +99,6 @@ def _log_density(error: Array, jacobian: Array, gram: Array) -> float:
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:
-    """Root mean square error of a prediction (N,) in each channel, in its unit."""
+    """Root mean square error of each channel in its unit."""
     error = stack.measured - predicted
     return {c: float(np.sqrt(np.mean(error[stack.of(c)] ** 2))) for c in stack.rig.channels}

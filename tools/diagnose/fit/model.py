@@ -1,20 +1,86 @@
-"""A set of effects and its fit."""
+"""A set of effects, its fit, and its evidence."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.bending import bending_freedoms
+from gritd.tools.diagnose.fit.freedom import Freedom
+from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
+from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
+
+ROUNDS = 4  # of fit and sizes, one after the other; nearly always two are enough
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The base model with some effects, fitted together with the constants."""
+    """The base model with some effects, fitted together with the constants.
+
+    fitted:   with every freedom at its likeliest size.
+    evidence: log evidence, averaged over the sizes of the freedoms.
+    sizes:    of each freedom of form, which one.
+    bends:    of each effect, how far its form differs.
+    """
 
     fitted: Fitted
-    names: tuple[str, ...] = ()  # of the effects
-    log_prior: float = 0.0  # of so many effects at work [nats]
+    names: tuple[str, ...] = ()
+    evidence: float = float("nan")
+    sizes: Chosen = ()
+    bends: tuple[float, ...] = ()
+    marginal: Marginal | None = None
+    chosen: Chosen = ()  # sizes of all freedoms in `marginal`
 
-    @property
-    def evidence(self) -> float:
-        return self.fitted.log_evidence + self.log_prior
+    def constants(self) -> tuple[Array, Array]:
+        """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of
+        all freedoms: how far the forms may be off is part of what is not known of the soil.
+        """
+        count = len(self.fitted.u)
+        if self.marginal is None:
+            return self.fitted.u, self.fitted.covariance()[:count, :count]
+        return self.marginal.constants(self.chosen, count)
+
+
+def fit_model(
+    problem: Problem,
+    forms: Sequence[Freedom],
+    effects: Sequence[Maker],
+    free: Sequence[Free],
+    start: tuple[Array, Array],
+    sizes: Chosen,
+) -> Model:
+    """Fit and sizes in turns, until the sizes stay.
+
+    problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
+    parameters (p,); sizes: of the forms, where the search begins.
+    """
+    allowed = problem.with_freedoms(forms, _values(forms, sizes))
+    fitted = allowed.descend(effects, free, *start)
+    for _ in range(ROUNDS):
+        bends = bending_freedoms(problem.stack, problem.noise, fitted)
+        every = (*forms, *bends)
+
+        before = sizes
+        marginal = Marginal(fitted, problem.tolerance, every)
+        chosen, evidence = marginal.likeliest((*sizes, *(0 for _ in bends)))
+        sizes = chosen[: len(forms)]
+        if sizes == before:
+            break
+        fitted = problem.with_freedoms(forms, _values(forms, sizes)).refit(fitted)
+
+    names = tuple(effect.name for effect in fitted.acting)
+    bent = problem.with_freedoms(every, _values(every, chosen))
+    final = bent.refit(fitted)
+    shapes = tuple(_values(bends, chosen[len(forms) :]))
+    return Model(final, names, evidence, sizes, shapes, marginal, chosen)
+
+
+def plain_model(problem: Problem, fitted: Fitted) -> Model:
+    """A fit without freedoms."""
+    names = tuple(effect.name for effect in fitted.acting)
+    return Model(fitted, names, Marginal(fitted, problem.tolerance, ()).likeliest(())[1])
+
+
+def _values(freedoms: Sequence[Freedom], chosen: Chosen) -> list[float]:
+    return [f.sizes.values[number] for f, number in zip(freedoms, chosen, strict=True)]

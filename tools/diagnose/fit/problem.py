@@ -1,35 +1,34 @@
-"""Constants and effects fitted together to all channels of all runs: Gauss-Newton with priors,
-started warm.
+"""Constants and effects fitted together to all channels of all runs, within their priors and
+bounds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
-from scipy.special import logsumexp
 
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.fit import descent
+from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.projection import Projection, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
 
 Maker = Callable[..., Effect]  # an effect's class, or one with some parameters given
 
-STEP = 0.02  # of a prior σ or an expected size, for differences
-ROUNDS = 8
-ENOUGH = 0.02  # [nats] an improvement less than this ends the descent
+STEP = 2e-3  # of a prior σ or an expected size, for differences
+ROUNDS = 30  # linearisations at most; a descent that needs them all has not converged
+FAR = 8.0  # [σ] constants are kept this close to what is known of them
 WIDE = 3.0  # a strength's prior standard deviation, in units of the expected size
 
 
 @dataclass(frozen=True)
-class FreeParameter:
+class Free:
     """One parameter of an effect in the fit: its value is off + x · size, inside its bounds."""
 
     effect: Maker
@@ -48,12 +47,12 @@ class FreeParameter:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A maximum of the posterior. x: constants in prior σ, then effect parameters in expected
+    """An optimum of the posterior. x: constants in prior σ, then effect parameters in expected
     sizes, then tolerance.
     """
 
     effects: tuple[Maker, ...]
-    free: tuple[FreeParameter, ...]
+    free: tuple[Free, ...]
     u: Array  # (q,)
     x: Array  # (p,)
     predicted: Array  # (N,), tolerance not included
@@ -63,82 +62,58 @@ class Fitted:
     penalty: Array  # (q + p + tolerance,) square root of the prior precision
     slack: Array  # fitted tolerance (t,)
     objective: float  # whitened squares and prior strain at the optimum
+    carried: (
+        Array  # (N, m) in the channels' units: the last of the tolerance, predicted elsewhere too
+    )
+    held: Bools  # (q + p,) stands at its bound and wants out
+    converged: bool = False
 
     @property
     def acting(self) -> tuple[Effect, ...]:
         return build(self.effects, self.free, self.x)
 
-    def covariance(self) -> Array:
-        """Of all unknowns (q + p + t, q + p + t), in the units of u, x and slack."""
-        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
-        return np.asarray(np.linalg.inv(gram))
+    @property
+    def centre(self) -> Array:
+        """Constants and effect parameters (q + p,)."""
+        return np.concatenate((self.u, self.x))
+
+    @property
+    def all_u(self) -> Array:
+        return np.concatenate((self.u, self.x, self.slack))
+
+    @property
+    def nats(self) -> float:
+        return 0.5 * self.objective
 
     @cached_property
-    def log_evidence(self) -> float:
-        """Log evidence, up to a constant that all models of one problem share.
+    def gradient(self) -> Array:
+        """Of `nats` by constants and effect parameters (q + p,), the tolerance fitted to each."""
+        own = self.jacobian[:, : self.raw.shape[1]]
+        left = self.residual - self.jacobian[:, own.shape[1] :] @ self.slack
+        return np.asarray(self.penalty[: own.shape[1]] ** 2 * self.centre - own.T @ left)
 
-        Laplace's approximation (MacKay 2003, ch. 27) for all unknowns but the strengths; these have
-        the screen's prior: several sizes, and of each effect all strengths or one alone.
-        """
-        strong = np.zeros(self.penalty.size, bool)
-        strong[len(self.u) : len(self.u) + len(self.free)] = [
-            f.parameter.role == "strength" for f in self.free
-        ]
+    @cached_property
+    def curvature(self) -> Array:
+        """Of `nats` (q + p, q + p), the tolerance fitted to each."""
+        count = self.raw.shape[1]
+        own, tolerance = self.jacobian[:, :count], self.jacobian[:, count:]
+        gram = tolerance.T @ tolerance + np.eye(tolerance.shape[1])
+        shared = own.T @ tolerance
+        taken = shared @ np.linalg.solve(gram, shared.T)
+        return np.asarray(own.T @ own - taken + np.diag(self.penalty[:count] ** 2))
 
-        centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
-        prior = np.where(strong, 0.0, self.penalty**2)
-        pull = self.jacobian.T @ self.residual - prior * centre
-        gram = self.jacobian.T @ self.jacobian + np.diag(prior)
-
-        root = np.linalg.cholesky(gram[np.ix_(~strong, ~strong)])
-        inside = np.linalg.solve(
-            root, np.column_stack((gram[np.ix_(~strong, strong)], pull[~strong]))
-        )
-        spread = 2.0 * np.log(np.diag(root)).sum() - 2.0 * np.log(self.penalty[~strong]).sum()
-
-        misfit = (
-            self.residual @ self.residual
-            + np.sum(prior * centre**2)
-            - inside[:, -1] @ inside[:, -1]
-        )
-
-        a = gram[np.ix_(strong, strong)] - inside[:, :-1].T @ inside[:, :-1]
-        b = pull[strong] - inside[:, :-1].T @ inside[:, -1]
-        return float(-0.5 * (misfit + spread) + self._strengths(a, b, centre[strong]))
-
-    def _strengths(self, a: Array, b: Array, at: Array) -> float:
-        """What the strengths add to the log evidence, from curvature (p, p) and slope (p,) of the
-        likelihood there.
-        """
-        if not at.size:
-            return 0.0
-        free = [f for f in self.free if f.parameter.role == "strength"]
-        sign = [int(f.parameter.low >= f.parameter.off) for f in free]
-
-        names = [f.name for f in free]
-        groups = [[i for i, n in enumerate(names) if n == name] for name in dict.fromkeys(names)]
-        chosen = [
-            sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))
-        ]
-
-        pull = b + a @ at  # seen from strengths of nought
-        evidence = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
-        return float(logsumexp(evidence) - np.log(len(evidence)) - b @ at - 0.5 * at @ a @ at)
+    def covariance(self) -> Array:
+        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
+        return np.asarray(np.linalg.inv(gram))
 
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
         scaled = self.jacobian / self.penalty
-        centre = np.concatenate((self.u, self.x, np.zeros_like(self.slack)))
+        centre = np.concatenate((self.centre, np.zeros_like(self.slack)))
         return Projection(scaled, self.residual, centre * self.penalty, surrogates)
 
 
-def _choices(strengths: list[int]) -> list[list[int]]:
-    """All strengths of an effect together, and each alone."""
-    return [strengths] if len(strengths) == 1 else [strengths, *([i] for i in strengths)]
-
-
-def build(effects: Sequence[Maker], free: Sequence[FreeParameter], x: Array) -> tuple[Effect, ...]:
-    """The effects with their free parameters at x (p,)."""
+def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
     values: list[dict[str, float]] = [{} for _ in effects]
     for f, value in zip(free, x.tolist(), strict=True):
         values[effects.index(f.effect)][f.parameter.name] = f.value(value)
@@ -154,147 +129,156 @@ class Problem:
         """
         self.stack, self.noise, self.allowed = stack, noise, tolerance
         self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
+        self.carried = np.zeros((stack.size, 0))
         self.measured = whiten(noise, stack.measured)
 
     def beside(self, columns: Array) -> Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
         """
+        return self._with(columns, whiten(self.noise, columns))
+
+    def with_freedoms(self, freedoms: Sequence[Freedom], sizes: Sequence[float]) -> Problem:
+        """The same with freedoms of given sizes."""
+        sized = [(f, size) for f, size in zip(freedoms, sizes, strict=True) if size > 0.0]
+        if not sized:
+            return self
+        return self._with(
+            np.column_stack([f.columns * size for f, size in sized]),
+            np.column_stack([f.whitened * size for f, size in sized]),
+        )
+
+    def _with(self, columns: Array, whitened: Array) -> Problem:
         other = copy(self)
-        other.tolerance = np.column_stack((self.tolerance, whiten(self.noise, columns)))
+        other.tolerance = np.column_stack((self.tolerance, whitened))
         other.allowed = np.column_stack((self.allowed, columns))
+        other.carried = np.column_stack((self.carried, columns))
         return other
 
     def descend(
         self,
         effects: Sequence[Maker],
-        free: Sequence[FreeParameter],
+        free: Sequence[Free],
         u: Array,
         x: Array,
         rounds: int = ROUNDS,
     ) -> Fitted:
-        """The nearest optimum from constants u (q,) and effect parameters x (p,)."""
-        q = len(u)
-        penalty = np.concatenate(
-            (np.ones(q), [f.weight for f in free], np.ones(self.tolerance.shape[1]))
+        """The nearest optimum within bounds from constants u and effect parameters x."""
+        ground = _Ground(self, tuple(effects), tuple(free))
+        start = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))[0]
+        here = ground.linearised(start)
+        fitted, converged = descent.descend(ground, here, rounds) if rounds else (here, False)
+        return replace(fitted, converged=converged)
+
+    def refit(self, fitted: Fitted, rounds: int = ROUNDS) -> Fitted:
+        """The nearest optimum from a fit with other tolerances, whose slopes are a start."""
+        ground = _Ground(self, fitted.effects, fitted.free)
+        start = ground.tried(fitted.centre)[0]
+        found, converged = descent.descend(ground, ground.moved(fitted, start), rounds)
+        return replace(found, converged=converged)
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A prediction that was not linearised."""
+
+    centre: Array
+    predicted: Array
+    residual: Array
+    slack: Array
+    objective: float
+
+
+class _Ground:
+    """What is descended for one set of effects: see descent.Ground."""
+
+    def __init__(
+        self, problem: Problem, effects: tuple[Maker, ...], free: tuple[Free, ...]
+    ) -> None:
+        self._problem, self._effects, self._free = problem, effects, free
+        constants = problem.stack.rig.constants
+        self._count = len(constants)
+        weights = (np.ones(self._count), [f.weight for f in free])
+        self._penalty = np.concatenate((*weights, np.ones(problem.tolerance.shape[1])))
+        self._gram = problem.tolerance.T @ problem.tolerance + np.eye(problem.tolerance.shape[1])
+
+        ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
+        low, high = np.array(ends).reshape(-1, 2).T
+        self.bounds = descent.Bounds(low, high)
+
+    def tried(self, centre: Array) -> tuple[_Tried, float]:
+        problem = self._problem
+        predicted = self._predicted(centre)
+        if not np.isfinite(predicted).all():
+            return _Tried(centre, predicted, predicted, np.zeros(0), np.inf), np.inf
+        residual = problem.measured - whiten(problem.noise, predicted)
+
+        tolerance = problem.tolerance
+        slack = np.asarray(np.linalg.solve(self._gram, tolerance.T @ residual))
+        left = residual - tolerance @ slack
+        strain = np.sum((self._penalty[: centre.size] * centre) ** 2)
+        objective = float(left @ left + slack @ slack + strain)
+        return _Tried(centre, predicted, residual, slack, objective), 0.5 * objective
+
+    def linearised(self, tried: _Tried) -> Fitted:
+        raw = self._derivatives(tried.centre, tried.predicted)
+        return self._fitted(tried, raw, whiten(self._problem.noise, raw))
+
+    def moved(self, here: Fitted, tried: _Tried) -> Fitted:
+        """There, with the derivatives of a fit that stands next to it."""
+        return self._fitted(tried, here.raw, here.jacobian[:, : here.raw.shape[1]])
+
+    def _fitted(self, tried: _Tried, raw: Array, whitened: Array) -> Fitted:
+        problem, centre = self._problem, tried.centre
+        jacobian = np.column_stack((whitened, problem.tolerance))
+        fitted = Fitted(
+            self._effects,
+            self._free,
+            centre[: self._count],
+            centre[self._count :],
+            tried.predicted,
+            tried.residual,
+            jacobian,
+            raw,
+            self._penalty,
+            tried.slack,
+            tried.objective,
+            problem.carried,
+            np.zeros(centre.size, bool),
         )
-        centre = np.concatenate((u, x))
-        state = self._at(effects, free, centre, q)
-        return self.refine(self._state(effects, free, centre, q, state, penalty), rounds)
+        return replace(fitted, held=self.bounds.held(centre, fitted.gradient))
 
-    def refine(self, best: Fitted, rounds: int = ROUNDS) -> Fitted:
-        """The nearest optimum from a fit that was not finished."""
-        for _ in range(rounds):
-            better = self._search(
-                best.effects, best.free, best, self._step(best), len(best.u), best.penalty
-            )
-            if better is None:
-                break
-            gained, best = best.objective - better.objective, better
-            if gained < ENOUGH:
-                break
-        return best
+    def _predicted(self, centre: Array) -> Array:
+        acting = build(self._effects, self._free, centre[self._count :])
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            return self._problem.stack.predict(centre[: self._count], acting)
 
-    def _search(
-        self,
-        effects: Sequence[Maker],
-        free: Sequence[FreeParameter],
-        best: Fitted,
-        step: Array,
-        q: int,
-        penalty: Array,
-    ) -> Fitted | None:
-        """The first shortened step that improves, with its Jacobian."""
-        centre = np.concatenate((best.u, best.x))
-        for share in (1.0, 0.4, 0.1):
-            tried = self._bounded(free, centre + share * step, q)
-            predicted, residual = self._at(effects, free, tried, q)
-            _, objective = self._slack(residual, tried, penalty)
-            if objective < best.objective:
-                return self._state(effects, free, tried, q, (predicted, residual), penalty)
-        return None
-
-    def _bounded(self, free: Sequence[FreeParameter], centre: Array, q: int) -> Array:
-        out = centre.copy()
-        for i, f in enumerate(free):
-            p = f.parameter
-            out[q + i] = np.clip(
-                out[q + i], (p.low - p.centre) / p.sigma, (p.high - p.centre) / p.sigma
-            )
-        out[:q] = np.clip(out[:q], -8.0, 8.0)
-        return out
-
-    def _at(
-        self, effects: Sequence[Maker], free: Sequence[FreeParameter], centre: Array, q: int
-    ) -> tuple[Array, Array]:
-        predicted = self.stack.predict(centre[:q], build(effects, free, centre[q:]))
-        return predicted, self.measured - whiten(self.noise, predicted)
-
-    def _slack(self, residual: Array, centre: Array, penalty: Array) -> tuple[Array, float]:
-        """Best tolerance for a residual, and the objective with it."""
-        t = self.tolerance
-        gram = t.T @ t + np.eye(t.shape[1])
-        slack = np.asarray(np.linalg.solve(gram, t.T @ residual)) if t.shape[1] else np.zeros(0)
-        left = residual - t @ slack
-        return slack, float(
-            left @ left + slack @ slack + np.sum((penalty[: len(centre)] * centre) ** 2)
-        )
-
-    def _state(
-        self,
-        effects: Sequence[Maker],
-        free: Sequence[FreeParameter],
-        centre: Array,
-        q: int,
-        at: tuple[Array, Array],
-        penalty: Array,
-    ) -> Fitted:
-        predicted, residual = at
-        slack, objective = self._slack(residual, centre, penalty)
-        raw = np.empty((self.stack.size, len(centre)))
-        partial = self.stack.partial
-        for i in (i for i in range(len(centre)) if i not in partial):
-            raw[:, i] = self._difference(effects, free, centre, q, i, predicted)
-        for i, (whole, share) in partial.items():
+    def _derivatives(self, centre: Array, predicted: Array) -> Array:
+        """Of the prediction by every unknown (N, q + p); away from a bound."""
+        stack, raw = self._problem.stack, np.zeros((predicted.size, centre.size))
+        for i in (i for i in range(centre.size) if i not in stack.partial):
+            step = -STEP if centre[i] + STEP > self.bounds.high[i] else STEP
+            moved = centre.copy()
+            moved[i] += step
+            raw[:, i] = (self._predicted(moved) - predicted) / step
+        for i, (whole, share) in stack.partial.items():
             raw[:, i] = share * raw[:, whole]
-
-        jacobian = whiten(self.noise, raw)
-        return Fitted(
-            tuple(effects), tuple(free), centre[:q], centre[q:], predicted, residual,
-            np.column_stack((jacobian, self.tolerance)), raw, penalty, slack, objective,
-        )  # fmt: skip
-
-    def _difference(
-        self,
-        effects: Sequence[Maker],
-        free: Sequence[FreeParameter],
-        centre: Array,
-        q: int,
-        i: int,
-        predicted: Array,
-    ) -> Array:
-        """Derivative of the prediction by one unknown; away from a bound."""
-        step = STEP
-        if i >= q:
-            p = free[i - q].parameter
-            step = -STEP if centre[i] * p.sigma + p.centre + STEP * p.sigma > p.high else STEP
-
-        moved = centre.copy()
-        moved[i] += step
-        change: Array = (
-            self.stack.predict(moved[:q], build(effects, free, moved[q:])) - predicted
-        ) / step
-        return change
-
-    def _step(self, fitted: Fitted) -> Array:
-        count = len(fitted.u) + len(fitted.x)
-        j, penalty = fitted.jacobian, fitted.penalty
-        pulled = np.concatenate((fitted.u, fitted.x, np.zeros_like(fitted.slack)))
-        step = np.linalg.solve(
-            j.T @ j + np.diag(penalty**2), j.T @ fitted.residual - penalty**2 * pulled
-        )
-        return np.asarray(step[:count])
+        return np.nan_to_num(raw, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def free_of(effects: Sequence[type[Effect]]) -> tuple[FreeParameter, ...]:
-    return tuple(FreeParameter(e, p, e.name) for e in effects for p in e.parameters())
+def _ends(known: Constant) -> tuple[float, float]:
+    """Bounds of a constant, in prior σ."""
+    if known.log:
+        return -FAR, FAR
+    low, high = ((end - known.value) / known.sigma for end in (known.low, known.high))
+    return max(low, -FAR), min(high, FAR)
+
+
+def _ends_of(free: Free) -> tuple[float, float]:
+    """Bounds of an effect's parameter, in expected sizes."""
+    p = free.parameter
+    return (p.low - p.centre) / p.sigma, (p.high - p.centre) / p.sigma
+
+
+def free_of(effects: Sequence[type[Effect]]) -> tuple[Free, ...]:
+    return tuple(Free(e, p, e.name) for e in effects for p in e.parameters())

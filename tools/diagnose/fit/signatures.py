@@ -82,6 +82,13 @@ def _derivative(
     return np.full(stack.size, np.nan)
 
 
+def order_of(effect: type[Effect]) -> str | None:
+    """The shape of an effect that is an order of the wheel angle, if it has one."""
+    return next(
+        (p.name for p in effect.parameters() if p.role == "shape" and p.scan and not p.unit), None
+    )
+
+
 def shape_grid(rig: Rig, effect: type[Effect]) -> Iterator[dict[str, float]]:
     """Values of the effect's shapes worth trying on these recordings, all combinations."""
     shapes = [p for p in effect.parameters() if p.role == "shape"]

@@ -101,6 +101,31 @@ def estimate(
     )
 
 
+def estimate_beside_form(
+    stack: Stack,
+    predicted: Array,
+    explainable: Explainable,
+    before: Noise,
+    rng: np.random.Generator,
+) -> Noise:
+    """The same from a reference campaign: all that it shows beside what the form explains is what
+    this rig does when nothing is new, waves included.
+    """
+    residual, cells = stack.measured - predicted, replicates.cells(stack)
+    found = [
+        _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
+        for channel in stack.rig.channels
+    ]
+    colours = tuple(f[0] for f in found)
+    return Noise(
+        stack,
+        colours,
+        tuple(f[1:] for f in found),
+        uncertain(stack, predicted, colours),
+        np.zeros((stack.size, 0)),
+    )
+
+
 def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
     """Values of a channel that are hardly noisier than it is; at least half of them."""
     own = stack.of(channel)
@@ -118,9 +143,12 @@ def _fit_channel(
     cells: Index,
     before: Noise,
     rng: np.random.Generator,
+    rows: Bools | None = None,
 ) -> tuple[Colour, ...]:
-    """The colour to whiten with, then draws from the posterior."""
+    """The colour to whiten with, then draws from the posterior; of some rows (N,) only."""
     own = _steady(stack, channel, before)
+    if rows is not None and (own & rows).any():
+        own = own & rows
     mean = saturated_mean(residual[own], saturated.leading[own], saturated.whole[own], cells[own])
     columns = np.column_stack((mean, residual[own]))
 

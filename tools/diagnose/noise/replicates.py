@@ -59,7 +59,7 @@ def _labels(stack: Stack, coarser: float) -> Index:
 
 def _conditions(stack: Stack) -> Array:
     """Slip, speed and load of each value, in widths of a cell (N, m)."""
-    columns = [np.zeros(stack.size)]
+    columns = [np.where(stack.new, 1.0, 0.0)]
     for name, width in WIDTHS.items():
         if name in stack.rig.runs[0].covariates:
             values = stack.covariate(name)
@@ -245,9 +245,10 @@ def _few(count: int) -> float:
 
 
 def _terms(stack: Stack) -> Array:
-    """Pass and start of each run (runs, 2): on other terms a repetition is no replicate."""
-    rows = []
+    """Pass, start and campaign of each run (runs, 3): on other terms a repetition is no replicate."""
+    rows: list[tuple[float, float, float]] = []
     for run in stack.rig.runs:
         passes = run.covariates.get("pass", np.zeros(1))
-        rows.append((float(passes[0]), float(run.covariates["position"][0])))
+        start = float(run.covariates["position"][0])
+        rows.append((float(passes[0]), start, float(stack.rig.new[len(rows)])))
     return np.array(rows)

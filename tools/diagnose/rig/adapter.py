@@ -6,26 +6,44 @@ from collections.abc import Sequence
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
+from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.diagnose.rig.drive import RATE as DRIVE_RATE
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
-from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
 
 # all runs together up to so long [s]: grid [Hz]
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
 FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
 
 
-def rig_of(recordings: Sequence[Recording], settings: Settings) -> tuple[Rig, float]:
-    """The adapter that fits the recordings, and its grid [Hz]. Raises CommandError."""
+def rig_of(
+    recordings: Sequence[Recording],
+    settings: Settings,
+    reference: Sequence[Recording] = (),
+    bed: Bed = "prepared",
+) -> tuple[Rig, float]:
+    """The adapter that fits the recordings, and its grid [Hz]. Raises CommandError.
+
+    reference: recordings of a campaign in which nothing is new; bed: whether the others drive on
+    the same bed or on one prepared anew.
+    """
     if is_drive(recordings):
+        if reference:
+            raise CommandError(
+                "--reference: found a drive without soil; expected a wheel's recordings", USAGE
+            )
         series = [drive_series(r, settings) for r in recordings]
         names = [r.run.name or r.path.stem for r in recordings]
         return DriveRig(series, names, settings), DRIVE_RATE
 
-    coarse = [signals(r, settings, FIRST) for r in recordings]
-    length = sum(float(s.time[-1]) for s in coarse)
+    coarse = [[signals(r, settings, FIRST) for r in each] for each in (reference, recordings)]
+    length = sum(float(s.time[-1]) for each in coarse for s in each)
     rate = next(hertz for limit, hertz in RATES if length <= limit)
-    in_time = sorted(zip(recordings, coarse, strict=True), key=lambda pair: pair[1].start)
-    return WheelRig([signals(r, settings, rate) for r, _ in in_time], settings), rate
+    in_time = [
+        sorted(zip(each, rough, strict=True), key=lambda pair: pair[1].start)
+        for each, rough in zip((reference, recordings), coarse, strict=True)
+    ]
+    ordered = [signals(r, settings, rate) for each in in_time for r, _ in each]
+    return WheelRig(ordered, settings, len(reference), bed), rate

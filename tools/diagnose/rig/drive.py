@@ -28,7 +28,7 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.diagnose.rig.interface import Bools, Constant, Run, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
 
 RATE = 10.0  # [Hz] of the comparison, as for a wheel
@@ -61,6 +61,7 @@ class DriveRig:
 
     channels = ("torque",)
     units: Mapping[str, str] = UNITS
+    forms: tuple[FormSource, ...] = ()
     smooth = (
         ("speed",),
         ("velocity",),
@@ -99,6 +100,7 @@ class DriveRig:
         )
 
         self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}
+        self.new = [True for _ in names]
         self.runs = [self._run(m, n) for m, n in zip(self._motions, names, strict=True)]
 
     def _most(self, values: Iterable[Array]) -> float:

@@ -93,6 +93,28 @@ class LawForm:
     domain: Mapping[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class FormSource:
+    """Where the form of the model may be off: a smooth function of the conditions, the same in all
+    of its channels.
+
+    conditions: per run (n, d), each in units of the length over which the function changes.
+    weight:     per run (n,), how large the function is there, in the size of its last channel.
+    drive:      whether it is the drive's and not the soil's.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    conditions: tuple[Array, ...]
+    weight: tuple[Array, ...]
+    drive: bool = False
+
+    @property
+    def count(self) -> int:
+        """Conditions."""
+        return int(self.conditions[0].shape[1])
+
+
 class Rig(Protocol):
     """The adapter."""
 
@@ -124,6 +146,14 @@ class Rig(Protocol):
     @property
     def baseline(self) -> tuple[Effect, ...]:
         """Effects of the configuration: the model has them already."""
+
+    @property
+    def new(self) -> Sequence[bool]:
+        """Of each run, whether candidates act in it; all of them where there is no reference."""
+
+    @property
+    def forms(self) -> tuple[FormSource, ...]:
+        """Where the form of the model may be off."""
 
     @property
     def smooth(self) -> tuple[tuple[str, ...], ...]:
@@ -192,6 +222,12 @@ class Stack:
     def measured(self) -> Array:
         """(N,) in the channels' units."""
         return self.joined([run.measured for run in self.rig.runs])
+
+    @cached_property
+    def new(self) -> Bools:
+        """Values (N,) of runs in which candidates act."""
+        acting: Bools = np.array(self.rig.new)[self.run]
+        return acting
 
     @cached_property
     def motion_sigma(self) -> Array:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -23,7 +24,8 @@ from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import ORDER, Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import UNITS, calibration_sigmas, wheel_constants
-from gritd.tools.diagnose.rig.interface import Bools, Foreseen, LawForm, Run, Stack
+from gritd.tools.diagnose.rig.form import wheel_forms
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import at_rest, states
@@ -36,8 +38,12 @@ UNKNOWN = 1e5  # an offset less certain than this says that the channel was not 
 # constants that need the forward model
 PHYSICS = ("c", "tan_phi", "k", "n", "K", "weights", "carriage_scale")
 ONE_LOAD = 0.1  # relative spread below which the loads are one
-KEPT = 4  # simulations of a run that are kept
+KEPT = 8  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
+
+Bed = Literal["same", "prepared"]
+# Repeatability of a bed that is raked and levelled anew, relative standard deviations
+PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
 
 
 LAW_PREFIX = {
@@ -57,28 +63,53 @@ class WheelRig:
         ("slip", "sinkage"), ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),
     )  # fmt: skip
 
-    def __init__(self, signals: Sequence[Signals], settings: Settings) -> None:
+    def __init__(
+        self,
+        signals: Sequence[Signals],
+        settings: Settings,
+        reference: int = 0,
+        bed: Bed = "prepared",
+    ) -> None:
+        """reference: how many of the runs, the first ones, are of a reference campaign, in which no
+        candidate acts; bed: whether the others drive on the same bed or on one prepared anew.
+        """
         self.settings = settings
+        self.new = [number >= reference for number in range(len(signals))]
         self.caveats: list[str] = []
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]
         self.channels = _channels(signals, settings, [w.known for w in self._weights])
-        began = min(s.start for s in signals)
+        began = {
+            new: min(s.start for s, n in zip(signals, self.new, strict=True) if n == new)
+            for new in set(self.new)
+        }
         self._motions = [
-            _motion(s, w.values, settings, s.start - began)
-            for s, w in zip(signals, self._weights, strict=True)
+            _motion(s, w.values, settings, s.start - began[new])
+            for s, w, new in zip(signals, self._weights, self.new, strict=True)
         ]
         self._sets = weight_sets([np.asarray(m.load) for m in self._motions])
         self._set = np.concatenate(self._sets.label)  # (N,)
         self.baseline = configured(settings.effects)
         stated = all(w.known for w in self._weights)
-        self.constants = wheel_constants(settings, self.channels, self._sets, stated, self.caveats)
+        self._prepared = PREPARED if reference and bed == "prepared" else {}
+        self.constants = (
+            *wheel_constants(settings, self.channels, self._sets, stated, self.caveats),
+            *(Constant(f"new_{name}", 0.0, sigma) for name, sigma in self._prepared.items()),
+        )
 
         out = {*LEFT_OUT, *(b.name for b in self.baseline)}
         if not stated:  # the measured load that drives the balance holds its friction already
             out.add("load_axis_friction")
         self.effects = candidates(signals, out)
 
-        self._campaign = Campaign(self._motions, settings, self.channels)
+        self._campaigns = [
+            (new, Campaign([m for m, n in zip(self._motions, self.new, strict=True) if n == new],
+                           settings, self.channels))
+            for new in sorted(set(self.new))
+        ]  # fmt: skip
+        ends = np.cumsum([np.size(m.time) for m in self._motions])
+        self._parts = [
+            slice(end - np.size(m.time), end) for m, end in zip(self._motions, ends, strict=True)
+        ]
         self._kept: dict[tuple[object, ...], Array] = {}
         lengths = np.concatenate(
             [np.full(s.time.size, np.median(np.diff(s.time))) for s in signals]
@@ -86,41 +117,60 @@ class WheelRig:
         self._step: Array = lengths  # [s] grid interval of each value (N,)
         # (N,) with a neighbour of the same run on either side
         self._inner = np.ones(lengths.size, bool)
-        for part in self._campaign.parts:
+        for part in self._parts:
             self._inner[[part.start, part.stop - 1]] = False
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
+        self.forms = wheel_forms(self.runs, self.channels, settings.wheel.radius)
 
     # ---- prediction ------------------------------------------------------------------------------
 
     def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
-        """Every channel (n,) of every run, for constants u (q,) in prior σ and effects beyond the
-        configured ones.
-        """
         value = {
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)
         }
-        read = self._read(self._true(value, (*self._baseline(value), *effects)), value)
-        return [
-            dict(zip(self.channels, read[:, part], strict=True)) for part in self._campaign.parts
+        baseline = self._baseline(value)
+        true = [
+            self._true(value, (*baseline, *effects) if new else baseline, new, campaign)
+            for new, campaign in self._campaigns
         ]
+        read = self._read(np.hstack(true), value)
+        return [dict(zip(self.channels, read[:, part], strict=True)) for part in self._parts]
 
-    def _true(self, value: Mapping[str, float], effects: tuple[Effect, ...]) -> Array:
-        """True readings (channels, N) before scale, offset and delay; the last few are kept."""
+    def _true(
+        self,
+        value: Mapping[str, float],
+        effects: tuple[Effect, ...],
+        new: bool,
+        campaign: Campaign,
+    ) -> Array:
+        """True readings (channels, n) of one campaign before scale, offset and delay; the last few
+        are kept.
+        """
         # the last for values without a set of weights of their own
         own = (*(value[name] for name in self._sets.names), 0.0)
-        physics = (*(value[name] for name in PHYSICS), *own, *effects)
-
+        shifts = tuple(value[f"new_{name}"] if new else 0.0 for name in self._prepared)
+        physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
         if physics not in self._kept:
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
-            soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
-            weights = 1.0 + value["weights"] + np.array(own)[self._set]
-            self._kept[physics] = self._campaign.readings(
-                soil, weights, 1.0 + value["carriage_scale"], effects
+            weights = 1.0 + value["weights"] + np.array(own)[self._of(new)]
+            self._kept[physics] = campaign.readings(
+                self._soil(value, new), weights, 1.0 + value["carriage_scale"], effects
             )
         return self._kept[physics]
+
+    def _of(self, new: bool) -> Index:
+        """The set of weights of each value of one campaign (n,)."""
+        labels = [l for l, n in zip(self._sets.label, self.new, strict=True) if n == new]
+        return np.concatenate(labels)
+
+    def _soil(self, value: Mapping[str, float], new: bool) -> Soil:
+        """The soil of one campaign: a bed that was prepared anew has its own."""
+        shift = {name: np.exp(value[f"new_{name}"]) if new else 1.0 for name in self._prepared}
+        names = ("c", "tan_phi", "k", "n", "K")
+        return Soil(*(value[name] * float(shift.get(name, 1.0)) for name in names))
 
     def _read(self, true: Array, value: Mapping[str, float]) -> Array:
         scale, offset, delay, blur = (
@@ -185,7 +235,7 @@ class WheelRig:
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)
         }
-        soil = Soil(value["c"], value["tan_phi"], value["k"], value["n"], value["K"])
+        soil = self._soil(value, True)
         acting = (*self._baseline(value), *effects)
         motion = proposed(experiment, self._motions, self.settings.wheel.radius)
         sensed = simulate_arrays(

@@ -72,7 +72,9 @@ class OpenNoise:
     def __init__(self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature]) -> None:
         stack = problem.stack
         centre = np.concatenate((fitted.u, fitted.x))
-        base = np.column_stack((fitted.raw / fitted.penalty[: len(centre)], problem.allowed))
+        base = np.column_stack(
+            (fitted.raw / fitted.penalty[: len(centre)], problem.allowed, fitted.carried)
+        )
         y = stack.measured - fitted.predicted + fitted.raw @ centre
         columns = np.column_stack((base, *(s.columns for s in signatures), y))
 

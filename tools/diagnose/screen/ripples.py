@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Stack
 
 LOUDEST = 10  # orders whose physics is simulated
-
-
-def order_of(effect: type[Effect]) -> str | None:
-    """The shape of an effect that is an order of the wheel angle, if it has one."""
-    return next(
-        (p.name for p in effect.parameters() if p.role == "shape" and p.scan and not p.unit), None
-    )
 
 
 def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) -> list[float]:

@@ -24,10 +24,10 @@ from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
 from gritd.tools.diagnose.fit.shape import Shape
+from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
-from gritd.tools.diagnose.screen.ripples import order_of
 
 PLACES = 48  # of a step along an axis
 FEW = 8  # values on either side of a step
@@ -142,14 +142,20 @@ def waves(
     """Waves of some frequencies (f,) [1/s, 1/m]; nulls (N, draws) whitened surrogates."""
     size, x = np.sqrt(2.0) * size_of(stack, channel), stack.covariate(axis)
     blocks = []
-    for index in lines.stretches(stack, channel) if frequencies.size else ():
+    stretches = _stretches(stack, channel)
+    for index in stretches if frequencies.size else ():
         rows = _rows(stack.of(channel) & (stack.run == stack.run[index[0]]))
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
         blocks.append(_block(noise, nulls, rows, raw))
 
-    near = lines.neighbours(x, lines.stretches(stack, channel), frequencies) if blocks else None
+    near = lines.neighbours(x, stretches, frequencies) if blocks else None
     return Family(Shape(channel, (axis,), "wave"), frequencies, tuple(blocks), near)
+
+
+def _stretches(stack: Stack, channel: str) -> list[Index]:
+    """Those of runs in which something new may act."""
+    return [index for index in lines.stretches(stack, channel) if stack.new[index[0]]]
 
 
 def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at: Array) -> Family:
@@ -274,7 +280,7 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
         out[rows] = size * _risen(stack, rows, axis, np.array([shape.at]))
         return out
 
-    parts: list[Index] = lines.stretches(stack, shape.channel)
+    parts = _stretches(stack, shape.channel)
     parts = [np.concatenate(parts)] if shape.shared else parts
     out = np.zeros((stack.size, 2 * len(parts)))
     for number, index in enumerate(parts):

@@ -9,16 +9,18 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.base import BaseFit
+from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
-from gritd.tools.diagnose.fit.signatures import shape_grid, signature
+from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
-from gritd.tools.diagnose.screen.ripples import LOUDEST, loudest, order_of
+from gritd.tools.diagnose.screen.ripples import LOUDEST, loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
 from gritd.tools.diagnose.screen.screen import (
     SURE,
@@ -30,6 +32,8 @@ from gritd.tools.diagnose.screen.screen import (
 
 NULLS = 300  # surrogates
 WEIGHED = 6  # candidates that stand out whose evidence is weighed with the noise's colour open
+# covariates over which no form of the model varies
+BEYOND_FORM = {"time", "position", "heat", "run"}
 AGAIN = 4  # signatures of an effect that a later screen tries
 
 
@@ -39,13 +43,22 @@ class Screening:
 
     problem: Problem
     base: Model
+    forms: tuple[Freedom, ...]  # what the form of the model may be off by
     functions: tuple[Signature, ...]  # smooth functions without a name
     families: tuple[Family, ...]  # waves and steps without a name
     surrogates: Surrogates
 
     def shapes(self, model: Model) -> list[Signature]:
-        """Smooth functions, and the likeliest waves and steps beside a model."""
-        return [*self.functions, *candidates(self.families, self.problem, model.fitted)]
+        """What the form of the model cannot be: smooth functions of time and place, and the
+        likeliest waves and steps beside a model.
+        """
+        formed = {channel for source in self.problem.stack.rig.forms for channel in source.channels}
+        beyond = [
+            s
+            for s in self.functions
+            if s.shape.channel not in formed or set(s.shape.along) <= BEYOND_FORM
+        ]
+        return [*beyond, *candidates(self.families, self.problem, model.fitted)]
 
 
 def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
@@ -58,6 +71,7 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     return Screening(
         base.problem,
         base.model,
+        form_freedoms(stack, noise),
         smooth_signatures(stack),
         families(stack, noise, drawn),
         drawn,

@@ -4,37 +4,42 @@ re-tested.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import Fitted, FreeParameter, Maker, Problem, free_of
-from gritd.tools.diagnose.fit.signatures import strengths
-from gritd.tools.diagnose.screen.screen import Screen, WhitenedSignature
+from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
+from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
+from gritd.tools.diagnose.fit.signatures import signature, strengths
+from gritd.tools.diagnose.noise.colour import whiten
+from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_beside
 from gritd.tools.diagnose.search.parallel import each
 
-REACH = 0.35  # of the best effect's evidence: less cannot catch up in the nonlinear fit
-MOST = 9  # effects fitted at the first step
-PAIRS = 2  # first effects from which a second step starts
-SECOND = 5  # effects fitted at each further step
+MOST = 9  # effects fitted beside the base model
+SECOND = 5  # effects fitted beside a model with effects
+STARTS = 2  # models of a size from which the next step starts
 STEPS = 3  # effects at most
-QUICK, THOROUGH = 2, 8  # rounds of a first fit, and of one that may win
-# [nats] behind the best after the first fit, or this share of what the best gained
-HOPELESS, BEHIND = 12.0, 0.15
-PAIR_PRIOR = -3.0  # [nats] log odds of one more effect at work
-# of what the effects so far gained: what a published form other than ours may leave for another
-# effect
-FORM, FORM_MOST = 0.08, 25.0
+AGAIN = 4  # signatures of an effect that are tried beside a model: the likeliest of the screen
+BEHIND = 12.0  # [nats] a model so far behind the best starts nothing
+PROMISING = 1.0  # [nats] a signature must gain by linear algebra to be fitted
+FEW = 0.1  # least share of its own precision that a strength's start keeps
+# Odds of one more effect at work, shared by all candidates: of ten testbeds with one effect left
+# out, one or two have a second that shows.
+ODDS = 0.15
 
 
 @dataclass(frozen=True)
 class Search:
-    """All models that were fitted, the base model first, and the screens beside some of them."""
+    """All models that were fitted, and the screens beside some of them.
+
+    models: the base model first, exact in its form; then the base model with the form's learnt
+        discrepancy, where there is a mismatch; then those with effects.
+    """
 
     screening: Screening
     models: tuple[Model, ...]
@@ -46,17 +51,31 @@ class Search:
 
     @property
     def base(self) -> Model:
+        """Exact in its form."""
         return self.models[0]
+
+    @property
+    def bare(self) -> Model:
+        """Without effects, with the discrepancy of form that the recordings ask for."""
+        return self.models[1] if len(self.models) > 1 else self.models[0]
 
     @property
     def first(self) -> Screen:
         """Beside the base model."""
         return self.screens[self.base]
 
-    def best(self, size: int | None = None) -> Model:
-        """The most evident model, of so many effects."""
-        sized = (m for m in self.models if size is None or len(m.names) == size)
-        return max(sized, key=lambda m: m.evidence)
+    def weight(self, model: Model) -> float:
+        """Log evidence and log prior of so many effects, above the bare model's [nats]."""
+        more = np.log(ODDS / max(len(self.problem.stack.rig.effects), 1))
+        return float(model.evidence - self.bare.evidence + max(len(model.names) - 1, 0) * more)
+
+    def sized(self, size: int) -> list[Model]:
+        """Models of so many effects, the likeliest first."""
+        return sorted((m for m in self.models if len(m.names) == size), key=lambda m: -m.evidence)
+
+    def best(self) -> Model:
+        """The likeliest model with effects, or the bare one."""
+        return max(self.models[1:] or self.models, key=self.weight)
 
     def has(self, names: Sequence[str]) -> bool:
         return any(set(m.names) == set(names) for m in self.models)
@@ -69,31 +88,27 @@ class Search:
 def search_models(
     screening: Screening, step: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> Search:
-    """Forward steps from the base model while the screen alarms; each from the best few models of
-    the step before.
+    """Forward steps from the base model if the screen alarms; each from the best few models of the
+    step before.
 
     jobs: processes that fit.
     """
     step("screening every effect")
     search = begin(screening)
+    search = replace(search, models=(search.base, _bare(search, search.base)))
     if not search.first.alarmed:
         return search
 
     step("fitting the likely effects")
-    search = extended(search, search.base, MOST, jobs)
+    search = _settled(extended(search, search.bare, MOST, jobs))
     for size in range(1, STEPS):
-        starts = _starts(search, size)
+        starts = [m for m in search.sized(size)[:STARTS] if _near(search, m)]
         for model in starts:
             step(f"looking beside {' and '.join(model.names)}")
-            search = screened(search, model)
-            if search.screens[model].alarmed:
-                search = extended(search, model, SECOND, jobs)
-
-        if not starts or not any(len(m.names) == size + 1 for m in search.models):
-            return search
+            search = extended(search, model, SECOND, jobs)
         search = _retested(search)
         if len(search.best().names) <= size:
-            return search
+            break
     return search
 
 
@@ -103,95 +118,91 @@ def begin(screening: Screening) -> Search:
     return Search(screening, (base,), {base: screen_beside(screening, base)})
 
 
-def screened(search: Search, model: Model) -> Search:
-    """With the screen beside one more of its models."""
-    return replace(search, screens={**search.screens, model: search.screen_of(model)})
+def _bare(search: Search, start: Model) -> Model:
+    """The model without effects from the constants of another, its discrepancy learnt."""
+    screening = search.screening
+    sizes = start.sizes or tuple(0 for _ in screening.forms)
+    begins = (start.fitted.u, np.zeros(0))
+    return fit_model(screening.problem, screening.forms, (), (), begins, sizes)
 
 
-def _starts(search: Search, size: int) -> list[Model]:
-    """The best few models of so many effects, as far as they may win."""
-    best = search.best().evidence
-    sized = sorted((m for m in search.models if len(m.names) == size), key=lambda m: -m.evidence)
-    return [m for m in sized[:PAIRS] if m.evidence > best - _hopeless(search, best)]
+def _settled(search: Search) -> Search:
+    """With the bare model fitted again from where the best effect found its constants: no model may
+    be worse than one that it holds.
+    """
+    again = _bare(search, search.best())
+    if again.evidence <= search.bare.evidence:
+        return search
+    return replace(search, models=(search.base, again, *search.models[2:]))
 
 
-def likely(screen: Screen, names: Sequence[str], most: int) -> list[str]:
-    """Listed effects within reach of the best, most likely first."""
-    listed = sorted((n for n in screen.listed if n in names), key=lambda n: -screen.evidence[n])
-    if not listed:
-        return []
-    top = max(screen.evidence[listed[0]], 0.0)
-    return [n for n in listed if screen.evidence[n] >= min(REACH * top, top - 6.0)][:most]
+def _near(search: Search, model: Model) -> bool:
+    return search.weight(model) > search.weight(search.best()) - BEHIND
+
+
+# ---- one more effect ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What an effect would gain beside a model by linear algebra [nats], and its start."""
+
+    gain: float
+    effect: type[Effect]
+    start: Array  # of its parameters, in their units
 
 
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
-    """With fits of the model and one more effect each; those that may win are fitted to the end."""
-    effects, screen = search.problem.stack.rig.effects, search.screens[model]
-    names = [n for n in likely(screen, list(effects), most) if not search.has((*model.names, n))]
-    made = each(jobs, lambda name: _fitted(search, model, effects[name], screen.best[name]), names)
-
-    if made:
-        top = max(max(m.evidence for m in made), search.best().evidence)
-        behind = _hopeless(search, top)
-        foreseen = max(screen.evidence[m.names[-1]] for m in made) - behind
-        close = [
-            m for m in made if m.evidence > top - behind or screen.evidence[m.names[-1]] > foreseen
-        ]
-        done = iter(each(jobs, lambda m: _finished(search.problem, m), close))
-        made = [next(done) if m in close else m for m in made]
-
+    """With fits of the model and one more effect each."""
+    candidates = [p for p in promises(search, model) if p.gain > PROMISING]
+    fresh = [p for p in candidates if not search.has((*model.names, p.effect.name))]
+    made = each(jobs, lambda promise: _with_effect(search, model, promise), fresh[:most])
     return replace(search, models=(*search.models, *made))
 
 
-def _hopeless(search: Search, top: float) -> float:
-    """How far behind the best evidence a model may be and still win: rivals for a strong effect
-    differ by much.
-    """
-    return max(HOPELESS, BEHIND * (top - search.base.evidence))
+def promises(search: Search, model: Model) -> list[Promise]:
+    """Of every effect that is not in the model, the most promising first."""
+    effects = search.problem.stack.rig.effects
+    found = []
+    for name in (n for n in effects if n not in model.names and n in search.first.fixed):
+        tried = list(_tried(search, model, effects[name]))
+        if tried:
+            found.append(max(tried, key=lambda promise: promise.gain))
+    return sorted(found, key=lambda promise: -promise.gain)
 
 
-def _finished(problem: Problem, model: Model) -> Model:
-    return replace(model, fitted=problem.refine(model.fitted, THOROUGH))
+def _tried(search: Search, model: Model, effect: type[Effect]) -> Iterator[Promise]:
+    """The promise of an effect for each of its likeliest signatures."""
+    fitted, problem = model.fitted, search.problem
+    projection = fitted.projection()
+    for fixed in search.first.fixed[effect.name][:AGAIN]:
+        made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
+        if made is None:
+            continue
+        a, b = projection.project(whiten(problem.noise, made.columns))
+        gain = float(log_evidence(a, b, made.sign))
+        yield Promise(gain, effect, _start(effect, made, a, b))
 
 
-def _fitted(search: Search, model: Model, effect: type[Effect], best: WhitenedSignature) -> Model:
-    """One more effect, started at its linear estimate."""
-    a, b = model.fitted.projection().project(best.columns)
-    amplitude = np.asarray(np.linalg.solve(a + 0.1 * np.eye(len(b)), b))
-    amplitude = np.where(np.array(best.signature.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
-
-    more = free_of((effect,))
-    x = np.concatenate((model.fitted.x, _start(more, effect, amplitude, best.signature.fixed)))
-    effects: tuple[Maker, ...] = (*model.fitted.effects, effect)
-    free = (*model.fitted.free, *more)
-    fitted = search.problem.descend(effects, free, model.fitted.u, x, QUICK)
-    return Model(fitted, (*model.names, effect.name), model.log_prior + _one_more(search, model))
-
-
-def _one_more(search: Search, model: Model) -> float:
-    """Log prior of one more effect beside those of a model."""
-    gained = model.fitted.log_evidence - search.base.fitted.log_evidence
-    return PAIR_PRIOR - form(gained) if model.names else 0.0
-
-
-def form(gained: float) -> float:
-    """What the remainder of another published form may be worth [nats]."""
-    return float(np.clip(FORM * gained, 0.0, FORM_MOST))
-
-
-def _start(
-    free: Sequence[FreeParameter],
-    effect: type[Effect],
-    amplitude: Array,
-    fixed: Mapping[str, float],
-) -> Array:
-    """Where the fit of an effect's parameters begins, in their units."""
+def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
+    """Where the fit of an effect's parameters begins: strengths at their linear estimate."""
+    amplitude = np.asarray(np.linalg.solve(a + FEW * np.eye(len(b)), b))
+    amplitude = np.where(np.array(made.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
     size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
-    values = []
-    for f in free:
-        p = f.parameter
-        values.append(size[p.name] if p.name in size else (fixed[p.name] - p.centre) / p.sigma)
+    values = [
+        size[p.name] if p.name in size else (made.fixed[p.name] - p.centre) / p.sigma
+        for p in effect.parameters()
+    ]
     return np.asarray(np.clip(np.array(values), -20.0, 20.0))
+
+
+def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
+    fitted = model.fitted
+    effects: tuple[Maker, ...] = (*fitted.effects, promise.effect)
+    free = (*fitted.free, *free_of((promise.effect,)))
+    begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
+    screening = search.screening
+    return fit_model(screening.problem, screening.forms, effects, free, begins, model.sizes)
 
 
 def _retested(search: Search) -> Search:
@@ -202,13 +213,13 @@ def _retested(search: Search) -> Search:
         if kept and not search.has(kept):
             types = tuple(effects[n] for n in kept)
             free = free_of(types)
-            x = np.array([_at(best.fitted, f) for f in free])
-            fitted = search.problem.descend(types, free, best.fitted.u, x)
-            prior = _one_more(search, search.best(1)) * (len(kept) - 1)
-            search = replace(search, models=(*search.models, Model(fitted, kept, prior)))
-
+            begins = (best.fitted.u, np.array([_at(best, f) for f in free]))
+            screening = search.screening
+            less = fit_model(screening.problem, screening.forms, types, free, begins, best.sizes)
+            search = replace(search, models=(*search.models, less))
     return search
 
 
-def _at(fitted: Fitted, wanted: FreeParameter) -> float:
+def _at(model: Model, wanted: Free) -> float:
+    fitted = model.fitted
     return float(next(x for f, x in zip(fitted.free, fitted.x, strict=True) if f == wanted))

@@ -1,9 +1,9 @@
 """How far evidence is to be trusted: what `python -m gritd.tools.proof.ours.calibrate` learnt from
-simulated cases.
+simulated cases whose plants have other forms than the library's.
 
-The evidence of every explanation [nats] becomes a probability by one temperature, one weight for
-each degree to which a published form may differ from ours, the odds of one more effect and of
-physics that is in no list, and the share of cases in which all evidence misleads.
+The evidence of every explanation [nats] becomes a probability by one temperature, the odds of a
+listed effect, of one more effect and of what is in no list, and the share of cases in which all
+evidence misleads.
 """
 
 from __future__ import annotations
@@ -15,37 +15,32 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy.special import logsumexp
-
-from gritd.estimator.terramechanics.soil import Array
 
 TABLE = Path(__file__).with_name("calibration.json")
 
 
 @dataclass(frozen=True)
 class Calibration:
+    """candidates: listed effects, which share the odds among them."""
+
     temperature: float  # by which evidence is divided
-    forms: tuple[float, ...]  # log weight of each degree of difference of discrepancy.py
+    listed: float  # log odds of a listed effect against the discrepancy of form alone
     more: float  # log odds of one more effect
-    nameless: float  # log odds of functions without a name in the place of an effect
-    lapse: (
-        float  # share of cases in which the evidence misleads: no probability exceeds 1 less this
-    )
+    nameless: float  # log odds of functions without a name
+    lapse: float  # share of cases in which the evidence misleads: no probability exceeds 1 less it
+    candidates: int = 1
 
-    def listed(self, evidence: Array, count: int) -> float:
-        """Log weight of `count` effects, from their evidence (FORMS,) above the base model's."""
-        return float(
-            logsumexp(evidence / self.temperature + np.array(self.forms))
-            + self.more * max(count - 1, 0)
-        )
-
-    def unlisted(self, evidence: float) -> float:
-        """Log weight of functions without a name, from their evidence above the base model's."""
-        return evidence / self.temperature + self.nameless
+    def weight(self, evidence: float, count: int, nameless: bool) -> float:
+        """Log weight of an explanation by so many effects, with functions without a name or not."""
+        weight = evidence / self.temperature
+        if count:
+            weight += self.listed + (count - 1) * self.more - count * np.log(self.candidates)
+        return float(weight + (self.nameless if nameless else 0.0))
 
 
 @cache
-def learnt() -> Calibration:
-    table: Mapping[str, object] = json.loads(TABLE.read_text(encoding="utf-8"))
-    values = {name: table[name] for name in Calibration.__dataclass_fields__}
-    return Calibration(**{n: tuple(v) if isinstance(v, list) else v for n, v in values.items()})  # type: ignore[arg-type]
+def learnt(candidates: int = 1) -> Calibration:
+    """For so many listed effects."""
+    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))
+    names = [n for n in Calibration.__dataclass_fields__ if n != "candidates"]
+    return Calibration(**{name: float(table[name]) for name in names}, candidates=candidates)

@@ -1,122 +1,121 @@
 """From fitted models to a verdict, probabilities and groups.
 
-Every explanation has an evidence: listed effects, with a discrepancy for forms other than ours
-(forms.py); or functions without a name instead of them: `unlisted` (nameless.py). `calibration.py`
-makes probabilities of these. An effect has the weight of all models that hold it.
+Every explanation has an evidence: the discrepancy of form alone, listed effects with it, functions
+without a name instead of effects or beside them. `calibration.py` makes probabilities of these. An
+effect has the weight of all explanations that hold it. `unlisted` has the weight of those without
+any.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
 
-from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
-from gritd.tools.diagnose.verdict import forms
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
-from gritd.tools.diagnose.verdict.decision import Decision, Verdict, WeighedModel
-from gritd.tools.diagnose.verdict.nameless import nameless_evidence, remaining
+from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
+from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 
 ALIKE = 2.0  # log odds: effects that are less apart cannot be told apart
-WEIGHED = 5  # models at most, of one effect and of more
-NEAR, FAR = 0.5, 60.0  # within this share of the best gain, or so many nats of it
-WHOLE, MUCH = 0.9, 20.0  # share of the misfit that an explanation takes, if it leaves so many nats
-# belief in one that takes less: of eleven such in simulated cases none was right, of eight others
-# all
-PART = 0.1
+TENTH = 0.1  # share of the misfit that names must take to be an explanation
 POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
 QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
 
 def decide(search: Search) -> Decision:
     """The verdict on a search."""
-    base, screen = search.base, search.first
-    if not screen.alarmed:
-        verdict: Verdict = "consistent" if power(search, screen) >= POWER else "insufficient"
-        return Decision(verdict, base, 1.0, 0.0, False, _quiet(screen), 0.0, {})
-    return judged(search, weigh(search), nameless_evidence(search.screening, base), learnt())
+    found = search.first
+    if not found.alarmed:
+        verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
+        return Decision(verdict, search.bare, 1.0, None, _quiet(found), 0.0, {})
+
+    best = search.best()
+    alone = nameless_beside(search.screening, search.bare)
+    beside = nameless_beside(search.screening, best) if best.names else alone
+    return judged(search, weigh(search, alone, beside), beside, learnt(len(_candidates(search))))
+
+
+def _candidates(search: Search) -> Sequence[str]:
+    return list(search.problem.stack.rig.effects)
+
+
+def weigh(search: Search, alone: Nameless | None, beside: Nameless | None) -> list[Weighed]:
+    """All explanations with their evidence [nats above the bare model].
+
+    alone, beside: functions without a name in the place of effects, and beside the best ones.
+    """
+    bare, best = search.bare, search.best()
+    every = [Weighed(m, m.names, False, m.evidence - bare.evidence) for m in search.models[1:]]
+    if alone is not None:
+        every.append(Weighed(alone.model, (), True, alone.gain))
+    if beside is not None and best.names:
+        gain = best.evidence - bare.evidence + beside.gain
+        every.append(Weighed(beside.model, best.names, True, gain))
+    return every
 
 
 def judged(
-    search: Search, weighed: Sequence[WeighedModel], nameless: float, calibration: Calibration
+    search: Search, weighed: Sequence[Weighed], beside: Nameless | None, calibration: Calibration
 ) -> Decision:
-    """The decision from the evidence of all explanations [nats above the base model]."""
-    weights = np.array([calibration.listed(w.evidence, len(w.model.names)) for w in weighed])
-    unnamed = calibration.unlisted(nameless)
-    total = float(np.logaddexp(logsumexp(weights), unnamed)) if weighed else unnamed
+    """The decision from the evidence of all explanations."""
+    weights = np.array([calibration.weight(w.evidence, len(w.names), w.nameless) for w in weighed])
+    shares = np.exp(weights - logsumexp(weights)) * (1.0 - calibration.lapse)
+    every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    best = _best(weighed, weights) if weighed else search.base
-    left, significant = remaining(search, best)
-    gained = 0.5 * (search.base.fitted.objective - best.fitted.objective)
-    share = gained / max(gained + left, 1e-9)
-    beyond = left - max((_bending(w) for w in weighed if w.model is best), default=0.0)
-
-    trusted = 1.0 - calibration.lapse
-    believed = (PART if significant and beyond > MUCH and share < WHOLE else 1.0) * trusted
-    unlisted = trusted - believed * -float(np.expm1(unnamed - total))
+    best = _best(every)
+    unlisted = sum(w.probability for w in every if not w.names)
+    share = taken_share(search, best) if best.names else 0.0
+    named = bool(best.names) and unlisted < 0.5 * (1.0 - calibration.lapse) and share > TENTH
     return Decision(
-        "explained" if weighed and unlisted < 0.5 * trusted else "unlisted",
-        best,
+        "explained" if named else "unlisted",
+        best if named else search.bare,
         share,
-        left,
-        significant,
-        _probabilities(weighed, weights - total + np.log(believed)),
+        beside if named or not best.names else nameless_beside(search.screening, search.bare),
+        _probabilities(every),
         unlisted,
-        _groups(weighed, weights, best),
-        tuple(weighed),
-        nameless,
+        _groups(every, best),
+        every,
     )
 
 
-def _bending(weighed: WeighedModel) -> float:
-    """Nats that another published form of the same effects takes of what they leave."""
-    return float(weighed.evidence.max() - weighed.evidence[0])
-
-
-def _best(weighed: Sequence[WeighedModel], weights: Array) -> Model:
+def _best(weighed: Sequence[Weighed]) -> Model:
     """The likeliest model of the likeliest number of effects: many alike sets of two weigh together
     against one.
     """
-    sizes = np.array([len(w.model.names) for w in weighed])
-    size = max(np.unique(sizes).tolist(), key=lambda n: float(logsumexp(weights[sizes == n])))
-    return weighed[int(np.argmax(np.where(sizes == size, weights, -np.inf)))].model
+    sizes = {len(w.names) for w in weighed}
+    size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
+    plain = [w for w in weighed if len(w.names) == size and not w.nameless]
+    return max(plain, key=lambda w: w.probability).model
 
 
-def weigh(search: Search) -> list[WeighedModel]:
-    """The models that may count, the most evident first."""
-    base = search.base
-    gains = {m: m.fitted.log_evidence - base.fitted.log_evidence for m in search.models if m.names}
-    if not gains:
-        return []
-
-    top = max(gains.values())
-    near = [m for m in gains if gains[m] > top - max(NEAR * top, FAR)]
-    near.sort(key=lambda m: -gains[m])
-    one, more = (
-        [m for m in near if (len(m.names) == 1) == single][:WEIGHED] for single in (True, False)
+def taken_share(search: Search, model: Model) -> float:
+    """Share of the misfit that a model's effects take: of the squares beyond noise that the exact
+    form leaves, 0 to 1.
+    """
+    free = search.problem.stack.size - len(search.base.fitted.u)
+    before, after = (
+        float(m.fitted.residual @ m.fitted.residual) - free for m in (search.base, model)
     )
-    return [
-        WeighedModel(m, forms.evidence(search.problem, m.fitted, base.fitted))
-        for m in (*one, *more)
-    ]
+    return float(np.clip(1.0 - max(after, 0.0) / max(before, 1e-9), 0.0, 1.0))
 
 
-def _probabilities(weighed: Sequence[WeighedModel], log_share: Array) -> dict[str, float]:
-    """Weight of all models that hold an effect."""
+def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
+    """Weight of all explanations that hold an effect."""
     out: dict[str, float] = {}
-    for w, share in zip(weighed, np.exp(log_share).tolist(), strict=True):
-        for name in w.model.names:
-            out[name] = out.get(name, 0.0) + share
+    for w in weighed:
+        for name in w.names:
+            out[name] = out.get(name, 0.0) + w.probability
     return out
 
 
-def _quiet(screen: Screen) -> dict[str, float]:
+def _quiet(found: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
-    listed = screen.listed
+    listed = found.listed
     weight = {
         n: float(np.exp(min(e, 20.0) / QUIET)) / max(len(listed), 1) for n, e in listed.items()
     }
@@ -124,34 +123,31 @@ def _quiet(screen: Screen) -> dict[str, float]:
     return {n: w / total for n, w in weight.items()}
 
 
-def _groups(
-    weighed: Sequence[WeighedModel], weights: Array, best: Model
-) -> dict[str, tuple[str, ...]]:
+def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:
     """For each effect of the best model, those that could stand in its place."""
-    pairs = list(zip(weighed, weights.tolist(), strict=True))
-    top = max((weight for m, weight in pairs if m.model is best), default=0.0)
-    close = [
-        weighed[i].model
-        for i in np.argsort(-weights)
-        if weighed[i].model is not best and top - weights[i] < ALIKE
-    ]
-    same = [m for m in close if len(m.names) == len(best.names)]
+    sized = [w for w in weighed if len(w.names) == len(best.names) and not w.nameless]
+    sized.sort(key=lambda w: -w.probability)
+    top = max((w.probability for w in sized if w.model is best), default=1.0)
 
-    groups: dict[str, tuple[str, ...]] = {}
+    out: dict[str, tuple[str, ...]] = {}
     for name in best.names:
         rest = set(best.names) - {name}
-        rivals = [m for m in same if rest <= set(m.names)]
-        groups[name] = tuple(dict.fromkeys(n for m in rivals for n in m.names if n not in rest))
-    return groups
+        rivals = [
+            w
+            for w in sized
+            if rest <= set(w.names) and w.model is not best and w.probability > top * np.exp(-ALIKE)
+        ]
+        out[name] = tuple(dict.fromkeys(n for w in rivals for n in w.names if n not in rest))
+    return out
 
 
-def power(search: Search, screen: Screen) -> float:
+def power(search: Search, found: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size."""
     projection = search.base.fitted.projection()
     seen = []
-    for name, ready in screen.best.items():
+    for name, ready in found.best.items():
         if isinstance(name, str):
             a, _ = projection.project(ready.columns)
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(screen.surprise(name, float(gain)) > screen.threshold)
+            seen.append(found.surprise(name, float(gain)) > found.threshold)
     return float(np.mean(seen)) if seen else 0.0

@@ -5,33 +5,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.verdict.nameless import Nameless
 
 Verdict = Literal["consistent", "explained", "unlisted", "insufficient"]
 
 
 @dataclass(frozen=True)
-class WeighedModel:
-    """A model and its log evidence above the base model's for each degree of difference
-    (forms.FORMS,).
+class Weighed:
+    """An explanation and its evidence above the bare model's [nats].
+
+    names:    listed effects; none for the discrepancy of form alone.
+    nameless: whether functions without a name act beside them.
     """
 
     model: Model
-    evidence: Array
+    names: tuple[str, ...]
+    nameless: bool
+    evidence: float
+    probability: float = 0.0
 
 
 @dataclass(frozen=True)
 class Decision:
+    """best: the model that is accepted, or the bare one; beside: what has no name beside it."""
+
     verdict: Verdict
     best: Model
-    share: float  # of the explainable misfit that the best model takes
-    left: float  # nats that functions without a name could still gain
-    left_significant: bool
+    share: float  # of the misfit that the best model's effects take, by squares
+    beside: Nameless | None
     probability: dict[str, float]
     unlisted: float
     groups: dict[str, tuple[str, ...]]
-    weighed: tuple[WeighedModel, ...] = ()
-    nameless: float = -np.inf  # evidence of functions without a name [nats above the base model]
+    weighed: tuple[Weighed, ...] = ()

@@ -1,96 +1,95 @@
-"""What functions without a name would gain beside a model: smooth ones, waves and steps."""
+"""What has no name: functions of time and place, waves and steps that act beside a model.
+
+They compete with the listed effects. Smooth functions of the conditions are not among them: those
+are the discrepancy of form, which every model has.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
-from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.shape import Shape
+from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screen import whitened
 from gritd.tools.diagnose.screen.screening import Screening
-from gritd.tools.diagnose.search.search import Search
 
-PAIR = 3.0  # [nats] a second function must gain
-FORM, FORM_MOST = 0.08, 25.0  # and this share of what the first gained, at most so many nats
 SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
-TOGETHER, FITTED = 4, 2  # functions that may act together; that are fitted with the soil
+TOGETHER = 4  # functions that may act together
 
 
-def remaining(search: Search, model: Model) -> tuple[float, bool]:
-    """Nats that functions without a name would still gain; whether any of them stands out of the
-    noise.
+@dataclass(frozen=True, eq=False)
+class Nameless:
+    """Functions beside a model, fitted with everything else; gain: log evidence above the model's,
+    the number of functions that were tried counted.
     """
-    screen = search.screen_of(model)
-    standing = screen.alarmed and any(isinstance(of, Shape) for of in screen.stands_out)
-    return (_chosen(search.screening, model)[0] if standing else 0.0), standing
+
+    model: Model
+    functions: tuple[Signature, ...]
+    gain: float
 
 
-def nameless_evidence(screening: Screening, model: Model) -> float:
-    """Evidence for functions without a name on top of a model [nats], as far as they may act
-    together.
-
-    Linear, and with soil and calibration fitted anew beside the first few, as they are for listed
-    effects.
-    """
-    linear, chosen = _chosen(screening, model)
-    fitted = range(min(len(chosen), FITTED))
-    return max([linear, *(_refitted(screening, model, chosen[: n + 1]) for n in fitted)])
+def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
+    """The functions that act together beside a model; None where none pays for itself."""
+    chosen, price = _chosen(screening, model)
+    if not chosen:
+        return None
+    fitted = [_fitted(screening, model, chosen, size) for size in SIZES]
+    best = max(fitted, key=lambda m: m.evidence)
+    return Nameless(best, tuple(chosen), best.evidence - model.evidence + price)
 
 
 def nameless_functions(screening: Screening, model: Model) -> list[Signature]:
     """Functions without a name that act together beside a model."""
-    return _chosen(screening, model)[1]
+    return _chosen(screening, model)[0]
 
 
-def _refitted(screening: Screening, model: Model, chosen: Sequence[Signature]) -> float:
-    """Evidence of functions with everything else fitted anew beside them [nats]."""
-    problem, start = screening.problem, model.fitted
-    columns, prior = np.column_stack([s.columns for s in chosen]), sum(s.prior for s in chosen)
-    gains = []
-    for scale in SIZES:
-        beside = problem.beside(columns * scale)
-        fitted = beside.descend(start.effects, start.free, start.u, start.x)
-        gain = fitted.log_evidence - start.log_evidence + prior
-        gains.append(gain - (PAIR + _form(gain)) * (len(chosen) - 1))
-    return max(gains)
+def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature], size: float) -> Model:
+    columns = size * np.column_stack([s.columns for s in chosen])
+    fitted = model.fitted
+    return fit_model(
+        screening.problem.beside(columns),
+        screening.forms,
+        fitted.effects,
+        fitted.free,
+        (fitted.u, fitted.x),
+        model.sizes,
+    )
 
 
-def _chosen(screening: Screening, model: Model) -> tuple[float, list[Signature]]:
-    """Evidence of the chosen functions together [nats], and which they are."""
-    projection = without_harmonics(screening.problem, model.fitted)
+def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]:
+    """Functions one after the other, while each gains by linear algebra more than the choice among
+    all costs; and that cost [nats, negative].
+    """
     functions = screening.shapes(model)
-    prior = np.array([s.prior for s in functions])
+    if not functions:
+        return [], 0.0
+    projection = without_harmonics(screening.problem, model.fitted)
     ready = whitened(screening.problem.noise, functions)
-
     a, b = projection.project(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]
+    prior = np.array([s.prior for s in functions]) - np.log(len({s.of for s in functions}))
 
-    total = 0.0
-    chosen: list[int] = []
+    total, chosen = 0.0, list[int]()
     for _ in range(TOGETHER):
-        tried = [
-            _together(a, b, [parts[i] for i in (*chosen, k)]) + float(prior[[*chosen, k]].sum())
+        tried = {
+            k: _together(a, b, [parts[i] for i in (*chosen, k)]) + float(prior[[*chosen, k]].sum())
             for k in range(len(parts))
-        ]
-        best = int(np.argmax(tried))
-        price = PAIR + _form(total) if chosen else 0.0
-        if best in chosen or tried[best] - price <= total:
+            if k not in chosen
+        }
+        best = max(tried, key=lambda k: tried[k], default=-1)
+        if best < 0 or tried[best] <= total:
             break
-        total, chosen = tried[best] - price, [*chosen, best]
-    return total, [functions[i] for i in chosen]
+        total, chosen = tried[best], [*chosen, best]
+    return [functions[i] for i in chosen], float(prior[chosen].sum())
 
 
 def _together(a: Array, b: Array, parts: list[Index]) -> float:
     index = np.unique(np.concatenate(parts))
     return float(log_bayes(a[np.ix_(index, index)], b[index], (0,) * len(index)))
-
-
-def _form(gained: float) -> float:
-    return float(np.clip(FORM * gained, 0.0, FORM_MOST))

@@ -146,12 +146,11 @@ def work(search: Search, decision: Decision) -> dict[str, Any]:
     return {
         "screen": dict(sorted(evidence, key=lambda i: -i[1])[:8]),
         "weighed": [
-            [list(w.model.names), [round(float(e), 2) for e in w.evidence]]
+            {"names": list(w.names), "nameless": w.nameless, "evidence": round(w.evidence, 2)}
             for w in decision.weighed
         ],
-        "nameless": round(max(decision.nameless, -1e6), 2),
+        "candidates": len(search.problem.stack.rig.effects),
         "share": decision.share,
-        "left": decision.left,
         "unlisted": decision.unlisted,
     }
 
@@ -235,7 +234,7 @@ def _scored(
         "channels": list(diagnosis.fit.unit),
         "slow": [plan.slow, plan.slow_time],
         "summary": diagnosis.summary,
-        "remaining": diagnosis.remaining,
+        "remaining": diagnosis.remaining_words,
         "law": diagnosis.law.expression if diagnosis.law else None,
     }
 
@@ -260,13 +259,11 @@ def _oracle(
     fitted = search.problem.descend(tuple(types), free, search.base.fitted.u, x)
     stack = search.problem.stack
     best = heldout.rmse(stack, heldout.held_out(fitted, heldout.run_folds(stack)).predicted)
-
-    gained = search.base.fitted.log_evidence
     return {
         "oracle": float(np.mean([diagnosis.fit.after[c] / best[c] for c in best])),
         "before": float(np.mean([diagnosis.fit.before[c] / best[c] for c in best])),
-        "truth_gain": fitted.log_evidence - gained,
-        "best_gain": search.best().fitted.log_evidence - gained,
+        "truth_gain": search.base.fitted.nats - fitted.nats,
+        "best_gain": search.base.fitted.nats - search.best().fitted.nats,
     }
 
 

@@ -140,7 +140,7 @@ def stated(said: Said) -> Array:
 def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]:
     first = said.found["hypotheses"][0]["effect"] if said.found["hypotheses"] else "nothing"
     group = listed(sorted(said.group)) or "nothing"
-    remains = said.found["remaining"]
+    remains = said.found["remaining_words"]
 
     asked = [
         Asked(

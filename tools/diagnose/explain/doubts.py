@@ -1,0 +1,39 @@
+"""What a reader should doubt: strained constants, parameters at a bound, fits that did not converge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.rig.interface import Rig
+
+STRAINED = 3.0  # [σ] from what is known, beyond which a constant is told
+
+
+def doubts(rig: Rig, model: Model) -> tuple[str, ...]:
+    """One sentence each, of the fit of the accepted model."""
+    return (*_strained(rig, model), *_bounded(model), *_unfinished(model))
+
+
+def _strained(rig: Rig, model: Model) -> Iterator[str]:
+    """Constants far from what is known of them, the farthest first."""
+    for place in np.argsort(-np.abs(model.fitted.u)).tolist():
+        strain = float(model.fitted.u[place])
+        if abs(strain) >= STRAINED:
+            name = rig.constants[place].name
+            yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
+
+
+def _bounded(model: Model) -> Iterator[str]:
+    fitted = model.fitted
+    for number, free in enumerate(fitted.free):
+        if fitted.held[len(fitted.u) + number] and free.parameter.role == "shape":
+            value = f"{free.value(float(fitted.x[number])):.3g} {free.parameter.unit}".rstrip()
+            yield f"At its bound: {free.parameter.name} of {free.name} is {value}."
+
+
+def _unfinished(model: Model) -> Iterator[str]:
+    if not model.fitted.converged:
+        yield "The fit of what is said here did not converge: take its numbers with care."

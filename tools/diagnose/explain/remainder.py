@@ -1,0 +1,81 @@
+"""What is left when the accepted names are taken: by channel and condition, in physical units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.result import Discrepancy, Remainder
+from gritd.tools.diagnose.explain.wording import value_of
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.rig.interface import Stack
+
+ALONG = ("slip", "load", "speed", "position", "time", "wheel_angle")
+BENDS = 2  # powers of a covariate along which a remainder is described
+TELLS = 0.2  # share of a remainder's squares that a covariate must take to be named
+PARTS = 3  # of a covariate's range that are told apart
+
+
+def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
+    """Of each channel: what the model predicts without its discrepancies, against the recording,
+    beyond the noise.
+    """
+    stack, rig = problem.stack, problem.stack.rig
+    left = stack.measured - model.fitted.predicted
+    found = {}
+    for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
+        own = np.flatnonzero(stack.of(channel))
+        squares = float(np.mean(left[own] ** 2)) - colour.sigma**2
+        size = float(np.sqrt(max(squares, 0.0)))
+        where = _where(stack, channel, left) if size > 0.5 * colour.sigma else "within the noise"
+        found[channel] = Remainder(size, rig.units[channel], where)
+    return found
+
+
+def _where(stack: Stack, channel: str, left: Array) -> str:
+    """Along which condition a channel's remainder (N,) changes most, in words."""
+    own = stack.of(channel) & (stack.covariate("speed") > 0.0)
+    unit = stack.rig.units[channel]
+    mean = float(np.mean(left[own])) if own.any() else 0.0
+
+    shares = {name: _share(stack.covariate(name)[own], left[own]) for name in ALONG}
+    name = max(shares, key=lambda n: shares[n])
+    if shares[name] < TELLS:
+        return f"{mean:+.2g} {unit} on average, along no condition"
+
+    along = stack.covariate(name)[own]
+    edges = np.quantile(along, np.linspace(0.0, 1.0, PARTS + 1))
+    low, high = along <= edges[1], along >= edges[-2]
+    ends = [
+        f"{float(np.mean(left[own][part])):+.2g} {unit} at {value_of(stack, name, float(along[part].mean()))}"
+        for part in (low, high)
+    ]
+    return ", ".join(ends)
+
+
+def _share(along: Array, left: Array) -> float:
+    """Share of the squares about the mean that a smooth function of a covariate takes."""
+    if along.size < 10 or np.ptp(along) <= 1e-9:
+        return 0.0
+    scaled = (along - along.mean()) / np.ptp(along)
+    columns = np.vander(scaled, BENDS + 1)
+    fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+    spread = float(np.sum((left - left.mean()) ** 2))
+    return 1.0 - float(np.sum((left - fitted) ** 2)) / spread if spread > 0.0 else 0.0
+
+
+def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
+    """Of each channel, the standard deviation that the learnt discrepancy of form has there."""
+    stack, rig, fitted = problem.stack, problem.stack.rig, model.fitted
+    count = problem.tolerance.shape[1]
+    spread = np.sqrt(np.sum(fitted.carried**2, axis=1))
+    learnt = "recordings" if fitted.slack.size > count else "prior"
+    found = {}
+    for channel in rig.channels:
+        own = stack.of(channel)
+        size = float(np.sqrt(np.mean(spread[own] ** 2))) if own.any() else 0.0
+        found[channel] = Discrepancy(size, rig.units[channel], learnt)
+    return found

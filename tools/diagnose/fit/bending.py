@@ -1,0 +1,60 @@
+"""Other published forms of an effect, as a freedom of the fit.
+
+A listed effect stands for its physics, not for one formula. Another form differs from ours by a
+smooth share of what the effect does. An effect that adds S(x) to all channels may therefore add
+
+    S(x) (1 + h(x)),   h(x) = Σ aⱼ φⱼ(x),   aⱼ ~ N(0, ρ²/m)
+
+with one h for all channels: the strength itself varies smoothly with the conditions, with time and
+along the bed, as another formula for it would have it. A ripple may also have other harmonics. ρ is
+how far published forms differ; its prior is over 5 to 40 %. It is never nothing: where the soil
+can absorb most of an effect, another form of it changes the soil and hardly the fit, so that the
+recordings would let our own form pass for exact.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
+from gritd.tools.diagnose.fit.functions import shares
+from gritd.tools.diagnose.fit.problem import Fitted, build
+from gritd.tools.diagnose.fit.signatures import order_of
+from gritd.tools.diagnose.noise.colour import Noise
+from gritd.tools.diagnose.rig.interface import Stack
+
+FORMS = Sizes((0.05, 0.15, 0.4), (0.35, 0.45, 0.2))
+
+
+def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
+    """One for each effect of a fit that changes anything."""
+    found = []
+    functions = shares(stack, np.ones(stack.size, bool))
+    for number, effect in enumerate(fitted.acting):
+        added = _added(stack, fitted, number)
+        if np.any(added):
+            every = np.column_stack((functions, _harmonics(stack, fitted, number)))
+            columns = added[:, None] * every / np.sqrt(every.shape[1])
+            found.append(freedom(effect.name, columns, noise, FORMS))
+    return tuple(found)
+
+
+def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
+    """Prediction with an effect less that without it (N,)."""
+    acting = build(fitted.effects, fitted.free, fitted.x)
+    others = tuple(e for i, e in enumerate(acting) if i != number)
+    return fitted.predicted - stack.predict(fitted.u, others)
+
+
+def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Array:
+    """The first two harmonics of a ripple's order (N, 4): times the ripple they give another shape.
+    Else (N, 0).
+    """
+    effect = build(fitted.effects, fitted.free, fitted.x)[number]
+    if effect.fingerprint.covariate != "wheel_angle":
+        return np.zeros((stack.size, 0))
+    name = order_of(type(effect))
+    phase = stack.covariate("wheel_angle") * (getattr(effect, name) if name else 1.0)
+    waves = [np.sqrt(2.0) * wave(k * phase) for k in (1.0, 2.0) for wave in (np.cos, np.sin)]
+    return np.column_stack(waves)

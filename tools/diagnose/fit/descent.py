@@ -1,0 +1,140 @@
+"""Damped descent to an optimum within bounds.
+
+Levenberg (1944) and Marquardt (1963) with the curvature of least squares; a coordinate whose
+gradient points out of its bounds is held there (active set, Bertsekas 1982, SIAM J. Control
+Optim. 20, 221-246). The descent ends where the undamped step would gain next to nothing, so a fit
+that says `converged` stands at an optimum and not where the rounds ran out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Bools
+
+GAIN = 0.005  # [nats] a step that would gain less ends the descent
+NEAR = 1.0  # [nats] a good step that gains less leaves the slopes as they are
+START, LEAST, MOST = 1e-3, 1e-7, 1e7  # damping, in units of the curvature
+HARDER, SOFTER = 8.0, 0.2  # factors on the damping after a step that failed, and a good one
+FULFILLED, GOOD = 0.1, 0.75  # of the gain foretold: a step is taken; the damping falls
+TRIES = 12  # dampings tried from one place
+AT = 1e-9  # closer to a bound a coordinate is on it
+SETS = 8  # times the set of held coordinates may grow within one step
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Of every coordinate: low and high (n,)."""
+
+    low: Array
+    high: Array
+
+    def clipped(self, centre: Array) -> Array:
+        return np.asarray(np.clip(centre, self.low, self.high))
+
+    def reached(self, centre: Array) -> Bools:
+        """Coordinates (n,) that stand at a bound."""
+        at: Bools = (centre <= self.low + AT) | (centre >= self.high - AT)
+        return at
+
+    def held(self, centre: Array, gradient: Array) -> Bools:
+        """Coordinates (n,) that stand at a bound and want out."""
+        held: Bools = ((centre <= self.low + AT) & (gradient > 0.0)) | (
+            (centre >= self.high - AT) & (gradient < 0.0)
+        )
+        return held
+
+
+class Place(Protocol):
+    """Where a descent stands: an objective in nats, its gradient (n,), its curvature (n, n)."""
+
+    @property
+    def centre(self) -> Array: ...
+    @property
+    def nats(self) -> float: ...
+    @property
+    def gradient(self) -> Array: ...
+    @property
+    def curvature(self) -> Array: ...
+
+
+Here = TypeVar("Here", bound=Place)
+Linearised = TypeVar("Linearised", bound=Place, covariant=True)
+Tried = TypeVar("Tried")
+
+
+class Ground(Protocol[Linearised, Tried]):
+    """What is descended."""
+
+    @property
+    def bounds(self) -> Bounds: ...
+
+    def tried(self, centre: Array) -> tuple[Tried, float]:
+        """The function there, not linearised, and its objective [nats]."""
+
+    def linearised(self, tried: Tried) -> Linearised: ...
+
+    def moved(self, here: Any, tried: Tried) -> Linearised:
+        """There, with the slopes of a place so near that they are the same."""
+
+
+def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here, bool]:
+    """The optimum that is reached from a start in so many linearisations; whether it is one."""
+    here, damping = start, START
+    for _ in range(rounds):
+        held = ground.bounds.held(here.centre, here.gradient)
+        found = None
+        while found is None and damping < MOST:
+            step = bounded_step(here, ground.bounds, held, damping)
+            foretold = _gain(here, step)
+            if foretold < GAIN:
+                return here, True
+
+            tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
+            share = (here.nats - nats) / foretold
+            if np.isfinite(nats) and share > FULFILLED:
+                found = tried
+                damping = max(damping * (SOFTER if share > GOOD else 1.0), LEAST)
+            else:
+                damping *= HARDER
+
+        if found is None:
+            return here, False
+        near = foretold < NEAR and share > GOOD
+        here = ground.moved(here, found) if near else ground.linearised(found)
+    return here, _gain(here, _undamped(here, ground.bounds)) < GAIN
+
+
+def _undamped(here: Place, bounds: Bounds) -> Array:
+    return bounded_step(here, bounds, bounds.held(here.centre, here.gradient), LEAST)
+
+
+def _gain(here: Place, step: Array) -> float:
+    """What a step would gain by the linearised function [nats]."""
+    return float(-(here.gradient @ step + 0.5 * step @ here.curvature @ step))
+
+
+def bounded_step(here: Place, bounds: Bounds, held: Bools, damping: float) -> Array:
+    """The damped step (n,) that leaves no bound: coordinates that would are put on theirs."""
+    held, step = held.copy(), np.zeros(here.centre.size)
+    low, high = bounds.low - here.centre, bounds.high - here.centre
+    for _ in range(SETS):
+        free = np.flatnonzero(~held)
+        if not free.size:
+            break
+
+        curvature = here.curvature[np.ix_(free, free)]
+        pull = here.gradient[free] + here.curvature[np.ix_(free, held)] @ step[held]
+        damped = curvature + damping * np.diag(np.diag(curvature))
+        step[free] = -np.linalg.solve(damped, pull)
+
+        beyond = ~held & ((step < low - AT) | (step > high + AT))
+        if not beyond.any():
+            break
+        step = np.asarray(np.clip(step, low, high))
+        held |= beyond
+    return np.asarray(np.clip(step, low, high))

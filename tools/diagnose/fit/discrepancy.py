@@ -1,0 +1,68 @@
+"""The discrepancy of form δ: what every model of a wheel in soil misses, as freedoms of the fit.
+
+The size of δ is learnt from the recordings, under a prior that says how far published models miss
+published measurements of drawbar pull and torque: half of it lies at 5 to 20 %. (Shibly, Iagnemma
+and Dubowsky (2005) report 2.0 and 2.6 % for their linearisation alone; docs/diagnosis.md has what
+the equations miss on three public data sets.) δ is never zero by assumption. A rig that obeys the
+equations shows so by itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.model.discrepancy import features_of
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
+from gritd.tools.diagnose.noise.colour import Noise
+from gritd.tools.diagnose.rig.interface import Bools, FormSource, Stack
+
+FORM = Sizes((0.0, 0.003, 0.01, 0.03, 0.1, 0.3), (0.12, 0.12, 0.14, 0.22, 0.28, 0.12))
+DRIVE = Sizes((0.0, 0.003, 0.01, 0.03, 0.1), (0.3, 0.25, 0.25, 0.15, 0.05))
+MOST, LEAST = 36, 3e-3  # features of a source; variance of δ that may be left out
+TURN = 0.2  # size of what goes with the wheel's angle, in that of δ
+HARMONICS = (1.0, 2.0)  # a turn
+
+
+def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
+    """A freedom for each source of the rig; none for a rig that declares none."""
+    found = []
+    for source in stack.rig.forms:
+        columns = _columns(stack, source)
+        if columns.shape[1]:
+            sizes = DRIVE if source.drive else FORM
+            found.append(freedom(source.name, columns, noise, sizes))
+    return tuple(found)
+
+
+def _columns(stack: Stack, source: FormSource) -> Array:
+    """δ of one source (N, m), for a size of 1: as large as the channel itself."""
+    own = np.any([stack.of(c) for c in source.channels], axis=0)
+    weight = _joined(stack, source.weight) * own
+    acting: Bools = weight != 0.0
+    if not acting.any():
+        return np.zeros((stack.size, 0))
+
+    conditions = np.column_stack(
+        [_joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
+    )
+    features = features_of(conditions[acting], MOST, LEAST)
+    smooth = np.zeros((stack.size, len(features.points)))
+    smooth[acting] = features.at(conditions[acting])
+
+    angle = stack.covariate("wheel_angle")
+    turning = [TURN * wave(k * angle) for k in HARMONICS for wave in (np.cos, np.sin)]
+    return np.asarray(
+        np.column_stack((smooth, *turning)) * weight[:, None] * _size(stack, source, acting)
+    )
+
+
+def _joined(stack: Stack, runs: list[Array] | tuple[Array, ...]) -> Array:
+    """Per run (n,) to one vector (N,)."""
+    return stack.joined([dict.fromkeys(stack.rig.channels, values) for values in runs])
+
+
+def _size(stack: Stack, source: FormSource, acting: Bools) -> float:
+    """Root mean square of the source's last channel where it acts, in its unit."""
+    values = stack.measured[stack.of(source.channels[-1]) & acting]
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -1,0 +1,42 @@
+"""Functions that a model may be off by, of a size that the recordings tell.
+
+A freedom is a set of columns with unit normal weights, times one size for all of them. Its size has
+a prior over a few values. The form of the model has freedoms (discrepancy.py), and so
+has every effect, whose published forms differ (bending.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.noise.colour import Noise, whiten
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The sizes tried, the smallest first, and the prior probability of each."""
+
+    values: tuple[float, ...]
+    prior: tuple[float, ...]
+
+    @property
+    def log_prior(self) -> Array:
+        return np.log(np.array(self.prior) / sum(self.prior))
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise."""
+
+    name: str
+    columns: Array
+    whitened: Array
+    sizes: Sizes
+
+
+def freedom(name: str, columns: Array, noise: Noise, sizes: Sizes) -> Freedom:
+    """The freedom of columns (N, m) in the channels' units."""
+    return Freedom(name, columns, whiten(noise, columns), sizes)

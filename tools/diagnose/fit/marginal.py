@@ -1,0 +1,187 @@
+"""The evidence of a fit, averaged over the sizes of its freedoms.
+
+Around its optimum a fit is linear in all its unknowns, so for any sizes of the freedoms the evidence
+is a matter of the products of the columns, which are formed once:
+
+    ln Z(s) = −½ (rᵀr + |strain|² − bᵀA⁻¹b + ln det A − ln det P),   A = CᵀC + P
+
+with the columns C (Jacobian, tolerance, freedoms times their sizes), their prior precisions P and
+b = Cᵀr − P centre (Laplace's approximation: MacKay 2003, ch. 27). The strengths of effects have the
+screen's prior: several sizes, and of each effect all strengths or one alone. A parameter that
+stands at its bound is held there: it keeps the density of its prior and has no width of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from scipy.special import logsumexp
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.fit.freedom import Freedom
+from gritd.tools.diagnose.fit.problem import Fitted, Free
+from gritd.tools.diagnose.rig.interface import Bools
+
+SLIGHT = 1e-3  # weight of sizes below which they do not count
+SWEEPS = 4  # over the freedoms, each to its likeliest size
+
+Chosen = tuple[int, ...]  # of each freedom, which of its sizes
+
+
+class Marginal:
+    """A fit without its freedoms, and the freedoms that it may have."""
+
+    def __init__(self, fitted: Fitted, tolerance: Array, freedoms: Sequence[Freedom]) -> None:
+        """tolerance: (N, t) whitened columns of unit prior that every fit has."""
+        self.freedoms, known = tuple(freedoms), len(fitted.u) + len(fitted.x)
+        columns = [fitted.jacobian[:, :known], tolerance, *(f.whitened for f in freedoms)]
+        every = np.column_stack([*columns, fitted.residual])
+        self._products = every.T @ every
+        self._ends = np.cumsum([c.shape[1] for c in columns])
+
+        size = int(self._ends[-1])
+        self._centre, self._weight = np.zeros(size), np.ones(size)
+        self._centre[:known] = np.concatenate((fitted.u, fitted.x))
+        self._weight[:known] = fitted.penalty[:known]
+        self._held = np.zeros(size, bool)
+        self._held[:known] = fitted.held
+
+        first = len(fitted.u)
+        self._strong = np.zeros(size, bool)
+        self._strong[first:known] = [f.parameter.role == "strength" for f in fitted.free]
+        self._strengths = [
+            f
+            for i, f in enumerate(fitted.free)
+            if self._strong[first + i] and not fitted.held[first + i]
+        ]
+        self._known: dict[Chosen, float] = {}
+
+    def log_evidence(self, chosen: Chosen) -> float:
+        """For given sizes, their prior counted."""
+        if chosen not in self._known:
+            self._known[chosen] = self._log_evidence(chosen)
+        return self._known[chosen]
+
+    def likeliest(self, start: Chosen) -> tuple[Chosen, float]:
+        """The likeliest sizes, found one freedom at a time, and the log evidence averaged over
+        the sizes about them.
+        """
+        chosen = start
+        for _ in range(SWEEPS):
+            before = chosen
+            for number in range(len(self.freedoms)):
+                chosen = max(self._along(chosen, number), key=self.log_evidence)
+            if chosen == before:
+                break
+
+        top = average = self.log_evidence(chosen)
+        for number in range(len(self.freedoms)):
+            values = [self.log_evidence(c) for c in self._along(chosen, number)]
+            average += float(logsumexp(values)) - top
+        return chosen, average
+
+    def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
+        """Mean (count,) and covariance of the first unknowns, averaged over the sizes about the
+        likeliest ones.
+        """
+        every = {chosen, *(c for n in range(len(self.freedoms)) for c in self._along(chosen, n))}
+        ordered = sorted(every)
+        values = np.array([self.log_evidence(c) for c in ordered])
+        weight = np.exp(values - logsumexp(values))
+        told = [
+            (w, *self._posterior(c, count))
+            for w, c in zip(weight, ordered, strict=True)
+            if w > SLIGHT
+        ]
+        total = sum(w for w, _, _ in told)
+        mean = sum(w * m for w, m, _ in told) / total
+        spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in told) / total
+        return np.asarray(mean), np.asarray(spread)
+
+    def _posterior(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
+        """Mean and covariance of the first unknowns for given sizes."""
+        scale, acting = self._scaled(chosen)
+        index = np.flatnonzero(acting & ~self._held)
+        products = self._products * scale[:, None] * scale
+        prior = self._weight[index] ** 2
+        gram = products[np.ix_(index, index)] + np.diag(prior)
+        pull = products[index, -1] - prior * self._centre[index]
+
+        covariance = np.linalg.inv(gram)
+        mean, spread = self._centre[:count].copy(), np.zeros((count, count))
+        own = np.flatnonzero(index < count)
+        mean[index[own]] += covariance[own] @ pull
+        spread[np.ix_(index[own], index[own])] = covariance[np.ix_(own, own)]
+        return mean, spread
+
+    def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
+        """The same sizes but for one freedom, which has each of its own."""
+        count = len(self.freedoms[number].sizes.values)
+        return [(*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)]
+
+    def _log_evidence(self, chosen: Chosen) -> float:
+        scale, acting = self._scaled(chosen)
+        acting &= ~self._held
+        index = np.flatnonzero(acting)
+        products = self._products * scale[:, None] * scale
+
+        strong = self._strong[index]
+        prior = np.where(strong, 0.0, self._weight[index] ** 2)
+        centre = self._centre[index]
+        gram = products[np.ix_(index, index)] + np.diag(prior)
+        pull = products[index, -1] - prior * centre
+
+        root = np.linalg.cholesky(gram[np.ix_(~strong, ~strong)])
+        rest = np.column_stack((gram[np.ix_(~strong, strong)], pull[~strong]))
+        inside = np.linalg.solve(root, rest)
+        spread = 2.0 * (np.log(np.diag(root)).sum() - np.log(self._weight[index][~strong]).sum())
+        strain = np.sum(prior * centre**2) + self._strain_of_held()
+        misfit = products[-1, -1] + strain - inside[:, -1] @ inside[:, -1]
+
+        a = gram[np.ix_(strong, strong)] - inside[:, :-1].T @ inside[:, :-1]
+        b = pull[strong] - inside[:, :-1].T @ inside[:, -1]
+        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.freedoms, chosen, strict=True))
+        return float(
+            sizes
+            - 0.5 * (misfit + spread)
+            + strength_evidence(self._strengths, a, b, centre[strong])
+        )
+
+    def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:
+        """Factors of all columns and the residual; which columns act."""
+        scale, acting = np.ones(self._products.shape[0]), np.ones(len(self._centre), bool)
+        for freedom, number, first, last in zip(
+            self.freedoms, chosen, self._ends[1:-1], self._ends[2:], strict=True
+        ):
+            scale[first:last] = freedom.sizes.values[number]
+            acting[first:last] = freedom.sizes.values[number] > 0.0
+        return scale, acting
+
+    def _strain_of_held(self) -> float:
+        held = self._held & ~self._strong
+        return float(np.sum((self._weight[held] * self._centre[held]) ** 2))
+
+
+def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> float:
+    """What strengths add to the log evidence, from curvature (p, p) and slope (p,) of the
+    likelihood where they stand.
+    """
+    if not at.size:
+        return 0.0
+    sign = [int(f.parameter.low >= f.parameter.off) for f in strengths]
+    names = [f.name for f in strengths]
+    groups = [[i for i, n in enumerate(names) if n == name] for name in dict.fromkeys(names)]
+    chosen = [
+        sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))
+    ]
+    pull = b + a @ at  # seen from strengths of nought
+    found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
+    return float(logsumexp(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
+
+
+def _choices(strengths: list[int]) -> list[list[int]]:
+    """All strengths of an effect together, and each alone."""
+    return [strengths] if len(strengths) == 1 else [strengths, *([i] for i in strengths)]

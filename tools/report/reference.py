@@ -1,0 +1,95 @@
+"""The reference campaign of `gritd diagnose --reference`: recordings, or what an earlier diagnosis
+wrote.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.diagnose.explain.coverage import coverage
+from gritd.tools.diagnose.explain.result import Diagnosis, Reference
+from gritd.tools.diagnose.rig.interface import Rig, Stack
+from gritd.tools.diagnose.rig.wheel import Bed
+
+WELL = 0.9  # share of the new campaign that must be covered for nothing to be told of it
+
+
+@dataclass(frozen=True)
+class Given:
+    """Recordings of a campaign in which nothing is new; verdict: of its own diagnosis, if known."""
+
+    files: tuple[Path, ...] = ()
+    bed: Bed = "prepared"
+    verdict: str | None = None
+
+    def kept(self, hashes: Mapping[str, str]) -> dict[str, Any]:
+        """What doing the diagnosis again needs."""
+        if not self.files:
+            return {}
+        files = {str(path): hashes[str(path)] for path in self.files}
+        return {"reference": {"files": files, "bed": self.bed}}
+
+
+NONE = Given()
+
+
+def given(paths: Sequence[Path], bed: Bed) -> Given:
+    """From the command line. Raises CommandError where an earlier diagnosis cannot be read."""
+    files: list[Path] = []
+    verdicts: list[str] = []
+    for path in paths:
+        if path.suffix == ".json":
+            earlier = _earlier(path)
+            files += [_beside(path, name) for name in earlier["redo"]["files"]]
+            verdicts.append(str(earlier["verdict"]))
+        else:
+            files.append(path)
+    return Given(tuple(files), bed, verdicts[0] if len(verdicts) == 1 else None)
+
+
+def again(redo: Mapping[str, Any]) -> Given:
+    """From what a diagnosis kept."""
+    kept = redo.get("reference")
+    if not kept:
+        return NONE
+    return Given(tuple(Path(name) for name in kept["files"]), kept["bed"])
+
+
+def told(found: Diagnosis, rig: Rig, reference: Given) -> Diagnosis:
+    """The result with what it was held against, and what of it lies outside."""
+    covered = coverage(Stack(rig))
+    files = tuple(str(path) for path in reference.files)
+    kept = Reference(files, reference.verdict, reference.bed, covered.share, covered.outside)
+    caveats = found.caveats
+    if covered.share < WELL:
+        caveats = (
+            *caveats,
+            f"{covered.share:.0%} of the new campaign lies where the reference was driven;"
+            f" outside: {covered.outside}. What is said of the rest is less certain.",
+        )
+    return replace(found, reference=kept, caveats=caveats)
+
+
+def _earlier(path: Path) -> Mapping[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(found["redo"]["files"], dict) or not isinstance(found["verdict"], str):
+            raise KeyError("redo.files")
+    except FileNotFoundError:
+        raise CommandError(f"{path}: found no such file; expected a reference", USAGE) from None
+    except (OSError, ValueError, KeyError, TypeError):
+        raise CommandError(
+            f"{path}: found no diagnosis; expected recordings or the JSON of `gritd diagnose`",
+            DAMAGED,
+        ) from None
+    return found  # type: ignore[no-any-return]
+
+
+def _beside(path: Path, name: str) -> Path:
+    """A recording that a diagnosis names: as it is, or in the folder of its JSON."""
+    return Path(name) if Path(name).exists() else path.parent / Path(name).name

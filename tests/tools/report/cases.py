@@ -152,7 +152,7 @@ def base(**changed: object) -> Diagnosis:
         law=None,
         next_experiment=None,
         caveats=("The configuration states n as almost exact; it floats within 1 % instead.",),
-        remaining="Nothing remains above the noise floor",
+        remaining_words="Nothing remains above the noise floor",
         nuisance={
             "sinkage_offset": Quantity(4e-5, 6e-5, "m"),
             "torque_scale": Quantity(0.004, 0.0015, ""),
@@ -303,7 +303,7 @@ def unlisted() -> Diagnosis:
             0.88,
             MappingProxyType({"torque_slip_squared": Quantity(0.4, 0.02, "N·m")}),
         ),
-        remaining="Replicates differ by less than the law leaves: "
+        remaining_words="Replicates differ by less than the law leaves: "
         "0.02 N·m remain above the noise floor",
         traces=drawn,
         scatters=(scatter(drawn),),
@@ -347,7 +347,7 @@ def hostile() -> Diagnosis:
         hypotheses=(replace(best, sentence=evil, separated_by={"current_offset": evil}), *others),
         fit=Fit({"torque": "N·m"}, {"torque": bad}, {"torque": bad}, {"torque": bad}),
         caveats=(evil,),
-        remaining=evil,
+        remaining_words=evil,
         law=Law("torque", evil, {evil: (0.0, bad)}, bad, {evil: Quantity(bad, bad, evil)}),
         traces=tuple(
             replace(t, run=evil, measured=[bad] * len(t.time), sigma=bad) for t in first.traces[:4]

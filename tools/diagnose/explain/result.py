@@ -257,25 +257,28 @@ class Diagnosis:
     law: Law | None
     next_experiment: NextExperiment | None
     caveats: tuple[str, ...]
-    share: float  # of the misfit that the accepted names take
-    remaining: Mapping[str, Remainder]  # channel -> what they leave
-    remaining_words: str
-    discrepancy: Mapping[str, Discrepancy]  # channel -> how far the form of the model may be off
     nuisance: Mapping[
         str, Quantity
     ]  # calibration constants that floated, fitted with the accepted effects
     noise: Mapping[
         str, Mapping[str, float]
     ]  # channel -> sigma of a grid value, correlation time [s], configured sigma
-    reference: Reference | None  # the campaign in which nothing is new
-    explanations: tuple[Explanation, ...]  # all that were weighed
-    candidates: int  # listed effects that were considered
     baseline: tuple[str, ...]  # effects the configuration already held
     traces: tuple[Trace, ...]
     scatters: tuple[Scatter, ...]
     redo: Mapping[
         str, Any
     ]  # files with their SHA-256, configuration text, seed, versions, settings of the engine
+
+    share: float = 0.0  # of the misfit that the accepted names take
+    remaining_words: str = ""
+    # channel -> what the accepted names leave
+    remaining: Mapping[str, Remainder] = field(default_factory=dict)
+    # channel -> how far the form of the model may be off
+    discrepancy: Mapping[str, Discrepancy] = field(default_factory=dict)
+    reference: Reference | None = None  # the campaign in which nothing is new
+    explanations: tuple[Explanation, ...] = ()  # all that were weighed
+    candidates: int = 0  # listed effects that were considered
 
     @property
     def accepted(self) -> tuple[Hypothesis, ...]:

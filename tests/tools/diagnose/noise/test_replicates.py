@@ -48,12 +48,13 @@ def stack_of(slip: float = 0.2) -> Any:
         SimpleNamespace(covariates={**held, "position": np.zeros(1), "pass": np.ones(1)})
         for _ in range(RUNS)
     ]
-    rig = SimpleNamespace(channels=("sinkage",), runs=runs)
+    rig = SimpleNamespace(channels=("sinkage",), runs=runs, new=[True] * RUNS)
     return SimpleNamespace(
         rig=rig,
         size=time.size,
         time=time,
         run=run,
+        new=np.ones(time.size, bool),
         gaps=gaps,
         channel=np.zeros(time.size, dtype=int),
         covariate=held.__getitem__,

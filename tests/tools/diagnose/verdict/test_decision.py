@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,14 +13,17 @@ from scipy.stats import norm
 
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.fit.bending import FORMS
 from gritd.tools.diagnose.fit.evidence import SCALES
+from gritd.tools.diagnose.fit.marginal import Marginal
+from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import WIDE, Fitted, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.verdict import decide, forms
-from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
-from gritd.tools.proof.ours.calibrate import learn, log_truth, tabled
+from gritd.tools.diagnose.verdict import decide
+from gritd.tools.diagnose.verdict.calibration import learnt
+from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.other_forms import LorentzStribeck
 from tests.tools.diagnose.campaigns import plan, settings
@@ -44,26 +48,24 @@ def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:
     assert found.surprise("drift") < 1.0 < found.threshold < found.surprise("friction")
 
 
-def _evidence(acting: Sequence[Effect], name: str) -> Any:
-    """Evidence of a listed effect above the base model, for each degree of difference of forms."""
+def _model(acting: Sequence[Effect], name: str) -> Model:
+    """A listed effect fitted to recordings in which something acts."""
     rig = WheelRig(record(plan(seconds=12.0), acting), settings())
     base = fit_base(rig, np.random.default_rng(0))
-    effect = EFFECTS[name]
-    free = free_of((effect,))
-    x = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
-    fitted = base.problem.descend((effect,), free, base.fitted.u, x)
-    return forms.evidence(base.problem, fitted, base.fitted)
+    free = free_of((EFFECTS[name],))
+    start = np.array([1.0 if f.parameter.role == "strength" else 0.0 for f in free])
+    return fit_model(base.problem, (), (EFFECTS[name],), free, (base.fitted.u, start), ())
 
 
 def test_another_published_form_keeps_its_name() -> None:
-    """Lorentz's break-away friction is not our Gaussian: with a discrepancy it is evident, ours
-    needs none.
+    """Lorentz's break-away friction is not our Gaussian: ours needs the least bending, the other
+    more, and what it is bent by is paid for by far.
     """
-    ours = _evidence((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
-    other = _evidence((LorentzStribeck(size=1.5),), "stribeck_friction")
-    assert np.argmax(ours) == 0
-    assert np.argmax(other) > 0
-    assert other.max() > other[0] + 3.0
+    ours = _model((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
+    other = _model((LorentzStribeck(size=1.5),), "stribeck_friction")
+    assert ours.bends == (FORMS.values[0],) < other.bends
+    assert other.marginal is not None
+    assert other.evidence > other.marginal.log_evidence((0,)) + 3.0
 
 
 def test_the_calibration_is_learnt_from_what_was_true() -> None:
@@ -73,43 +75,52 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
         evidence = rng.normal(20.0, 6.0, 3)
         share = np.exp((evidence - evidence.max()) / 3.0)
         truth = rng.choice(["a", "b", "c"], p=share / share.sum())
-        weighed = [[[n], [e] * forms.FORMS] for n, e in zip("abc", evidence.tolist(), strict=True)]
-        cases.append(
-            {"stratum": "effect", "truth": [str(truth)], "weighed": weighed, "nameless": -1e6}
-        )
+        weighed = [
+            {"names": [n], "nameless": False, "evidence": e}
+            for n, e in zip("abc", evidence.tolist(), strict=True)
+        ]
+        cases.append(case_of(weighed, [str(truth)], False, 3))
     by, score = learn(cases)
     assert by.temperature == pytest.approx(3.0, rel=0.25)
-    overconfident = Calibration(0.5, by.forms, by.more, by.nameless, by.lapse)
-    assert score > log_truth(tabled(cases), overconfident).mean()
+    overconfident = replace(by, temperature=0.5)
+    assert score > np.mean([log_truth(case, overconfident) for case in cases])
 
 
-@pytest.mark.parametrize(
-    "left, verdict", [(0.0, "explained"), (40.0, "explained"), (100.0, "unlisted")]
-)
-def test_an_explanation_that_leaves_much_is_none(
-    left: float, verdict: str, monkeypatch: pytest.MonkeyPatch
+def _judged(listed: float, nameless: float, share: float, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """One effect against functions without a name, of so much evidence each [nats]."""
+    monkeypatch.setattr(decide, "taken_share", lambda *_: share)
+    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    bare, best = (SimpleNamespace(names=names) for names in ((), ("a",)))
+    search: Any = SimpleNamespace(bare=bare, screening=None)
+    weighed: Any = [
+        decide.Weighed(bare, (), False, 0.0),
+        decide.Weighed(best, ("a",), False, listed),
+        decide.Weighed(bare, (), True, nameless),
+    ]
+    return decide.judged(search, weighed, None, learnt(30))
+
+
+def test_the_verdict_is_that_of_the_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    named = _judged(300.0, 200.0, 1.0, monkeypatch)
+    assert named.verdict == "explained" and named.best.names == ("a",)
+    assert named.probability["a"] == pytest.approx(1.0 - learnt().lapse, abs=1e-6)
+
+    strange = _judged(200.0, 300.0, 1.0, monkeypatch)
+    assert strange.verdict == "unlisted" and strange.best.names == ()
+    assert strange.probability["a"] + strange.unlisted == pytest.approx(1.0 - learnt().lapse)
+
+
+def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Five hundred nats gained, by far more than functions without a name alone; what stands out
-    beside it decides.
-    """
-    monkeypatch.setattr(decide, "remaining", lambda *_: (left, left > 0.0))
-    base, best = (
-        SimpleNamespace(names=n, fitted=SimpleNamespace(objective=o))
-        for n, o in (((), 1000.0), (("a",), 0.0))
-    )
-    search: Any = SimpleNamespace(base=base)
-    weighed: Any = [decide.WeighedModel(best, np.full(forms.FORMS, 480.0))]
-    found = decide.judged(search, weighed, 200.0, learnt())
-    assert found.verdict == verdict
-    assert found.probability["a"] + found.unlisted == pytest.approx(1.0 - learnt().lapse)
-    assert (found.probability["a"] > 0.5) == (verdict == "explained")
+    assert _judged(300.0, 200.0, 0.3, monkeypatch).verdict == "explained"
+    assert _judged(300.0, 200.0, 0.05, monkeypatch).verdict == "unlisted"
 
 
 def test_the_learnt_table_is_sound() -> None:
     by = learnt()
     assert 0.5 < by.temperature < 50.0
-    assert np.exp(by.forms).sum() == pytest.approx(1.0, abs=0.05)
-    assert max(by.more, by.nameless) < 3.0
+    assert max(by.more, by.nameless) < 3.0 and by.listed > -5.0
     assert 0.0 < by.lapse < 0.2
 
 
@@ -134,6 +145,8 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
         penalty,
         np.zeros(0),
         objective,
+        np.zeros((30, 0)),
+        np.zeros(2, bool),
     )
 
     constant, strength = np.linspace(-4.0, 5.0, 300), np.linspace(0.0, 8.0, 400)
@@ -147,4 +160,5 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     )
     priors = np.mean([2.0 * norm.pdf(strength, 0.0, s) for s in SCALES], axis=0)
     true = np.trapezoid(np.trapezoid(likelihood * priors, strength, axis=1), constant)
-    assert fitted.log_evidence == pytest.approx(np.log(true) - 0.5 * residual @ residual, abs=0.02)
+    evidence = Marginal(fitted, np.zeros((30, 0)), ()).log_evidence(())
+    assert evidence == pytest.approx(np.log(true) - 0.5 * residual @ residual, abs=0.02)

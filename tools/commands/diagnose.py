@@ -171,8 +171,8 @@ def of_files(
     reference: references.Given = references.NONE,
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
-    hashes = distinct([*files, *reference.files])
     recordings, known = read_all(files), read_all(reference.files)
+    hashes = distinct([*files, *reference.files])
     rig, rate = rig_of(recordings, configuration.settings, known, reference.bed)
     if not rig.channels:
         raise CommandError(

@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from gritd.estimator.config import configuration as config
+from gritd.estimator.effects.library import EFFECTS
 from gritd.estimator.recording.salvage import read
 from gritd.tools.proof.blind import cases, detect, handover, knowledge, strata
 from gritd.tools.proof.blind.detect import Detector
@@ -64,6 +65,11 @@ def test_worlds_can_be_chosen() -> None:
     drawn = strata.assignments(40, np.random.default_rng(4), worlds=("strips", PAPER))
     assert {a.world for a in drawn if a.stratum == "foreign"} == {"strips"}
     assert {a.world for a in drawn if a.stratum == "pair"} == {"strips", PAPER}
+
+
+def test_every_effect_of_the_library_is_asked_for_in_two_forms() -> None:
+    assert set(LISTED) == set(EFFECTS) - {"stress_linearisation", "empirical_law"}
+    assert all(len(forms) >= 2 for forms in LISTED.values())
 
 
 def test_the_groups_name_effects_that_exist() -> None:

@@ -14,6 +14,9 @@ import numpy as np
 
 from gritd.tools.proof.blind.plant.quadrature import RULE, Array
 
+TINY = 1e-12  # a rim that does not slide is held along its plane
+LIGHT = 5e3  # σ₀ [Pa] pressure below which a smooth rim grips like a rough one
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -67,6 +70,13 @@ class Reaction(NamedTuple):
     torque: Array  # T [N·m], Eq. (10)
     pressure: Array  # mean normal stress on the rim in contact [Pa]
     side: Array  # sideways force of a skewed wheel [N]
+
+
+class Sliding(NamedTuple):
+    """How the rim slides on the soil; in any unit."""
+
+    along: Array
+    aside: Array
 
 
 class Zone(NamedTuple):
@@ -138,8 +148,11 @@ def _zone(
     """∫(τ cos − σ sin), ∫(σ cos + τ sin), ∫τ, ∫σ, ∫τ across, over one zone."""
     sigma = _normal(ground, radius, zone.drop)
     jay = radius * (zone.turned - column(ratio) * zone.gap)  # Eq. (6)
-    aside = radius * column(ratio) * zone.turned * rim.skew if np.any(rim.skew) else None
-    tau, across = sheared(ground, rim, sigma, jay, aside)
+    sliding = None
+    if np.any(rim.skew):
+        along = 1.0 - column(ratio) * zone.cosine
+        sliding = Sliding(along, column(ratio) * np.asarray(rim.skew) + 0.0 * along)
+    tau, across = sheared(ground, rim, sigma, jay, sliding)
     cosine, sine, weight = zone.cosine, zone.sine, zone.width
     return (
         ((tau * cosine - sigma * sine) * weight).sum(axis=1),
@@ -158,30 +171,22 @@ def _normal(ground: Ground, radius: float, drop: Array) -> Array:
 
 
 def sheared(
-    ground: Ground, rim: Rim, sigma: Array, jay: Array, aside: Array | None = None
+    ground: Ground, rim: Rim, sigma: Array, jay: Array, sliding: Sliding | None = None
 ) -> tuple[Array, Array]:
-    """Shear stress τ along and across the wheel's plane under normal stress σ, Eqs. (2), (7).
+    """Shear stress τ along and across the wheel's plane under normal stress σ and displacement j,
+    Eqs. (2), (7). All broadcast.
 
-    `jay`, `aside`: displacement along and across [m]. The stress has the direction of both
-    together (Ishigami et al. 2007, J. Field Robotics 24, 233-250). All broadcast.
+    The stress of a skewed wheel has the direction in which the rim slides (Coulomb). A smooth rim
+    grips 1 − s σ/(σ + σ₀) of the soil's strength: the envelope of sand on steel is bent, and
+    its slope falls to about half, Uesugi and Kishida (1986), Soils and Foundations 26(4), 139-149.
     """
-    cohesion, friction = _on_the_rim(ground, rim)
-    strength = (cohesion + sigma * friction) * rim.strength
-    if aside is None:
-        return strength * mobilised(jay / ground.shear_modulus, rim), np.zeros((1, 1))
-    far = np.hypot(jay, aside) + 1e-12
-    tau = strength * mobilised(far / ground.shear_modulus, rim)
-    return tau * jay / far, tau * aside / far
-
-
-def _on_the_rim(ground: Ground, rim: Rim) -> tuple[Array | float, Array | float]:
-    """Adhesion [Pa] and tan δ: c and tan φ on a rough rim; on a smooth one adhesion goes first.
-
-    Source: Uesugi and Kishida (1986), Soils and Foundations 26(4), 139-149: friction on steel
-    falls with its roughness from tan φ to about half of it.
-    """
-    left = 1.0 - rim.polish
-    return ground.cohesion * left**3, ground.tan_phi * left
+    gripped = 1.0 - rim.polish * sigma / (sigma + LIGHT)
+    strength = (ground.cohesion + sigma * ground.tan_phi) * rim.strength * gripped
+    tau = strength * mobilised(jay / ground.shear_modulus, rim)
+    if sliding is None:
+        return tau, np.zeros((1, 1))
+    speed = np.hypot(*sliding) + TINY
+    return tau * (np.abs(sliding.along) + TINY) / speed, np.abs(tau) * sliding.aside / speed
 
 
 def mobilised(x: Array, rim: Rim) -> Array:

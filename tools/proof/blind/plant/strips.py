@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.tools.proof.blind.plant.bed import LIFTED
-from gritd.tools.proof.blind.plant.contact import sheared
+from gritd.tools.proof.blind.plant.contact import Sliding, sheared
 from gritd.tools.proof.blind.plant.lanes import Lanes, Moment, grid, lanes
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import HANGING, Scene
@@ -83,6 +83,9 @@ class Under(NamedTuple):
     cosine: Array
     area: Array  # of the rim over a strip [m²]
     depth: Array  # how deep a strip stays pressed [m]
+    along: Array  # shear displacement [m]
+    sliding: Sliding | None  # since the step before, of a skewed wheel [m]
+    stiff: Array  # of unloading [Pa/m], (lanes, 1)
 
 
 class _Strips:
@@ -102,7 +105,7 @@ class _Strips:
         self._lane = self._count * np.arange(len(scenes))[:, None]
 
         self._depth = np.zeros(self._count * len(scenes))
-        self._along, self._aside = np.zeros_like(self._depth), np.zeros_like(self._depth)
+        self._along = np.zeros_like(self._depth)
         self._sinkage = np.zeros((len(scenes), 1))
 
     def felt(self) -> Felt:
@@ -111,7 +114,7 @@ class _Strips:
         found: list[Felt] = []
         for left in range(int(passes.max()) - 1, -1, -1):
             self._depth *= np.repeat(passes > left + 1, self._count)
-            self._along[:], self._aside[:], self._sinkage[:] = 0.0, 0.0, 0.0
+            self._along[:], self._sinkage[:] = 0.0, 0.0
             found = [
                 self._step(moment, FIRST if not n else NEWTON) for n, moment in enumerate(moments)
             ]
@@ -119,21 +122,17 @@ class _Strips:
 
     def _step(self, now: Moment, most: int) -> Felt:
         under = self._under(now)
-        along = self._along[under.flat] + now.rolled - now.moved * under.cosine
-        aside = self._aside[under.flat] + np.abs(now.moved) * now.rim.skew
-        stiff = self._stiffness(now)
-        self._balance(now, under, stiff, along, aside, most)
+        self._balance(now, under, most)
 
-        pressure, yielding = self._pressure(now, under, stiff)
+        pressure, yielding = self._pressure(now, under)
         touched = pressure > 0.0
-        tau, across = sheared(now.ground, now.rim, pressure, along, aside)
+        tau, across = sheared(now.ground, now.rim, pressure, under.along, under.sliding)
         force, side = tau * under.area * touched, across * under.area * touched
         pressed = pressure * under.area
 
-        self._depth[under.flat] = np.where(
-            yielding, self._dent(under, pressure, stiff), under.depth
-        )
-        self._along[under.flat], self._aside[under.flat] = along * touched, aside * touched
+        dent = self._sinkage - under.above - pressure / under.stiff
+        self._depth[under.flat] = np.where(yielding, dent, under.depth)
+        self._along[under.flat] = under.along * touched
         total = (under.area * touched).sum(axis=1, keepdims=True)
         return Felt(
             self._sinkage.copy(),
@@ -149,10 +148,21 @@ class _Strips:
         ahead = self._origin + (index + 0.5) * self._pitch - now.place
         sine = np.clip(ahead / self._radius, -REACH, REACH)
         cosine = np.sqrt(1.0 - sine**2)
-        above = np.where(np.abs(ahead) < REACH * self._radius, self._radius * (1.0 - cosine), 1.0)
+        near = np.abs(ahead) < REACH * self._radius
+
         flat = index + self._lane
+        slid = now.rolled - now.moved * cosine
+        skewed = Sliding(slid, np.abs(now.moved) * now.rim.skew + np.zeros_like(slid))
         return Under(
-            flat, above, sine, cosine, self._pitch * self._width / cosine, self._depth[flat]
+            flat=flat,
+            above=np.where(near, self._radius * (1.0 - cosine), 1.0),
+            sine=sine,
+            cosine=cosine,
+            area=self._pitch * self._width / cosine,
+            depth=self._depth[flat],
+            along=self._along[flat] + slid,
+            sliding=skewed if np.any(now.rim.skew) else None,
+            stiff=self._stiffness(now),
         )
 
     def _stiffness(self, now: Moment) -> Array:
@@ -160,26 +170,21 @@ class _Strips:
         usual = now.ground.modulus * (SHALLOW * self._radius) ** (now.ground.exponent - 1.0)
         return np.asarray(usual / (self._recovery + now.rim.rebound))
 
-    def _dent(self, under: Under, pressure: Array, stiff: Array) -> Array:
-        return np.asarray(self._sinkage - under.above - pressure / stiff)
-
-    def _pressure(self, now: Moment, under: Under, stiff: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def _pressure(self, now: Moment, under: Under) -> tuple[Array, NDArray[np.bool_]]:
         """Normal stress [Pa], and where the strip yields: Bekker's K zⁿ, or the spring's."""
         deep = self._sinkage - under.above
         bearing = now.ground.modulus * np.maximum(deep, 0.0) ** now.ground.exponent
-        spring = stiff * (deep - under.depth)
+        spring = under.stiff * (deep - under.depth)
         return np.clip(spring, 0.0, bearing), spring > bearing
 
-    def _balance(
-        self, now: Moment, under: Under, stiff: Array, along: Array, aside: Array, most: int
-    ) -> None:
+    def _balance(self, now: Moment, under: Under, most: int) -> None:
         """Sinkage at which the strips carry the weight: Newton's steps, halves where they leave
         what is known to be too high and too deep.
         """
         leap, weight = LEAP * self._radius, np.maximum(now.weight, LIFTED)
         high, deep = np.full_like(self._sinkage, -np.inf), np.full_like(self._sinkage, np.inf)
         for _ in range(most):
-            upward, rise = self._load(now, under, stiff, along, aside)
+            upward, rise = self._load(now, under)
             miss = weight - upward
             if np.abs(miss).max() < CLOSE * weight.min():
                 break
@@ -191,15 +196,13 @@ class _Strips:
             half = np.where(known, 0.5 * (high + deep), aimed)
             self._sinkage = np.where(inside, aimed, half)
 
-    def _load(
-        self, now: Moment, under: Under, stiff: Array, along: Array, aside: Array
-    ) -> tuple[Array, Array]:
+    def _load(self, now: Moment, under: Under) -> tuple[Array, Array]:
         """What the strips carry [N], and how it rises with the sinkage [N/m], but for shear."""
-        pressure, yielding = self._pressure(now, under, stiff)
+        pressure, yielding = self._pressure(now, under)
         touched = pressure > 0.0
-        tau, _ = sheared(now.ground, now.rim, pressure, along, aside)
+        tau, _ = sheared(now.ground, now.rim, pressure, under.along, under.sliding)
         upward = (pressure * under.cosine + tau * under.sine * touched) * under.area
         dent = np.maximum(self._sinkage - under.above, 1e-9)
-        slope = np.where(yielding, now.ground.exponent * pressure / dent, stiff * touched)
+        slope = np.where(yielding, now.ground.exponent * pressure / dent, under.stiff * touched)
         rise = slope * under.cosine * under.area
         return upward.sum(axis=1, keepdims=True), rise.sum(axis=1, keepdims=True)

@@ -90,11 +90,16 @@ def _since_reversal(omega: Array, turn: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class HardPlay(Play):
-    """Nothing, then all. Source: dead zone, Nordin and Gutman (2002), Automatica 38, 1633-1649."""
+class StrikingPlay(Play):
+    """Nothing, then the teeth strike: 1.4 of the load, which dies out over a third of b.
+
+    Source: impact at the end of a dead zone, Nordin and Gutman (2002), Automatica 38, 1633-1649;
+    its size was chosen here.
+    """
 
     def taken_up(self, turned: Array) -> Array:
-        return np.asarray((turned >= 1.0).astype(float))
+        since = np.minimum(np.maximum(turned - 1.0, 0.0), 50.0)
+        return np.asarray((turned >= 1.0) * (1.0 + 0.4 * np.exp(-3.0 * since)))
 
 
 @dataclass(frozen=True)
@@ -215,7 +220,7 @@ class WarmMagnets(Effect):
 EFFECTS: tuple[type[Effect], ...] = (
     RoundTeeth,
     CatchingTeeth,
-    HardPlay,
+    StrikingPlay,
     SoftPlay,
     HousedWinding,
     LadderedHeat,

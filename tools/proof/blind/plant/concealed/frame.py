@@ -60,19 +60,25 @@ class LeaningAxis(Effect):
 
 @dataclass(frozen=True)
 class InclinedBed(Effect):
-    """The bed rises by α against the rail: the potentiometer reads z − x tan α, and W sin α goes
-    from the pull. Geometry and statics.
-
-    The wheel was set on the soil where the first run began.
+    """The bed rises against the rail, by α at first; its forms give how it goes on. The
+    potentiometer reads z − rise, and W sin of the grade goes from the pull. Geometry and statics.
     """
+
+    length: float = 1.0  # L [m]
 
     name, signed, most = "bed_inclination", True, 0.06
 
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most * cls.sign(rng), facts.length)
+
     def grade(self, place: Array) -> Array:
-        return np.full(place.size, float(np.tan(self.strength)))
+        """Rise of the surface per way, at places on the bed (n,) [m]."""
+        raise NotImplementedError
 
     def rise(self, place: Array) -> Array:
-        return place * float(np.tan(self.strength))
+        """Height of the surface over where the bed begins [m]."""
+        raise NotImplementedError
 
     def forces(self, scene: Scene) -> Scene:
         climb = scene.carried * np.sin(np.arctan(self.grade(scene.motion.travel)))
@@ -85,20 +91,26 @@ class InclinedBed(Effect):
 
 @dataclass(frozen=True)
 class HollowBed(InclinedBed):
-    """The same for a bed raked hollow: its surface rises by α x (1 − h x/L)."""
-
-    length: float = 1.0  # L [m]
-    hollow: float = 0.2  # h
-
-    @classmethod
-    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(cls.most * cls.sign(rng), facts.length, float(rng.uniform(0.1, 0.3)))
+    """Raked hollow: α x (1 − x/5L)."""
 
     def grade(self, place: Array) -> Array:
-        return np.asarray(self.strength * (1.0 - 2.0 * self.hollow * place / self.length))
+        return np.asarray(self.strength * (1.0 - 0.4 * place / self.length))
 
     def rise(self, place: Array) -> Array:
-        return np.asarray(self.strength * place * (1.0 - self.hollow * place / self.length))
+        return np.asarray(self.strength * place * (1.0 - 0.2 * place / self.length))
+
+
+@dataclass(frozen=True)
+class RollingBed(InclinedBed):
+    """Raked in a wave: α (x + L/20 sin 2πx/L)."""
+
+    def grade(self, place: Array) -> Array:
+        wave = 0.1 * np.pi * np.cos(2.0 * np.pi * place / self.length)
+        return np.asarray(self.strength * (1.0 + wave))
+
+    def rise(self, place: Array) -> Array:
+        wave = 0.05 * self.length * np.sin(2.0 * np.pi * place / self.length)
+        return np.asarray(self.strength * (place + wave))
 
 
 @dataclass(frozen=True)
@@ -248,8 +260,8 @@ class RoughWall(Effect):
 EFFECTS: tuple[type[Effect], ...] = (
     SaggingSlope,
     LeaningAxis,
-    InclinedBed,
     HollowBed,
+    RollingBed,
     JointedFrame,
     RollingContacts,
     SpringAxis,

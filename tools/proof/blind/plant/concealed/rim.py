@@ -153,7 +153,9 @@ class PressedPeak(Effect):
 
 @dataclass(frozen=True)
 class PolishedRim(Effect):
-    """Friction on the rim is tan δ = (1 − s) tan φ; adhesion falls faster. `contact.sheared`."""
+    """The rim grips lightly pressed soil well, and heavily pressed soil less: strength times 1 −
+    s σ/(σ + σ₀). See `contact.sheared`.
+    """
 
     name, most = "rim_friction", 0.4
 
@@ -175,9 +177,8 @@ class SlidingRim(Effect):
 
 @dataclass(frozen=True)
 class SkewedWheel(Effect):
-    """The wheel's plane is turned from its travel by β: soil is sheared sideways, too.
-
-    j_y = r (1 − i)(θ₁ − θ) tan β. Source: Ishigami et al. (2007), J. Field Robotics 24, 233-250.
+    """The wheel's plane is turned from its travel by β: the rim slides sideways, too, and the shear
+    stress has the direction of the sliding. See `contact.sheared`.
     """
 
     name, signed, most = "side_slip", True, 0.35

@@ -161,23 +161,41 @@ class DentedRim(OffsetAxle):
 
 
 @dataclass(frozen=True)
-class BentAxle(Effect):
-    """The hub runs out: it lifts the axle by e cos ψ' and drops it again, and the rim stays round.
-
-    Only the potentiometer sees it.
+class Hub(Effect):
+    """The hub runs out: it lifts the axle and drops it again, and the rim stays round. Only the
+    potentiometer sees it; its forms give the wave.
     """
 
     phase: float = 0.0
 
-    name, most = "wheel_eccentricity", 0.003
+    name, most = "hub_runout", 0.003
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
 
+    def wave(self, angle: Array) -> Array:
+        raise NotImplementedError
+
     def sensed(self, felt: Felt) -> Felt:
-        wave = self.strength * np.cos(felt.scene.motion.turn + self.phase)
-        return felt.read(sinkage=felt.sinkage - wave * (felt.scene.carried > 1.0))
+        lifted = self.strength * self.wave(felt.scene.motion.turn + self.phase)
+        return felt.read(sinkage=felt.sinkage - lifted * (felt.scene.carried > 1.0))
+
+
+@dataclass(frozen=True)
+class OvalHub(Hub):
+    """cos ψ' and 0.4 of it twice a turn."""
+
+    def wave(self, angle: Array) -> Array:
+        return np.asarray(np.cos(angle) + 0.4 * np.cos(2.0 * angle))
+
+
+@dataclass(frozen=True)
+class KeyedHub(Hub):
+    """A bell of 0.6 rad once a turn: a key that stands proud of its groove."""
+
+    def wave(self, angle: Array) -> Array:
+        return np.asarray(np.exp((np.cos(angle) - 1.0) / 0.6**2))
 
 
 @dataclass(frozen=True)
@@ -282,7 +300,8 @@ EFFECTS: tuple[type[Effect], ...] = (
     AdheringSidewall,
     OffsetAxle,
     DentedRim,
-    BentAxle,
+    OvalHub,
+    KeyedHub,
     ElasticInertia,
     GearedInertia,
     WornRim,

@@ -153,11 +153,11 @@ class Drift(Effect):
 
 
 @dataclass(frozen=True)
-class WarmingDrift(Drift):
-    """Towards a new zero as the bridge warms up: (1 − e^(−t/τ)) τ over the first run's length."""
+class RoomDrift(Drift):
+    """With the temperature of the room, which swings: sin(t/τ) τ over a run."""
 
     def crept(self, time: Array) -> Array:
-        return np.asarray(-np.expm1(-time / self.pace) * self.pace / self.span)
+        return np.asarray(np.sin(time / self.pace) * self.pace / self.span)
 
 
 @dataclass(frozen=True)
@@ -175,6 +175,6 @@ EFFECTS: tuple[type[Effect], ...] = (
     ScatteredDatum,
     TiltedPotentiometer,
     LoadedPotentiometer,
-    WarmingDrift,
+    RoomDrift,
     GluedDrift,
 )

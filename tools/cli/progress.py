@@ -1,27 +1,27 @@
 """Progress on standard error for whatever takes longer than two seconds: a line rewritten on a
-terminal, else none.
+terminal, a line from time to time elsewhere.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 
-from gritd.estimator.visible import visible
-from gritd.tools.cli.terminal import control
+from gritd.tools.cli.terminal import LiveLine
 
 QUIET = 2.0  # [s] nothing is shown before
 EVERY = {True: 0.2, False: 5.0}  # [s] between lines on a terminal, and elsewhere
 
 
 class Progress:
-    """Counts steps towards a total; a total of 0 is unknown."""
+    """Counts steps towards a total, or names the step that is being done."""
 
     def __init__(self, what: str, total: int = 0) -> None:
+        """total: 0 where it is unknown."""
         self._what, self._total, self._done = what, total, 0
-        self._terminal = sys.stderr.isatty()
-        self._shown = False
+        self._line = LiveLine(sys.stderr)
         self._start = self._last = time.monotonic()
 
     def __enter__(self) -> Progress:
@@ -33,25 +33,27 @@ class Progress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._shown and self._terminal:
-            print(file=sys.stderr)
+        self._line.clear()
 
     def advance(self, steps: int = 1) -> None:
+        """So many steps more are done."""
         self._done += steps
-        now = time.monotonic()
-        if now - self._start > QUIET and now - self._last > EVERY[self._terminal]:
-            self._last = now
-            self._show(now - self._start)
+        self._show(self._counted)
 
-    def _show(self, elapsed: float) -> None:
-        text = f"{visible(self._what)}: {self._done}"
-        if self._total:
-            left = elapsed * (self._total - self._done) / max(self._done, 1)
-            text += f" of {self._total} ({self._done / self._total:.0%}), {left:.0f} s left"
-        print(
-            f"\r\033[K{text}" if self._terminal else text,
-            end="" if self._terminal else "\n",
-            file=control(sys.stderr),
-            flush=True,
-        )
-        self._shown = True
+    def at(self, step: str) -> None:
+        """This step begins. A terminal shows it at once: the next one may be long in coming."""
+        self._show(lambda elapsed: f"{step}, {elapsed:.0f} s", at_once=self._line.terminal)
+
+    def _show(self, words: Callable[[float], str], at_once: bool = False) -> None:
+        now = time.monotonic()
+        due = now - self._start > QUIET and now - self._last > EVERY[self._line.terminal]
+
+        if due or at_once:
+            self._last = now
+            self._line.show(f"{self._what}: {words(now - self._start)}")
+
+    def _counted(self, elapsed: float) -> str:
+        if not self._total:
+            return f"{self._done}"
+        left = elapsed * (self._total - self._done) / max(self._done, 1)
+        return f"{self._done} of {self._total} ({self._done / self._total:.0%}), {left:.0f} s left"

@@ -6,14 +6,12 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 import re
 import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import get_args
 
@@ -21,11 +19,10 @@ from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.topics import TOPICS
 from gritd.estimator.threads.stop_request import StopRequest
-from gritd.estimator.visible import visible
 from gritd.tools.cli.child import Child, interruptible
 from gritd.tools.cli.command import DONE, FAILED, Parser, number, whole
 from gritd.tools.cli.optional import missing
-from gritd.tools.cli.terminal import control
+from gritd.tools.cli.terminal import LiveLine
 from gritd.tools.commands import demo_targets as targets
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.testbed import NAME, PLAYED, SHORTEST
@@ -118,12 +115,15 @@ def _wait_for_devices(daemon: Child) -> None:
 def _follow(daemon: Child, testbed: Child, seconds: float) -> None:
     """Show the daemon's status until the time is over."""
     start = time.monotonic()
-    with live_line() as show:
+    status = LiveLine(sys.stdout)
+    try:
         while (elapsed := time.monotonic() - start) < seconds:
             testbed.check()
             line = daemon.line(min(0.2, seconds - elapsed))
             if line and " slip " in line:
-                show(f"{elapsed:4.0f} s {_short(line)}")
+                status.show(f"{elapsed:4.0f} s {_short(line)}")
+    finally:
+        status.keep()
 
 
 def _short(line: str) -> str:
@@ -134,22 +134,6 @@ def _short(line: str) -> str:
     ]
     status, *rest = (part.group() if part else "" for part in parts)
     return " ".join((f"{status:10}", *rest))
-
-
-@contextmanager
-def live_line() -> Iterator[Callable[[str], None]]:
-    """A line that is rewritten on a terminal; plain lines elsewhere."""
-    if not sys.stdout.isatty():
-        yield lambda text: print(text, flush=True)
-        return
-    out = control(sys.stdout)
-    yield lambda text: print(
-        f"\r\033[K{visible(text[: os.get_terminal_size().columns - 1])}",
-        end="",
-        file=out,
-        flush=True,
-    )
-    print()
 
 
 # --- the verdict ---

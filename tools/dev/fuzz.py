@@ -40,6 +40,7 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import DONE, FAILED, Parser
+from gritd.tools.cli.progress import Progress
 
 NS = 1_000_000_000
 START = 1_700_000_000 * NS
@@ -92,12 +93,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def run(target: Target, cases: int, seed: int, folder: Path) -> int:
     """Run the cases of one target; how many failed."""
     case, failed, began = target.make(folder), 0, time.monotonic()
-    for number in range(cases):
-        wrong = answered(case, random.Random(f"{seed}/{target.name}/{number}"))
-        if wrong:
-            failed += 1
-            if failed <= SHOWN:
+
+    with Progress(target.name, cases) as progress:
+        for number in range(cases):
+            wrong = answered(case, random.Random(f"{seed}/{target.name}/{number}"))
+            failed += bool(wrong)
+            if wrong and failed <= SHOWN:
                 print(f"{target.name}, case {number}: {wrong}", file=sys.stderr, flush=True)
+            progress.advance()
 
     print(
         f"{target.name}: {cases} cases, {failed} failed, {time.monotonic() - began:.0f} s",

@@ -36,6 +36,7 @@ from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.child import Child
 from gritd.tools.cli.command import DONE, FAILED, Parser
 from gritd.tools.cli.guard import guarded
+from gritd.tools.cli.progress import Progress
 from gritd.tools.service.client import connected, reports
 from gritd.tools.testbed import plant
 from gritd.tools.testbed.schedule import motion_of
@@ -127,20 +128,14 @@ def simulated(arguments: Namespace) -> list[str]:
     state, began, memory, ticks = pipeline.start(), time.monotonic(), [], 0
     unfit = 0
 
-    for number, batches in enumerate(laps(pool, arguments.hours, round(NS / arguments.tick))):
-        for stamp, batch in batches:
-            state, record = pipeline.step(state, batch, stamp)
-            unfit += not all(math.isfinite(record[place]) for place in READ)
-            ticks += 1
-        memory.append((number * LAP / 3600.0, resident(os.getpid())))
-
-        if (number + 1) % NOISES == 0:
-            print(
-                f"{(number + 1) * LAP / 3600.0:.0f} h of {arguments.hours:g}",
-                end="\r",
-                file=sys.stderr,
-                flush=True,
-            )
+    with Progress("laps", max(1, round(arguments.hours * 3600.0 / LAP))) as progress:
+        for number, batches in enumerate(laps(pool, arguments.hours, round(NS / arguments.tick))):
+            for stamp, batch in batches:
+                state, record = pipeline.step(state, batch, stamp)
+                unfit += not all(math.isfinite(record[place]) for place in READ)
+                ticks += 1
+            memory.append((number * LAP / 3600.0, resident(os.getpid())))
+            progress.advance()
 
     slope = growth(memory)
     found = dict(zip(TICK_NAMES, record, strict=True))
@@ -163,9 +158,10 @@ def driven(settings: Settings, seed: int) -> Iterator[list[Reading]]:
     soil = plant.drawn_soil(settings, np.random.default_rng(seed))
     motion = motion_of(plant.schedule(LAP), settings.wheel.radius, settings.rates.tick)
     response = plant.linear_response(settings, soil, motion)
-    for number in range(NOISES):
-        print(f"noise {number + 1} of {NOISES}", end="\r", file=sys.stderr, flush=True)
-        yield readings(settings, motion, response, np.random.default_rng((seed, number)))
+    with Progress("noises", NOISES) as progress:
+        for number in range(NOISES):
+            yield readings(settings, motion, response, np.random.default_rng((seed, number)))
+            progress.advance()
 
 
 def thinned(readings: Sequence[Reading], by: int) -> list[Reading]:

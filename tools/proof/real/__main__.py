@@ -13,6 +13,7 @@ from pathlib import Path
 
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.guard import guarded
+from gritd.tools.cli.progress import Progress
 from gritd.tools.proof.real import cmu, ding, emps, figure, mgst
 from gritd.tools.proof.real.bench import ROOT, Bench
 from gritd.tools.proof.real.page import page, section
@@ -63,10 +64,8 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
 
     with tempfile.TemporaryDirectory(prefix="gritd-proof-") as work, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        bench = Bench(
-            data.resolve(), Path(work), lambda what: _step(f"{place}, {proof.name}: {what}", began)
-        )
-        finding = proof.run(bench)
+        with Progress(f"{place}, {proof.name}") as progress:
+            finding = proof.run(bench := Bench(data.resolve(), Path(work), progress.at))
 
     seconds = time.monotonic() - began
     _tell(proof, finding, seconds)
@@ -77,10 +76,6 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
     target.write_text(
         page(old, proof.name, section(proof, finding, bench.commands, seconds)), encoding="utf-8"
     )
-
-
-def _step(what: str, began: float) -> None:
-    print(f"[{time.monotonic() - began:4.0f} s] {what}", file=sys.stderr, flush=True)
 
 
 def _tell(proof: Proof, finding: Finding, seconds: float) -> None:

@@ -22,7 +22,7 @@ class Bulldozing(Effect):
     """
 
     share: float = strength(
-        "share of a plane blade's resistance, s", "", typical=0.3, low=0.0, high=1.5
+        "share of a plane blade's resistance, s", "", typical=0.3, low=0.0, high=5.0
     )
     unit_weight: float = shape(
         "weight of the soil, γ", "N/m^3", mean=15e3, sigma=2e3, low=1e3, high=25e3

@@ -45,7 +45,9 @@ class ContactRelaxation(Effect):
         "speed",
     )
     at_start = ()
-    confusable_with = told_apart(sensor_latency="speed_step", load_axis_friction="slip_step")
+    confusable_with = told_apart(
+        sensor_latency="speed_step", load_axis_friction="slip_step", running_in="load_step"
+    )
 
     @classmethod
     def in_steady_states(cls) -> None:

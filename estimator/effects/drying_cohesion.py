@@ -21,7 +21,7 @@ class DryingCohesion(Effect):
     Widger 1978, Canadian Geotechnical J. 15, 313-321), suction relaxing exponentially.
     """
 
-    change: float = strength("final relative change of c, a", "", typical=0.4, low=-0.95, high=5.0)
+    change: float = strength("final relative change of c, a", "", typical=0.4, low=-1.0, high=10.0)
     duration: float = shape(
         "time constant, τ", "s", mean=300.0, sigma=300.0, low=10.0, high=36e3, scan=True
     )

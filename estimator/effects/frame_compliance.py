@@ -18,7 +18,7 @@ class FrameCompliance(Effect):
     mm/N when it presses on a rigid stop.
     """
 
-    compliance: float = strength("yielding per load, C", "m/N", typical=1.5e-5, low=0.0, high=2e-4)
+    compliance: float = strength("yielding per load, C", "m/N", typical=1.5e-5, low=0.0, high=0.001)
 
     stage = "testbed"
     fingerprint = Fingerprint(

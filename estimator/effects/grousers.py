@@ -29,9 +29,9 @@ class Grousers(Effect):
     was not at hand; d = h where all of it is carried.
     """
 
-    height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.04)
+    height: float = strength("height of the lugs, h", "m", typical=5e-3, low=0.0, high=0.06)
     grip: float = strength(
-        "gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=1.0
+        "gain of shear strength over the smooth rim, g", "", typical=0.15, low=0.0, high=2.0
     )
     ripple_cos: float = strength(
         "relative ripple of torque in phase, a", "", typical=0.15, low=-0.5, high=0.5
@@ -40,7 +40,7 @@ class Grousers(Effect):
         "relative ripple of torque in quadrature, b", "", typical=0.15, low=-0.5, high=0.5
     )
     digging: float = strength(
-        "height of the soil that the lugs carry away, d", "m", typical=2e-3, low=0.0, high=0.02
+        "height of the soil that the lugs carry away, d", "m", typical=2e-3, low=0.0, high=0.06
     )
     count: float = shape(
         "lugs on the rim, N", "", mean=16.0, sigma=8.0, low=4.0, high=60.0, scan=True

@@ -29,7 +29,7 @@ class RateDependentShear(Effect):
     """
 
     per_decade: float = strength(
-        "gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.2, high=0.3
+        "gain of strength per tenfold speed, λ", "", typical=0.08, low=-0.3, high=0.6
     )
 
     stage = "contact"

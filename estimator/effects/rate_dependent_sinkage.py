@@ -28,7 +28,7 @@ class RateDependentSinkage(Effect):
     speed.
     """
 
-    power: float = strength("exponent of speed, m", "", typical=0.08, low=-0.3, high=0.5)
+    power: float = strength("exponent of speed, m", "", typical=0.08, low=-0.5, high=1.0)
 
     stage = "soil"
     fingerprint = Fingerprint("sinkage", "speed", "sinkage falls with speed at fixed load and slip")

@@ -18,7 +18,7 @@ class RearContact(Effect):
     Robotics 24, 233-250.
     """
 
-    ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=0.8)
+    ratio: float = strength("exit over entry angle, c₃", "", typical=0.25, low=0.0, high=1.0)
 
     stage = "contact"
     fingerprint = Fingerprint(

@@ -54,7 +54,7 @@ class RunningIn(Effect):
         high=1.0,
     )
     length: float = shape(
-        "travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.005, high=0.12
+        "travel to 63 % of the steady state, λ", "m", mean=0.05, sigma=0.04, low=0.002, high=0.3
     )
 
     stage = "wheel"

@@ -28,10 +28,10 @@ class ShearPeak(Effect):
     """
 
     overshoot: float = strength(
-        "P: 0 is no peak, 1.4 a residual of two thirds", "", typical=0.4, low=0.0, high=3.0
+        "P: 0 is no peak, 1.4 a residual of two thirds", "", typical=0.4, low=0.0, high=5.0
     )
     breadth: float = shape(
-        "K_w/k: the peak stands at j = 0.69 K_w", "", mean=1.0, sigma=0.5, low=0.5, high=3.0
+        "K_w/k: the peak stands at j = 0.69 K_w", "", mean=1.0, sigma=0.5, low=0.2, high=5.0
     )
 
     stage = "contact"

@@ -20,7 +20,7 @@ class SideWallRubbing(Effect):
     sideways force.
     """
 
-    share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=0.5)
+    share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=1.0)
 
     stage = "testbed"
     fingerprint = Fingerprint(

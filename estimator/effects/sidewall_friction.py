@@ -31,7 +31,7 @@ class SidewallFriction(Effect):
     """
 
     share: float = strength(
-        "strength mobilised on the faces, s", "", typical=0.3, low=0.0, high=1.5
+        "strength mobilised on the faces, s", "", typical=0.3, low=0.0, high=3.0
     )
 
     stage = "wheel"

@@ -19,7 +19,7 @@ class SinkageDatum(Effect):
     """
 
     offset: float = strength(
-        "reading on the undisturbed surface, z₀", "m", typical=2e-3, low=-0.03, high=0.03
+        "reading on the undisturbed surface, z₀", "m", typical=2e-3, low=-0.1, high=0.1
     )
 
     stage = "sensor"

@@ -17,7 +17,7 @@ class SinkageGain(Effect):
     Source: calibration model. It acts after the datum, on all that the potentiometer moves.
     """
 
-    gain: float = strength("relative error of the scale, g", "", typical=0.05, low=-0.5, high=1.0)
+    gain: float = strength("relative error of the scale, g", "", typical=0.05, low=-0.8, high=2.0)
 
     stage = "sensor"
     fingerprint = Fingerprint("sinkage", "sinkage", "sinkage off in proportion to itself")

@@ -22,7 +22,7 @@ class SlipSinkage(Effect):
     """
 
     growth: float = strength(
-        "rise of the exponent with slip, n₁", "", typical=0.2, low=-0.2, high=1.2
+        "rise of the exponent with slip, n₁", "", typical=0.2, low=-0.5, high=2.5
     )
 
     stage = "soil"

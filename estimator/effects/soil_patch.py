@@ -24,10 +24,10 @@ class SoilPatch(Effect):
     """
 
     cohesion_change: float = strength(
-        "relative change of c, a", "", typical=0.4, low=-0.9, high=4.0
+        "relative change of c, a", "", typical=0.4, low=-1.0, high=10.0
     )
     friction_change: float = strength(
-        "relative change of tan φ, b", "", typical=0.1, low=-0.5, high=0.5
+        "relative change of tan φ, b", "", typical=0.1, low=-0.8, high=1.5
     )
     centre: float = shape(
         "middle of the patch, x₀", "m", mean=0.5, sigma=0.5, low=-2.0, high=10.0, scan=True

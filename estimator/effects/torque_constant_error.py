@@ -19,7 +19,7 @@ class TorqueConstantError(Effect):
     """
 
     error: float = strength(
-        "relative error of the configured constant, e", "", typical=0.08, low=-0.6, high=1.0
+        "relative error of the configured constant, e", "", typical=0.08, low=-0.8, high=2.0
     )
 
     stage = "sensor"

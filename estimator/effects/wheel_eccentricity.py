@@ -22,10 +22,10 @@ class WheelEccentricity(Effect):
     """
 
     offset_cos: float = strength(
-        "eccentricity in phase, a", "m", typical=1e-3, low=-0.01, high=0.01
+        "eccentricity in phase, a", "m", typical=1e-3, low=-0.02, high=0.02
     )
     offset_sin: float = strength(
-        "eccentricity in quadrature, b", "m", typical=1e-3, low=-0.01, high=0.01
+        "eccentricity in quadrature, b", "m", typical=1e-3, low=-0.02, high=0.02
     )
 
     stage = "wheel"

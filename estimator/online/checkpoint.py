@@ -44,7 +44,10 @@ def decode(text: str, settings: Settings) -> State:
         parts = json.loads(text)
         sync = Sync(settings)
         sync.remember(_object(parts["sync"]))
-        return State(sync, *_object(parts["rest"]))
+        state = State(sync, *_object(parts["rest"]))
+        if not all(isinstance(recall, tuple) for recall in state.track.recall.values()):
+            raise TypeError("what an effect remembers is no list of numbers")
+        return state
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(
             f"not a state of this configuration: {type(error).__name__}: {error!s:.100}"

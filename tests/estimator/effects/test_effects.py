@@ -297,7 +297,7 @@ def test_configuration_errors_are_one_line() -> None:
         ),
         (
             ConfiguredEffect("rear_contact", {"ratio": Uncertain(7.0)}),
-            "effects.rear_contact.ratio: 7 is outside 0 … 0.8",
+            "effects.rear_contact.ratio: 7 is outside 0 … 1",
         ),
     ):
         with pytest.raises(ValueError) as error:

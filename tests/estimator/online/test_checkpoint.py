@@ -100,6 +100,15 @@ def test_a_state_of_other_channels_is_refused(consumed):
         checkpoint.decode(text, SETTINGS)
 
 
+def test_an_effects_memory_of_an_older_version_is_refused(consumed):
+    """It was one number; now it is a list of them."""
+    pipeline = Pipeline(SETTINGS)
+    state, _ = run(pipeline, pipeline.start(), consumed[:9])
+    older = replace(state, track=state.track._replace(recall={"motor_heating": 0.3}))
+    with pytest.raises(ValueError, match="what an effect remembers"):
+        checkpoint.decode(checkpoint.encode(older), SETTINGS)
+
+
 def test_no_class_but_those_of_a_state_can_be_named():
     text = json.dumps({"sync": {"Popen": [["true"]]}, "rest": []})
     with pytest.raises(ValueError, match="KeyError: 'Popen'"):

@@ -18,6 +18,7 @@ from gritd.drivers.framing_cobs import CobsFraming
 from gritd.drivers.link import Clock, Link
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader, Tap
+from gritd.drivers.recorded import Playback
 from gritd.drivers.sensor import Sensor, SensorSettings, SignalShape, sensor_kinds
 from gritd.drivers.serial_link import SerialLink
 from gritd.estimator.config.settings import Device, Settings
@@ -28,17 +29,22 @@ def build_readers(
     clock: Clock,
     queue: ReadingQueue,
     tap: Callable[[str], Tap | None] = lambda device: None,
+    playback: Playback | None = None,
 ) -> list[Reader]:
     """One reader for each device that some channel uses, not yet started.
 
     clock: ns since the epoch, the daemon's own. tap: device name -> where to log its raw chunks, or
-    None. Raises DeviceSettingsError, one line, where channels, devices and signals do not fit
-    together.
+    None. playback: recorded wires in the place of the hardware. Raises DeviceSettingsError, one
+    line, where channels, devices and signals do not fit together.
     """
     readers = []
     for device in used_devices(settings):
         decoder = build_decoder(settings, device)
-        link = build_link(device, decoder.framing, clock)
+        link: Link
+        if playback is not None:
+            link = playback.link(device.name)
+        else:
+            link = build_link(device, decoder.framing, clock)
         readers.append(Reader(device.name, link, decoder, queue, tap(device.name)))
     return readers
 

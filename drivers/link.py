@@ -11,7 +11,7 @@ POLL = 0.05  # [s] the longest a read waits: a reader is stopped within this
 
 
 class Chunk(NamedTuple):
-    """Bytes as they came in one piece."""
+    """Bytes as they came in one piece; of a recorded wire none where the device was opened."""
 
     received: int  # [ns]
     data: bytes
@@ -27,9 +27,7 @@ class Link(Protocol):
         ...
 
     def read(self) -> Chunk | None:
-        """What came, or None after POLL of silence. Raises DeviceError, or EOFError where a
-        recording ends.
-        """
+        """What came, or None after POLL of silence. Raises DeviceError."""
         ...
 
     def close(self) -> None:

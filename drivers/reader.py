@@ -23,7 +23,7 @@ class ReaderStats:
     """What a reader has seen since its start."""
 
     device: str
-    state: str  # OPEN, WAITING to reopen, ENDED (stopped, or a recording played out), DEAD
+    state: str  # OPEN, WAITING to reopen, ENDED when stopped, DEAD
     last_error: str  # one line; empty if there was none
     last_received: int  # [ns] when the last chunk came; 0 before the first
     bytes: int
@@ -44,7 +44,7 @@ class Reader:
     """Reads one device into the queue until it is stopped.
 
     tap, if given, is called with (received [ns], bytes) of every chunk before it is decoded: a wire
-    log.
+    log. Before the first chunk of each opening it is called without bytes.
     """
 
     def __init__(
@@ -61,6 +61,7 @@ class Reader:
         self._last_error = ""
         self._last_received = 0
         self._bytes = self._readings = self._opened = 0
+        self._new_session = False
         self.beats = (
             0  # moves while the thread is not held up in the hardware: the watchdog's pulse
         )
@@ -125,8 +126,6 @@ class Reader:
             before = self._bytes
             try:
                 self._session()
-            except EOFError:
-                return
             except DeviceError as error:
                 self._last_error = str(error)
             self._link.close()
@@ -141,6 +140,7 @@ class Reader:
         """From one opening to the stop, or to the failure that raises DeviceError."""
         self._link.open()
         self._opened += 1
+        self._new_session = True
         self.decoder.restart()
         self._state = "OPEN"
         while not self._stop.is_set():
@@ -150,10 +150,18 @@ class Reader:
                 self._take(chunk)
 
     def _take(self, chunk: Chunk) -> None:
+        if not chunk.data:  # of a recorded wire: the device was opened here
+            self.decoder.restart()
+            return
+
         self._bytes += len(chunk.data)
         self._last_received = chunk.received
         if self._tap is not None:
+            if self._new_session:
+                self._tap(chunk.received, b"")
             self._tap(chunk.received, chunk.data)
+        self._new_session = False
+
         readings = self.decoder.decode(chunk.received, chunk.data)
         self._readings += len(readings)
         if readings:

@@ -40,7 +40,11 @@ class RecordedTick(NamedTuple):
 
 def played(recording: Recording, rate: float) -> Iterator[RecordedTick]:
     """The ticks of a recording; `rate` [Hz] is used where it has none of its own."""
-    return _logged(recording) if recording.counts[TICK] else _built(recording, rate)
+    return (
+        _logged(recording)
+        if recording.counts[TICK]
+        else ticks_at(_in_order(recording.messages()), rate)
+    )
 
 
 def reading_of(message: Message) -> Reading | None:
@@ -67,17 +71,21 @@ def _logged(recording: Recording) -> Iterator[RecordedTick]:
             waiting.append(reading)
 
 
-def _built(recording: Recording, rate: float) -> Iterator[RecordedTick]:
-    readings = _in_order(recording.messages())
-    if not readings:
-        return
-    period, taken = round(NS / rate), 0
-    start, end = readings[0].received, readings[-1].received
-    for stamp in range(start, end + period, period):
-        first = taken
-        while taken < len(readings) and readings[taken].received <= stamp:
-            taken += 1
-        yield RecordedTick(stamp, readings[first:taken], None)
+def ticks_at(readings: Iterable[Reading], rate: float) -> Iterator[RecordedTick]:
+    """Ticks at `rate` [Hz] over readings in the order they were received, from the first to the
+    last.
+    """
+    period, waiting = round(NS / rate), list[Reading]()
+    stamp: int | None = None
+    for reading in readings:
+        stamp = reading.received if stamp is None else stamp
+        while reading.received > stamp:
+            yield RecordedTick(stamp, waiting, None)
+            waiting, stamp = [], stamp + period
+        waiting.append(reading)
+
+    if stamp is not None:
+        yield RecordedTick(stamp, waiting, None)
 
 
 def _in_order(messages: Iterable[Message]) -> list[Reading]:

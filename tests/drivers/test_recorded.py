@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import time
 
@@ -12,10 +13,9 @@ from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.link import Chunk
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader
-from gritd.drivers.recorded import RecordedLink, decoded, paced, play
+from gritd.drivers.recorded import Playback, decoded
 from gritd.drivers.wire import CanWire, SerialWire
-from gritd.drivers.wire_log import MAGIC, WireWriter, read_wire
-from gritd.estimator.messages.readings import Reading
+from gritd.drivers.wire_log import MAGIC, WireWriter, read_wire, wire_path
 from tests.drivers.rig import Plug, Ticking, can_device, channel, serial_device, wait_until, wiring
 from tests.drivers.test_framing_can import chunk as can_chunk
 
@@ -43,7 +43,7 @@ def drive(framing, seconds=3.0, seed=7):
         waiting += wire.encode("wheel_encoder", [count % 65536], 4000 * n)
         waiting += wire.encode("sinkage_pot", [1.0 + 0.001 * n], 4000 * n)
         if rng.random() < 0.4:
-            cut = rng.randrange(len(waiting) + 1)
+            cut = rng.randrange(1, len(waiting) + 1)
             chunks.append(Chunk(10**18 + n * 4_000_000 + rng.randrange(3_000_000), waiting[:cut]))
             waiting = waiting[cut:]
     chunks.append(Chunk(10**18 + n * 4_000_000 + 3_000_000, waiting))
@@ -75,14 +75,55 @@ def test_a_recorded_drive_through_the_real_framing(log):
     assert [r.stamp for r in wheel] == sorted({r.stamp for r in wheel})
 
 
-def test_a_recorded_drive_through_a_real_reader_is_the_same(log):
+def test_a_recorded_drive_through_a_real_reader_is_the_same_but_for_the_time(log):
+    """On the present clock every reading comes as long after the first chunk as it was recorded."""
     framing, path, chunks, _ = log
-    queue = ReadingQueue(1 << 20)
-    reader = Reader("encoders", RecordedLink(read_wire(path)), decoder(framing), queue)
+    queue, began = ReadingQueue(1 << 20), time.monotonic_ns()
+    playback = Playback({"encoders": path}, lambda: time.monotonic_ns() + 5 * began)
+    reader = Reader("encoders", playback.link("encoders"), decoder(framing), queue)
     reader.start()
-    assert wait_until(lambda: not reader.alive)
-    assert queue.drain() == list(decoded(chunks, decoder(framing)))
-    assert reader.stats().state == "ENDED" and reader.stats().last_error == ""
+    assert wait_until(lambda: playback.over)
+    assert time.monotonic_ns() - began >= chunks[-1].received - chunks[0].received
+    assert reader.stop(2.0)
+
+    live, recorded = queue.drain(), list(decoded(chunks, decoder(framing)))
+    shift = live[0].received - recorded[0].received
+    assert shift >= 6 * began - chunks[0].received
+    assert live == [
+        r._replace(stamp=r.stamp + shift, received=r.received + shift) for r in recorded
+    ]
+    stats = reader.stats()
+    assert stats.state == "ENDED" and stats.last_error == "" and stats.bad == 0
+
+
+def test_devices_keep_their_distances(tmp_path):
+    """The first chunk of all is due at once; that of the other device, later by what it was."""
+    for name, received in (("a", 10**18 + 500), ("b", 10**18)):
+        writer = WireWriter(wire_path(tmp_path, name))
+        writer(received, b"x")
+        writer.close()
+    wires = {name: wire_path(tmp_path, name) for name in ("a", "b")}
+    playback = Playback(wires, lambda: 7_000_000)
+    links = {name: playback.link(name) for name in wires}
+    for link in links.values():
+        link.open()
+    assert links["b"].read() == Chunk(7_000_000, b"x")
+    assert links["a"].read() == Chunk(7_000_500, b"x")
+    assert not playback.over
+    assert links["a"].read() is links["b"].read() is None and playback.over
+
+
+def test_a_reader_of_a_recorded_wire_can_be_stopped_while_it_waits(tmp_path):
+    path = tmp_path / "encoders.wire"
+    writer = WireWriter(path)
+    for received in (0, 1 << 62):
+        writer(received, b"k1,2\n")
+    writer.close()
+    playback = Playback({"encoders": path}, time.monotonic_ns)
+    reader = Reader("encoders", playback.link("encoders"), decoder(), ReadingQueue())
+    reader.start()
+    assert wait_until(lambda: reader.stats().bytes > 0)
+    assert reader.stop(2.0) and not playback.over
 
 
 def test_a_live_run_and_its_wire_log_give_the_same_readings(tmp_path):
@@ -153,36 +194,53 @@ def test_a_length_that_cannot_be_ends_the_log(tmp_path):
     assert list(read_wire(path)) == []
 
 
-def test_readings_are_played_into_the_queue_in_order():
-    readings = [Reading(n, "sinkage_pot", 1.0, n) for n in range(50)]
-    queue = ReadingQueue()
-    play(readings, queue)
-    assert queue.drain() == readings
+def test_a_device_that_was_opened_again_is_decoded_anew(tmp_path):
+    """What stood unfinished when it was unplugged is no part of what came after."""
+    wire = SerialWire(serial_device())
+    whole = wire.encode("sinkage_pot", [2.0], 8000)
+    chunks = [Chunk(0, b""), Chunk(1, whole[:5]), Chunk(2, b""), Chunk(3, whole)]
+    log = WireWriter(tmp_path / "run.wire")
+    for chunk in chunks:
+        log(*chunk)
+    log.close()
+    assert list(read_wire(tmp_path / "run.wire")) == chunks
+
+    again = decoder()
+    assert [r.value for r in decoded(chunks, again)] == [2.0]
+    assert again.framing.counts.bad == 0 and again.framing.counts.good == 1
 
 
-def test_paced_playing_waits_for_what_is_not_due():
-    waits = []
-    items = [
-        Reading(0, "sinkage_pot", 1.0, received) for received in (10**18, 10**18, 10**18 + 10**12)
-    ]
-    assert list(paced(items, waits.append)) == items
-    assert len(waits) == 1 and 900.0 < waits[0] <= 1000.0
+def test_a_log_that_cannot_be_written_on_is_given_up_and_said(tmp_path, monkeypatch):
+    """A full disk must not end a reader."""
+    path = tmp_path / "run.wire"
+    writer = WireWriter(path)
+    writer(1, b"kept")
+    honest = writer._file
+    writer._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115 - closed by the writer
+    for received in (2, 3):
+        writer(received, b"lost")
+    writer.close()
+    honest.close()
+    assert "space" in writer.error and writer.bytes == 4
+    assert list(read_wire(path)) == [Chunk(1, b"kept")]
 
 
-def test_a_reader_in_real_time_takes_the_recorded_time_and_can_be_stopped():
-    chunks, _ = drive("cobs", seconds=0.4)
-    queue = ReadingQueue()
-    start = time.monotonic()
-    reader = Reader("encoders", RecordedLink(chunks, real_time=True), decoder(), queue)
-    reader.start()
-    assert wait_until(lambda: not reader.alive)
-    assert time.monotonic() - start >= (chunks[-1].received - chunks[0].received) * 1e-9
-    assert queue.counts().received == 200
-    endless = Reader(
-        "encoders",
-        RecordedLink([chunks[0], chunks[0]._replace(received=1 << 62)], True),
-        decoder(),
-        queue,
-    )
-    endless.start()
-    assert wait_until(lambda: endless.stats().bytes > 0) and endless.stop(2.0)
+def test_a_log_that_is_there_is_not_overwritten(tmp_path):
+    path = tmp_path / "run.wire"
+    WireWriter(path).close()
+    with pytest.raises(DeviceSettingsError, match=r"run\.wire: File exists"):
+        WireWriter(path)
+
+
+def test_a_device_of_any_name_has_its_log_in_the_folder(tmp_path):
+    for name in ("encoders", "a b", "../../up", ".", "Brücke/1"):
+        path = wire_path(tmp_path, name)
+        assert path.parent == tmp_path and path.name.endswith(".wire")
+        WireWriter(path).close()
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_a_pipe_is_no_log(tmp_path):
+    os.mkfifo(tmp_path / "x.wire")
+    with pytest.raises(DeviceSettingsError, match="not a file, expected a wire log"):
+        list(read_wire(tmp_path / "x.wire"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -12,10 +13,11 @@ from typing import TYPE_CHECKING
 
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
 from gritd.estimator.daemon.lock import LockError, locked
-from gritd.tools.cli.command import FAILED, CommandError, Parser, file_name, number, whole
+from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name, number, whole
 from gritd.tools.service.client import SOCKET
 
 if TYPE_CHECKING:
+    from gritd.estimator.config.configuration import Configuration
     from gritd.estimator.messages.run_info import RunInfo
 
 
@@ -23,7 +25,10 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0 after SIGTERM or SIGINT with everything written; 1 if a thread died; 2 for the
     configuration.
     """
-    arguments = _parser().parse_args(argv)
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    if arguments.fast and not arguments.from_tap:
+        parser.error("argument --fast: only with --from-tap")
     try:
         with ExitStack() as held:
             return _run(arguments, held)
@@ -41,16 +46,41 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
     if early:
         held.enter_context(locked(early))
     from gritd.estimator.config.configuration import load
-    from gritd.tools.service.serve import serve
+    from gritd.tools.service.serve import Service, serve
 
     configuration = load(arguments.config)
     folder = Path(arguments.directory or configuration.settings.logging.directory)
     if folder != early:
         held.enter_context(locked(folder))
+
     run = _run_info(configuration.run, arguments)
-    return serve(
-        configuration, folder, run, _socket_path(folder, arguments.socket), arguments.status
+    if arguments.fast:
+        return _played(configuration, folder, run, arguments.from_tap)
+    service = Service(
+        folder,
+        run,
+        _socket_path(folder, arguments.socket),
+        arguments.status,
+        arguments.tap,
+        arguments.from_tap,
     )
+    return serve(configuration, service)
+
+
+def _played(configuration: Configuration, folder: Path, run: RunInfo, wires: Path) -> int:
+    """A recording of wire logs that are played at once, and where it lies."""
+    from gritd.estimator.recording.mcapfile import RecordingError
+    from gritd.estimator.recording.parts import run_path
+    from gritd.tools.cli.files import unwritten
+    from gritd.tools.service.tap import play_at_once
+
+    path = run_path(folder, run.name, time.time_ns())
+    try:
+        print(play_at_once(configuration, wires, run, path))
+    except RecordingError as error:
+        raise unwritten(error) from None
+    print(f"log {path}")
+    return DONE
 
 
 def _folder_named(arguments: Namespace) -> Path | None:
@@ -118,6 +148,22 @@ def _parser() -> Parser:
         default=1.0,
         metavar="S",
         help="seconds between status lines, 0 for none",
+    )
+
+    wires = parser.add_mutually_exclusive_group()
+    wires.add_argument(
+        "--tap", type=Path, metavar="DIR", help="keep the raw bytes of every device in this folder"
+    )
+    wires.add_argument(
+        "--from-tap",
+        type=Path,
+        metavar="DIR",
+        help="play such a folder through the drivers in place of the devices, then end",
+    )
+    parser.add_argument(
+        "--fast",
+        action="store_true",
+        help="with --from-tap: at once, not in real time, with the recorded times",
     )
 
     return parser

@@ -7,10 +7,12 @@ import signal
 import sys
 import threading
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
 from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
+from gritd.drivers.recorded import Playback
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.daemon.daemon import WARNING, Daemon, DaemonError
@@ -23,6 +25,7 @@ from gritd.estimator.recording.retention import sweep
 from gritd.estimator.recording.writer import WriterStatus
 from gritd.tools.cli.command import DONE, FAILED, CommandError
 from gritd.tools.cli.files import open_to_all
+from gritd.tools.service.tap import Taps, playback_of
 from gritd.tools.service.telemetry import Reporter
 from gritd.tools.service.watcher import Watcher, say
 
@@ -38,52 +41,87 @@ class QueueSource:
         return self._queue.counts().dropped
 
 
-def serve(
-    configuration: Configuration, folder: Path, run: RunInfo, socket: Path, status_every: float
-) -> int:
-    """Run until told to stop; the exit code. Raises CommandError if it cannot start or a thread
-    dies.
+@dataclass(frozen=True)
+class Service:
+    """What `gritd run` is told beside the configuration."""
+
+    folder: Path  # of the logs
+    run: RunInfo
+    socket: Path
+    status_every: float  # [s], 0 for never
+    tap: Path | None = None  # folder to keep the raw bytes of every device in
+    from_tap: Path | None = None  # folder of such bytes, in the place of the devices
+
+
+def serve(configuration: Configuration, service: Service) -> int:
+    """Run until told to stop, or until what is played is over; the exit code. Raises CommandError
+    if it cannot start or a thread dies.
     """
     try:
-        return _serve(configuration, folder, run, socket, status_every)
+        return _serve(configuration, service)
     except (DaemonError, RecordingError, PublishError) as error:
         raise CommandError(error, FAILED) from None
 
 
-def _serve(
-    configuration: Configuration, folder: Path, run: RunInfo, socket: Path, status_every: float
-) -> int:
-    clock, queue = Clock(), ReadingQueue()
-    notice = real_time()
-    readers = build_readers(configuration.settings, clock.now, queue)
+def _serve(configuration: Configuration, service: Service) -> int:
+    settings = configuration.settings
+    clock, queue, notice = Clock(), ReadingQueue(), real_time()
+    taps = Taps(service.tap, settings) if service.tap else None
+    playback = playback_of(service.from_tap, settings, clock.now) if service.from_tap else None
+    tap_of = taps.writers.__getitem__ if taps else _no_tap
+    readers = build_readers(settings, clock.now, queue, tap_of, playback)
 
-    for found in sweep(folder):
+    for found in sweep(service.folder):
         say(f"{found}: a power cut had taken its name; it has it again")
 
-    path = run_path(folder, run.name, clock.now())
-    daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock)
-    publisher = Publisher(socket, Reporter(daemon, readers, queue, notice))
-    watcher = Watcher(configuration.source, readers, queue, publisher, status_every)
+    path = run_path(service.folder, service.run.name, clock.now())
+    daemon = Daemon(configuration, path, service.run, readers, QueueSource(queue), clock)
+    publisher = Publisher(service.socket, Reporter(daemon, readers, queue, notice))
+    watcher = Watcher(configuration.source, readers, queue, publisher, service.status_every)
 
-    for ending in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(ending, lambda *_: daemon.stop())
+    _listen_to_signals(daemon, watcher)
+    _announce(daemon, path, notice)
+    with closing(publisher):
+        publisher.start()
+        last = daemon.serve(lambda daemon: _watch(daemon, watcher, taps, playback))
+
+    watcher.report(daemon)
+    if taps:
+        say(taps.close())
+    say(closing_line(last))
+    return DONE if last.state == "closed" else FAILED
+
+
+def _no_tap(device: str) -> None:
+    """Nothing is kept of a device."""
+
+
+def _listen_to_signals(daemon: Daemon, watcher: Watcher) -> None:
+    for stop in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(stop, lambda *_: daemon.stop())
     signal.signal(signal.SIGHUP, lambda *_: watcher.ask_reload())
-
-    say(f"logging to {path}")
-    for warning in filter(None, (notice, open_to_all(Path(configuration.source)))):
-        say(warning, sys.stderr)
-        daemon.say(WARNING, warning)
 
     threading.excepthook = _say_in_a_line
     logging.getLogger("can").setLevel(logging.CRITICAL)  # a reader says the same, once
 
-    with closing(publisher):
-        publisher.start()
-        last = daemon.serve(watcher)
 
-    watcher.report(daemon)
-    say(closing_line(last))
-    return DONE if last.state == "closed" else FAILED
+def _announce(daemon: Daemon, path: Path, notice: str) -> None:
+    """Where the log is, and what may be amiss from the start."""
+    say(f"logging to {path}")
+    for warning in filter(None, (notice, open_to_all(Path(daemon.configuration.source)))):
+        say(warning, sys.stderr)
+        daemon.say(WARNING, warning)
+
+
+def _watch(daemon: Daemon, watcher: Watcher, taps: Taps | None, playback: Playback | None) -> None:
+    """Ten times a second: what the watcher does, wire logs that were given up, the end of what is
+    played.
+    """
+    watcher(daemon)
+    for line in taps.trouble() if taps else ():
+        watcher.tell(daemon, WARNING, line)
+    if playback and playback.over:
+        daemon.stop()
 
 
 def _say_in_a_line(died: threading.ExceptHookArgs) -> None:

@@ -103,7 +103,7 @@ class Watcher:
             return
         self._states[stats.device] = stats.state
         trouble = stats.state not in ("OPEN", "ENDED")
-        self._tell(
+        self.tell(
             daemon,
             WARNING if trouble else INFO,
             f"device {stats.device} {stats.state} {stats.last_error}",
@@ -121,7 +121,7 @@ class Watcher:
             new, self._dropped = dropped - self._dropped, dropped
             self._overflowing = new > 0
             if new:
-                self._tell(
+                self.tell(
                     daemon,
                     WARNING,
                     f"queue: the loop fell behind, {new} readings dropped, {dropped} in all",
@@ -136,12 +136,12 @@ class Watcher:
                 if self._unconfirmed
                 else "confirms again"
             )
-            self._tell(daemon, WARNING if self._unconfirmed else INFO, f"log: the medium {text}")
+            self.tell(daemon, WARNING if self._unconfirmed else INFO, f"log: the medium {text}")
 
         status = daemon.writer.status()
         if status.state != self._writing:
             self._writing = status.state
-            self._tell(
+            self.tell(
                 daemon,
                 WARNING if status.state == "degraded" else INFO,
                 f"log {status.state} {status.error}",
@@ -149,9 +149,9 @@ class Watcher:
 
         if len(status.files) > self._files:
             self._files = len(status.files)
-            self._tell(daemon, INFO, f"logging to {status.files[-1]}")
+            self.tell(daemon, INFO, f"logging to {status.files[-1]}")
             while daemon.rotation.deleted:
-                self._tell(
+                self.tell(
                     daemon,
                     WARNING,
                     f"{daemon.rotation.deleted.pop()}: was deleted while it was written",
@@ -167,9 +167,10 @@ class Watcher:
                 if daemon.health
                 else "nothing hangs any more"
             )
-            self._tell(daemon, WARNING if daemon.health else INFO, text)
+            self.tell(daemon, WARNING if daemon.health else INFO, text)
 
-    def _tell(self, daemon: Daemon, level: int, text: str) -> None:
+    def tell(self, daemon: Daemon, level: int, text: str) -> None:
+        """A line for people, and the same in /log."""
         say(text.strip(), sys.stderr if level > INFO else sys.stdout)
         daemon.say(level, text.strip())
 
@@ -206,12 +207,12 @@ class Watcher:
     def _end_reload(self, daemon: Daemon) -> None:
         """Take over what was read; a bad one changes nothing."""
         if isinstance(self._loaded, str):
-            self._tell(daemon, WARNING, f"{self._loaded}; the old configuration is kept")
+            self.tell(daemon, WARNING, f"{self._loaded}; the old configuration is kept")
         else:
             configuration, change = self._loaded
             if change is not None:
                 daemon.reload(configuration, change)
-            self._tell(daemon, INFO, f"{self._config}: {'reloaded' if change else 'unchanged'}")
+            self.tell(daemon, INFO, f"{self._config}: {'reloaded' if change else 'unchanged'}")
         self._notifier.tell(notify.READY)
 
     def _tidy(self, daemon: Daemon) -> None:
@@ -223,7 +224,7 @@ class Watcher:
             for path in trim(
                 open_file.parent, daemon.configuration.settings.logging.disk_cap, [open_file]
             ):
-                self._tell(daemon, INFO, f"{path}: deleted, over logging.disk_cap")
+                self.tell(daemon, INFO, f"{path}: deleted, over logging.disk_cap")
         except OSError as error:
             trouble = (
                 f"{error.filename or open_file.parent}: logging.disk_cap cannot be kept: "
@@ -231,7 +232,7 @@ class Watcher:
             )
 
         if trouble and trouble != self._untidy:
-            self._tell(daemon, WARNING, trouble)
+            self.tell(daemon, WARNING, trouble)
         self._untidy = trouble
 
     def report(self, daemon: Daemon) -> None:

@@ -183,7 +183,15 @@ def test_mistakes_are_one_line(finished: Path, tmp_path: Path) -> None:
         prove.main(["--resume", "--output", str(tmp_path / "new")], STUB)
     with pytest.raises(CommandError, match="found 'nnoe'; expected some of none,"):
         prove.main(["--strata", "nnoe", "--output", str(tmp_path / "new")], STUB)
+    with pytest.raises(CommandError, match="found 'moon'; expected some of paper,"):
+        prove.main(["--worlds", "paper,moon", "--output", str(tmp_path / "new")], STUB)
+    with pytest.raises(CommandError, match="found no foreign world for the stratum foreign"):
+        prove.main(["--worlds", "paper", "--output", str(tmp_path / "new")], STUB)
     assert not (tmp_path / "new").exists()
+
+    (tmp_path / "batch.json").write_text('{"cases": 2, "strata": ["none"], "seal": ""}')
+    with pytest.raises(CommandError, match="found a batch of an earlier version"):
+        prove.main(["--resume", "--output", str(tmp_path)], STUB)
 
 
 def test_secrets_differ_unless_seeded(tmp_path: Path) -> None:

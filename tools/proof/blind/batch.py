@@ -85,6 +85,9 @@ def resumed(output: Path) -> Batch:
         raise CommandError(
             f"{output}: found no batch; expected one that was begun without --resume", USAGE
         ) from None
+    if "worlds" not in public:
+        reason = "found a batch of an earlier version, whose cases this one cannot draw"
+        raise CommandError(f"{output}: {reason}; expected one of this version", USAGE)
     answers = seal.opened(output / SECRET, public["seal"])
     return Batch(
         output,

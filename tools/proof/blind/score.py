@@ -7,18 +7,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
 from gritd.tools.proof.blind import score_worlds
+from gritd.tools.proof.blind.calibration import accepted, calibration
 from gritd.tools.proof.blind.shares import counted, quantiles
 from gritd.tools.proof.blind.strata import AWKWARD, LEVELS, STRATA
-from gritd.tools.proof.blind.verdicts import Row, Said
+from gritd.tools.proof.blind.verdicts import Row
 
-BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
-SURE = 0.9  # stated probability from which a name is meant to be relied on
 BY = ("name", "table", "engine", "plant")  # how a name counts as right
 AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair"))
 ONE = ("single", "absorbed", "confounded")  # strata with one listed effect
@@ -131,39 +127,6 @@ def unlisted(rows: Sequence[Row]) -> dict[str, Any]:
             row.first is not None and row.first.probability > 0.5 for row in seen
         ),
     }
-
-
-def calibration(rows: Sequence[Row]) -> dict[str, Any]:
-    """Stated probability of the first name against how often it, or the group it was stated with,
-    was right.
-    """
-    spoken = [(row, row.first) for row in rows if row.first is not None]
-    return {by: _reliable(spoken, by) for by in ("name", "engine")}
-
-
-def accepted(rows: Sequence[Row]) -> dict[str, Any]:
-    """The same of all names that are accepted, and of those that are stated as sure."""
-    spoken = [(row, said) for row in rows for said in row.accepted]
-    sure = [(row, said) for row, said in spoken if said.probability >= SURE]
-    return {
-        by: _reliable(spoken, by)
-        | {"sure": counted(row.said_right(said, by) for row, said in sure)}
-        for by in ("name", "table", "engine")
-    }
-
-
-def _reliable(spoken: Sequence[tuple[Row, Said]], by: str) -> dict[str, Any]:
-    stated = np.array([said.probability for _, said in spoken])
-    right = np.array([row.said_right(said, by) for row, said in spoken], dtype=float)
-    table = [_bin(stated, right, low, high) for low, high in pairwise(BINS)]
-    return {"table": table, "brier": float(np.mean((stated - right) ** 2)) if spoken else None}
-
-
-def _bin(stated: Any, right: Any, low: float, high: float) -> dict[str, Any]:
-    inside = (stated >= low) & ((stated < high) | ((high == 1.0) & (stated <= 1.0)))
-    mean = float(stated[inside].mean()) if inside.any() else None
-    share = counted(bool(value) for value in right[inside])
-    return {"from": low, "to": high, "stated": mean, "right": share}
 
 
 def _soil_groups(rows: Sequence[Row]) -> dict[str, list[Row]]:

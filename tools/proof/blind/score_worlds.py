@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from gritd.tools.proof.blind.calibration import accepted
 from gritd.tools.proof.blind.plant.concealed import LISTED
 from gritd.tools.proof.blind.plant.worlds import WORLDS
 from gritd.tools.proof.blind.shares import counted, quantiles
@@ -78,6 +79,7 @@ def _pairs(rows: Sequence[Row]) -> dict[str, Any]:
             by: counted(row.first_right(by) for row in listed) for by in ("name", "table", "engine")
         },
         "false companion": counted(row.false_companion() for row in listed),
+        "accepted": accepted(rows),
         "unlisted": counted(row.verdict == "unlisted" for row in strange),
         "over truth": quantiles([row.excess("truth") for row in rows]),
         "over fitted": quantiles([row.excess("fitted") for row in rows]),

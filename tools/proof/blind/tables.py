@@ -14,9 +14,9 @@ GAP = "  "
 
 def text(score: Mapping[str, Any], rows: Sequence[Row]) -> str:
     """All tables, then what went wrong, case by case."""
-    parts = [aligned(table) for table in all_tables(score).values()]
+    parts = [f"{heading}\n\n{aligned(table)}" for heading, table in all_tables(score).items()]
     wrong = [f"  {row.number:4}  {explained(row)}" for row in rows if missed(row)]
-    return "\n\n".join([*parts, "\n".join(["what went wrong", *wrong])] if wrong else parts)
+    return "\n\n".join([*parts, "\n".join(["What went wrong", "", *wrong])] if wrong else parts)
 
 
 def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
@@ -25,10 +25,11 @@ def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
         "Figures": headline(score),
         "By stratum and strength": strata(score),
         "Stated probability, and how often it was right": reliability(score),
-        "All accepted names": accepted(score),
+        "All accepted names": accepted(score["accepted"]),
         "Soil: median error": soil(score),
         "Soil: how often sigma covers the truth": coverage(score["soil"]),
         "A reference campaign, then a new one": pairs(score["pairs"]),
+        "All names accepted as new": accepted(score["pairs"].get("all", {}).get("accepted", {})),
         "Soil of the new campaign": coverage({n: of["soil"] for n, of in score["pairs"].items()}),
         "Campaigns alone in foreign worlds": foreign(score["foreign"]),
         "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
@@ -156,9 +157,9 @@ def reliability(score: Mapping[str, Any]) -> Table:
     return [("stated probability", "mean", "name right", "stated group right"), *rows]
 
 
-def accepted(score: Mapping[str, Any]) -> Table:
+def accepted(of: Mapping[str, Any]) -> Table:
     """The same of every name that is accepted, first or not."""
-    kinds = [score["accepted"][by]["table"] for by in ("name", "table", "engine")]
+    kinds = [of[by]["table"] for by in ("name", "table", "engine") if by in of]
     rows = [
         (
             f"{bins[0]['from']:.1f}-{bins[0]['to']:.1f}",
@@ -167,7 +168,8 @@ def accepted(score: Mapping[str, Any]) -> Table:
         )
         for bins in zip(*kinds, strict=True)
     ]
-    return [("stated probability", "mean", "name right", "fixed groups", "stated group"), *rows]
+    head = ("stated probability", "mean", "name right", "fixed groups", "stated group")
+    return [head, *rows]
 
 
 def soil(score: Mapping[str, Any]) -> Table:
@@ -217,6 +219,7 @@ def pairs(groups: Mapping[str, Any]) -> Table:
         "first, fixed groups",
         "first, stated group",
         "further name not there",
+        "0.9 or more, stated group",
         "strangers unlisted",
         "over truth",
     )
@@ -230,6 +233,7 @@ def _new(of: Mapping[str, Any]) -> tuple[str, ...]:
         of["first"]["table"],
         of["first"]["engine"],
         of["false companion"],
+        of["accepted"]["engine"]["sure"],
         of["unlisted"],
     )
     return (*map(said, shares), _median(of["over truth"]))

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gritd.tools.cli.command import CommandError
-from gritd.tools.proof.blind import page, score, score_worlds, seal, shares, tables
+from gritd.tools.proof.blind import calibration, page, score, score_worlds, seal, shares, tables
 from gritd.tools.proof.blind.plant.worlds import HELD
 from gritd.tools.proof.blind.verdicts import Row, Said
 
@@ -136,7 +136,7 @@ def test_calibration_compares_what_was_stated_with_what_was_right() -> None:
     rows = [single("bed_slope", said("bed_slope", 0.95))] * 3 + [
         single("bed_slope", said("grousers", 0.95))
     ]
-    found = score.calibration(rows)["name"]
+    found = calibration.calibration(rows)["name"]
     top = found["table"][-1]
     assert (top["stated"], top["right"]["k"], top["right"]["n"]) == (pytest.approx(0.95), 3, 4)
     assert found["brier"] == pytest.approx((3 * 0.05**2 + 0.95**2) / 4)

@@ -210,7 +210,7 @@ def test_what_is_no_schedule_file_is_said_in_words(tmp_path: Path) -> None:
             "--effect gremlins.size=3: found 'gremlins'; expected one of",
         ),
         (["--effect", "rear_contact.c3=0.2"], "found 'c3'; expected one of ratio"),
-        (["--effect", "rear_contact.ratio=9"], "9 is outside 0 … 0.8"),
+        (["--effect", "rear_contact.ratio=9"], "9 is outside 0 … 1"),
         (["--effect", "coulomb_friction.loss=2 mm"], "found '2 mm'"),
         (["--effect", "coulomb_friction.loss=much"], "found 'much'"),
         (["--soil", "moisture=3"], "found 'moisture'; expected one of cohesion"),

@@ -79,8 +79,8 @@ def percent(share: float | None) -> str:
 
 def spaced(value: float | None, unit: str, digits: int = 3) -> str:
     """A number and its unit, both as shown."""
-    said = number(value, digits)
-    return said if said == NOTHING else f"{said} {unit}".rstrip()
+    text = number(value, digits)
+    return text if text == NOTHING else f"{text} {unit}".rstrip()
 
 
 def listed(names: list[str]) -> str:

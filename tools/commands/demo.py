@@ -145,21 +145,22 @@ def conclude(folder: Path, plant: PlantKind, last_words: Sequence[str]) -> int:
     ticks, loop = recording.arrays("/tick"), recording.arrays("/loop")
     soil = json.loads((folder / f"{NAME}.truth.json").read_text(encoding="utf-8"))["soil"]
 
-    found = targets.judge(ticks, soil, plant)
-    table = [*targets.table(found), *targets.without_correction(recording, soil)]
+    estimates = targets.judge(ticks, soil, plant)
+    table = [*targets.table(estimates), *targets.without_correction(recording, soil)]
     print("\n".join([*table, "", *targets.punctuality(loop), *_counters(folder, last_words)]))
 
     print(f"log {recording.path}")
     print(
-        f"figure {_drawn(folder, ticks, targets.headline(found, plant, ticks), soil)}", flush=True
+        f"figure {_drawn(folder, ticks, targets.headline(estimates, plant, ticks), soil)}",
+        flush=True,
     )
 
-    missed = [*targets.reasons(found), *_replay(recording.path)]
+    missed = [*targets.reasons(estimates), *_replay(recording.path)]
 
     for reason in missed:
         print(f"target missed: {reason}", file=sys.stderr)
     if not missed:
-        print(targets.praise(found))
+        print(targets.praise(estimates))
     return FAILED if missed else DONE
 
 

@@ -33,8 +33,8 @@ NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One soil parameter at the end of the run, SI."""
+class Estimate:
+    """One estimated soil parameter at the end of the run, SI."""
 
     name: str
     value: float
@@ -64,18 +64,18 @@ class Finding:
         return missed
 
 
-def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[Finding]:
+def judge(ticks: Rows, truth: Mapping[str, float], plant: PlantKind) -> list[Estimate]:
     """The last tick against the truth. ticks: /tick (n,)."""
     full = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS >= FULL_RUN
     last = dict(zip(ticks.dtype.names or (), ticks[-1].tolist(), strict=True))
-    return _findings(last, truth, TARGETS[plant] if full else {})
+    return _estimates(last, truth, TARGETS[plant] if full else {})
 
 
-def _findings(
+def _estimates(
     last: Mapping[str, float], truth: Mapping[str, float], targets: Mapping[str, float]
-) -> list[Finding]:
+) -> list[Estimate]:
     return [
-        Finding(name, last[name], last[f"{name}_sigma"], truth[name], targets.get(name))
+        Estimate(name, last[name], last[f"{name}_sigma"], truth[name], targets.get(name))
         for name in SHOWN
     ]
 
@@ -99,41 +99,43 @@ def without_correction(recording: Recording, truth: Mapping[str, float]) -> list
 
     if tick is None:
         return []
-    found = _findings(dict(zip(TICK_NAMES, tick, strict=True)), truth, {})
-    return [f"the same readings without {LINEARISATION}:", *table(found)[1:]]
+    estimates = _estimates(dict(zip(TICK_NAMES, tick, strict=True)), truth, {})
+    return [f"the same readings without {LINEARISATION}:", *table(estimates)[1:]]
 
 
-def reasons(found: Sequence[Finding]) -> list[str]:
+def reasons(estimates: Sequence[Estimate]) -> list[str]:
     """Why the run falls short of its targets; empty if it does not."""
-    return [reason for finding in found for reason in finding.shortcomings]
+    return [reason for estimate in estimates for reason in estimate.shortcomings]
 
 
-def praise(found: Sequence[Finding]) -> str:
+def praise(estimates: Sequence[Estimate]) -> str:
     """What is said where nothing fell short."""
-    judged = any(finding.allowed is not None for finding in found)
+    judged = any(estimate.allowed is not None for estimate in estimates)
     return (
         "all targets met" if judged else f"a run of less than {FULL_RUN:g} s is not held to targets"
     )
 
 
-def table(found: Sequence[Finding]) -> list[str]:
+def table(estimates: Sequence[Estimate]) -> list[str]:
     """Estimate, truth, error and target, a line each."""
     lines = [f"{'':6}{'estimate ± σ':>22}{'truth':>12}{'error':>9}{'in σ':>8}   target"]
-    for f in found:
-        symbol, unit, factor, digits = SHOWN[f.name]
-        estimate = f"{f.value * factor:.{digits}f} ± {f.sigma * factor:.{digits}f} {unit}"
-        truth = f"{f.truth * factor:.{digits}f} {unit}"
+    for each in estimates:
+        symbol, unit, factor, digits = SHOWN[each.name]
+        value = f"{each.value * factor:.{digits}f} ± {each.sigma * factor:.{digits}f} {unit}"
+        truth = f"{each.truth * factor:.{digits}f} {unit}"
         lines.append(
-            f"{symbol:6}{estimate:>22}{truth:>12}{f.relative:>+9.1%}{f.in_sigmas:>+8.2f}   "
-            f"{_target(f)}"
+            f"{symbol:6}{value:>22}{truth:>12}{each.relative:>+9.1%}{each.in_sigmas:>+8.2f}   "
+            f"{_target(each)}"
         )
     return lines
 
 
-def _target(finding: Finding) -> str:
-    if finding.allowed is None:
+def _target(estimate: Estimate) -> str:
+    if estimate.allowed is None:
         return "none"
-    return f"{finding.allowed:.0%} and {SIGMAS:g} σ: {'missed' if finding.shortcomings else 'met'}"
+    return (
+        f"{estimate.allowed:.0%} and {SIGMAS:g} σ: {'missed' if estimate.shortcomings else 'met'}"
+    )
 
 
 def punctuality(loop: Rows) -> list[str]:
@@ -152,10 +154,10 @@ def _listed(times: Array, names: Sequence[str]) -> str:
     return ", ".join(f"{time:.3f} ms ({name})" for time, name in zip(times, names, strict=True))
 
 
-def headline(found: Sequence[Finding], plant: PlantKind, ticks: Rows) -> str:
+def headline(estimates: Sequence[Estimate], plant: PlantKind, ticks: Rows) -> str:
     """The run in one line, for the figure."""
     seconds = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS
     errors = ", ".join(
-        f"{SHOWN[f.name][0]} {f.relative:+.1%} ({f.in_sigmas:+.1f} σ)" for f in found
+        f"{SHOWN[f.name][0]} {f.relative:+.1%} ({f.in_sigmas:+.1f} σ)" for f in estimates
     )
     return f"gritd demo, {plant} plant, {seconds:.0f} s on real wires: error of {errors}"

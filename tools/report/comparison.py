@@ -73,7 +73,8 @@ class Comparison:
         runs: list[tuple[str, str | None]] = [(run, run) for run in self.runs]
         rows = runs + ([(ALL, None)] if len(runs) > 1 else [])
         return head, [
-            [said, *(self._error(c, run, units[c][1]) for c in self.channels)] for said, run in rows
+            [label, *(self._error(c, run, units[c][1]) for c in self.channels)]
+            for label, run in rows
         ]
 
     def _error(self, channel: str, run: str | None, factor: float) -> str:
@@ -85,37 +86,41 @@ def _unit(traces: Sequence[Trace], channel: str) -> str:
     return next(trace.unit for trace in traces if trace.channel == channel)
 
 
-def render(found: Comparison) -> str:
+def render(comparison: Comparison) -> str:
     """The whole document."""
-    head, rows = found.errors()
-    fitted = " → soil fitted" if found.soil else ""
+    head, rows = comparison.errors()
+    fitted = " → soil fitted" if comparison.soil else ""
 
     return page(
-        f"gritd compare: {found.testbed}",
-        _title(found),
+        f"gritd compare: {comparison.testbed}",
+        _title(comparison),
         section(
             "Errors",
             table(head, rows, numbers=1),
             tag("p", f"Root mean square: as configured{fitted}.", class_="note"),
         ),
-        section("Simulation against recording", tag("p", NOTE), _pictures(found)),
-        _soil(found),
-        _caveats(found),
-        section("To redo it", redo.content(found.redo)),
+        section("Simulation against recording", tag("p", NOTE), _pictures(comparison)),
+        _soil(comparison),
+        _caveats(comparison),
+        section("To redo it", redo.content(comparison.redo)),
     )
 
 
-def _title(found: Comparison) -> Markup:
+def _title(comparison: Comparison) -> Markup:
     effects = (
-        f"with {listed([name_of(b) for b in found.baseline])}" if found.baseline else "no effects"
+        f"with {listed([name_of(b) for b in comparison.baseline])}"
+        if comparison.baseline
+        else "no effects"
     )
-    kicker = f"gritd compare · {found.testbed} · {counted(len(found.runs), 'run')} · {effects}"
+    kicker = (
+        f"gritd compare · {comparison.testbed} · {counted(len(comparison.runs), 'run')} · {effects}"
+    )
 
-    said = f"As configured, the simulation is off by {_off(found, 'before')}."
-    if found.soil:
-        said += f" With the soil fitted, by {_off(found, 'after')}."
+    summary = f"As configured, the simulation is off by {_off(comparison, 'before')}."
+    if comparison.soil:
+        summary += f" With the soil fitted, by {_off(comparison, 'after')}."
 
-    lead = tag("p", held(said), class_="summary")
+    lead = tag("p", held(summary), class_="summary")
 
     return tag(
         "header",
@@ -126,36 +131,38 @@ def _title(found: Comparison) -> Markup:
     )
 
 
-def _off(found: Comparison, which: str) -> str:
+def _off(comparison: Comparison, which: str) -> str:
     """The error of every channel over all runs."""
-    said = []
-    for channel in found.channels:
-        unit, factor = shown(_unit(found.traces, channel))
-        said.append(
-            f"{number(found.rms(channel, None, which) * factor, 2)} {unit} in {name_of(channel)}"
-        )
-    return listed(said)
+    errors = []
+    for channel in comparison.channels:
+        unit, factor = shown(_unit(comparison.traces, channel))
+        error = number(comparison.rms(channel, None, which) * factor, 2)
+        errors.append(f"{error} {unit} in {name_of(channel)}")
+    return listed(errors)
 
 
-def _pictures(found: Comparison) -> Iterator[Markup]:
+def _pictures(comparison: Comparison) -> Iterator[Markup]:
     key = figures.legend(
-        {k: v for k, v in KEY.items() if found.soil or k != "after"} | {"unused": "not compared"}
+        {k: v for k, v in KEY.items() if comparison.soil or k != "after"}
+        | {"unused": "not compared"}
     )
 
-    if len(found.runs) == 1:
+    if len(comparison.runs) == 1:
         yield figures.figure(
-            f"All channels of {found.runs[0]}.", figures.channels(found.traces), legend=key
+            f"All channels of {comparison.runs[0]}.",
+            figures.channels(comparison.traces),
+            legend=key,
         )
         return
 
-    for channel in found.channels:
-        of = [trace for trace in found.traces if trace.channel == channel]
+    for channel in comparison.channels:
+        of = [trace for trace in comparison.traces if trace.channel == channel]
         caption = f"{name_of(channel).capitalize()} of {counted(len(of), 'run')}."
         yield figures.figure(caption, figures.traces(of, len(of)), legend=key)
 
 
-def _soil(found: Comparison) -> Markup | None:
-    if found.soil is None:
+def _soil(comparison: Comparison) -> Markup | None:
+    if comparison.soil is None:
         return None
     key = figures.legend({"prior": "known before", "after": "fitted"})
     caption = (
@@ -163,21 +170,21 @@ def _soil(found: Comparison) -> Markup | None:
         "as if nothing were left out."
     )
     return section(
-        "The soil", figures.figure(caption, figures.soil(found.soil), legend=key, small=True)
+        "The soil", figures.figure(caption, figures.soil(comparison.soil), legend=key, small=True)
     )
 
 
-def _caveats(found: Comparison) -> Markup | None:
+def _caveats(comparison: Comparison) -> Markup | None:
     return (
-        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in found.caveats)))
-        if found.caveats
+        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in comparison.caveats)))
+        if comparison.caveats
         else None
     )
 
 
-def printed(found: Comparison) -> str:
+def printed(comparison: Comparison) -> str:
     """The table of errors, the fitted soil and the caveats, for a terminal."""
-    head, rows = found.errors()
+    head, rows = comparison.errors()
     widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
 
     lines = [
@@ -188,12 +195,12 @@ def printed(found: Comparison) -> str:
         for row in (head, *rows)
     ]
 
-    if found.soil:
+    if comparison.soil:
         lines += ["", "root mean square residual as configured → with the soil fitted", ""]
         lines += [
-            f"{name_of(k):20}{quantity(found.soil.prior[k])}  →  {quantity(q)}"
-            for k, q in found.soil.after.items()
+            f"{name_of(k):20}{quantity(comparison.soil.prior[k])}  →  {quantity(q)}"
+            for k, q in comparison.soil.after.items()
         ]
 
-    lines += [f"note: {caveat}" for caveat in found.caveats]
+    lines += [f"note: {caveat}" for caveat in comparison.caveats]
     return "\n".join(map(visible, lines))

@@ -56,27 +56,27 @@ LOCATED_RUNS, OTHER_RUNS = (
 )  # pictures in view of a channel where the misfit lives, and of another
 
 
-def write(found: Diagnosis, path: Path) -> None:
+def write(diagnosis: Diagnosis, path: Path) -> None:
     """Raises OSError."""
-    path.write_text(render(found, path.name), encoding="utf-8")
+    path.write_text(render(diagnosis, path.name), encoding="utf-8")
 
 
-def render(found: Diagnosis, name: str = "report.html") -> str:
+def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
     """The whole document; name: of the file it will be."""
     return page(
-        f"gritd diagnosis: {VERDICTS[found.verdict][0].lower()}",
-        _verdict(found),
-        _simulation(found),
-        _misfit(found),
-        _hypotheses(found),
-        _soil(found),
-        tables.parameters(found),
-        tables.location(found),
-        tables.held_out(found),
-        tables.law(found),
-        _caveats(found),
-        _next(found),
-        _redo(found, name),
+        f"gritd diagnosis: {VERDICTS[diagnosis.verdict][0].lower()}",
+        _verdict(diagnosis),
+        _simulation(diagnosis),
+        _misfit(diagnosis),
+        _hypotheses(diagnosis),
+        _soil(diagnosis),
+        tables.parameters(diagnosis),
+        tables.location(diagnosis),
+        tables.held_out(diagnosis),
+        tables.law(diagnosis),
+        _caveats(diagnosis),
+        _next(diagnosis),
+        _redo(diagnosis, name),
     )
 
 
@@ -87,32 +87,32 @@ def paragraph(*content: Child) -> Markup:
 # --- verdict ---
 
 
-def _verdict(found: Diagnosis) -> Markup:
-    name, meaning = VERDICTS[found.verdict]
-    effects = [_or_alike(h) for h in found.accepted]
-    title = f"{name}: {listed(effects)}" if found.verdict == "explained" and effects else name
+def _verdict(diagnosis: Diagnosis) -> Markup:
+    name, meaning = VERDICTS[diagnosis.verdict]
+    effects = [_or_alike(h) for h in diagnosis.accepted]
+    title = f"{name}: {listed(effects)}" if diagnosis.verdict == "explained" and effects else name
 
-    runs = {trace.run for trace in found.traces}
+    runs = {trace.run for trace in diagnosis.traces}
 
     return tag(
         "header",
         tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
         tag("h1", title, tag("span", meaning)),
-        tag("p", held(tables.named(found, found.summary)), class_="summary"),
-        tag("dl", (_figure(*figure) for figure in _figures(found)), class_="figures"),
-        class_=f"verdict {found.verdict}",
+        tag("p", held(tables.named(diagnosis, diagnosis.summary)), class_="summary"),
+        tag("dl", (_figure(*figure) for figure in _figures(diagnosis)), class_="figures"),
+        class_=f"verdict {diagnosis.verdict}",
     )
 
 
-def explanation(found: Diagnosis) -> str:
+def explanation(diagnosis: Diagnosis) -> str:
     """What makes the difference between before and after, in words."""
-    if found.accepted:
+    if diagnosis.accepted:
         return (
-            name_of(found.accepted[0].effect)
-            if len(found.accepted) == 1
-            else f"these {len(found.accepted)} effects"
+            name_of(diagnosis.accepted[0].effect)
+            if len(diagnosis.accepted) == 1
+            else f"these {len(diagnosis.accepted)} effects"
         )
-    return "the empirical law" if found.law else "it"
+    return "the empirical law" if diagnosis.law else "it"
 
 
 def _or_alike(h: Hypothesis) -> str:
@@ -126,10 +126,12 @@ def _or_alike(h: Hypothesis) -> str:
     return name_of(h.effect) + (rivals if others else "")
 
 
-def _together(found: Diagnosis, h: Hypothesis) -> float:
+def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
     """Probability that it is this effect or one like it."""
     group = {h.effect, *h.indistinguishable_from}
-    return min(sum(other.probability for other in found.hypotheses if other.effect in group), 1.0)
+    return min(
+        sum(other.probability for other in diagnosis.hypotheses if other.effect in group), 1.0
+    )
 
 
 def _figure(term: str, value: str, detail: str) -> Markup:
@@ -141,26 +143,26 @@ def _figure(term: str, value: str, detail: str) -> Markup:
     )
 
 
-def _figures(found: Diagnosis) -> Iterator[tuple[str, str, str]]:
+def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
     """The few numbers a hurried reader takes away: what, how much, beside what."""
-    test = found.test
+    test = diagnosis.test
     alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
     yield "evidence of a mismatch", nats(test.statistic), alarm
 
-    for h in found.accepted:
-        said = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
+    for h in diagnosis.accepted:
+        parameters = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
         if h.indistinguishable_from:
-            said.append(f"together with its like {percent(_together(found, h))}")
-        yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(said)
+            parameters.append(f"together with its like {percent(_together(diagnosis, h))}")
+        yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(parameters)
 
-    channel = _most_improved(found)
+    channel = _most_improved(diagnosis)
     if channel:
-        change, floor = _change(found, channel)
+        change, floor = _change(diagnosis, channel)
         yield f"{name_of(channel)} error, held out", change, f"noise {floor}"
 
     for key in ("c", "tan_phi"):
-        if found.soil is not None and key in found.soil.after:
-            yield name_of(key), quantity(found.soil.after[key]), _without(found.soil, key)
+        if diagnosis.soil is not None and key in diagnosis.soil.after:
+            yield name_of(key), quantity(diagnosis.soil.after[key]), _without(diagnosis.soil, key)
 
 
 def _without(soil: SoilFit, key: str) -> str:
@@ -170,82 +172,92 @@ def _without(soil: SoilFit, key: str) -> str:
     )
 
 
-def _most_improved(found: Diagnosis) -> str | None:
+def _most_improved(diagnosis: Diagnosis) -> str | None:
     """The channel whose held-out error fell most, as a share."""
-    fit = found.fit
+    fit = diagnosis.fit
     known = [c for c in fit.before if c in fit.after and fit.before[c] > 0.0]
     return min(known, key=lambda c: fit.after[c] / fit.before[c]) if known else None
 
 
-def _change(found: Diagnosis, channel: str) -> tuple[str, str]:
+def _change(diagnosis: Diagnosis, channel: str) -> tuple[str, str]:
     """Held-out error before and after, and the noise floor, with their unit."""
-    unit = found.fit.unit.get(channel, "")
+    unit = diagnosis.fit.unit.get(channel, "")
     seen, factor = shown(unit)
     before, after = (
-        number(side[channel] * factor, 2) for side in (found.fit.before, found.fit.after)
+        number(side[channel] * factor, 2) for side in (diagnosis.fit.before, diagnosis.fit.after)
     )
     change = before if before == after else f"{before} → {after}"
-    return f"{change} {seen}".rstrip(), with_unit(found.fit.noise_floor.get(channel), unit, 2)
+    return f"{change} {seen}".rstrip(), with_unit(diagnosis.fit.noise_floor.get(channel), unit, 2)
 
 
 # --- pictures ---
 
 
-def _simulation(found: Diagnosis) -> Markup | None:
-    if not found.traces:
+def _simulation(diagnosis: Diagnosis) -> Markup | None:
+    if not diagnosis.traces:
         return None
-    runs = {trace.run for trace in found.traces}
-    channels = dict.fromkeys(trace.channel for trace in found.traces)
+    runs = {trace.run for trace in diagnosis.traces}
+    channels = dict.fromkeys(trace.channel for trace in diagnosis.traces)
     drawn = (
-        [_one_run(found)] if len(runs) == 1 else [_channel(found, channel) for channel in channels]
+        [_one_run(diagnosis)]
+        if len(runs) == 1
+        else [_channel(diagnosis, channel) for channel in channels]
     )
-    said = f"{RUNS_HELD if len(runs) >= FEW else THIRDS_HELD} {DRAWN}"
-    return section("Simulation against recording", paragraph(said), drawn)
+    note = f"{RUNS_HELD if len(runs) >= FEW else THIRDS_HELD} {DRAWN}"
+    return section("Simulation against recording", paragraph(note), drawn)
 
 
-def _one_run(found: Diagnosis) -> Markup:
+def _one_run(diagnosis: Diagnosis) -> Markup:
     """All its channels side by side."""
-    caption = "; ".join(_error_words(found, trace.channel) for trace in found.traces)
+    caption = "; ".join(_error_words(diagnosis, trace.channel) for trace in diagnosis.traces)
     return figures.figure(
-        sentence(caption), figures.channels(found.traces), legend=_key(found, found.traces)
+        sentence(caption),
+        figures.channels(diagnosis.traces),
+        legend=_key(diagnosis, diagnosis.traces),
     )
 
 
-def _channel(found: Diagnosis, channel: str) -> Markup:
+def _channel(diagnosis: Diagnosis, channel: str) -> Markup:
     """All runs of a channel; more of them in view where the misfit lives."""
-    of = [trace for trace in found.traces if trace.channel == channel]
-    most = LOCATED_RUNS if any(place.channel == channel for place in found.location) else OTHER_RUNS
-    caption = sentence(f"{_error_words(found, channel)} over all runs")
-    return figures.figure(caption, figures.traces(of, most), legend=_key(found, of))
+    of = [trace for trace in diagnosis.traces if trace.channel == channel]
+    most = (
+        LOCATED_RUNS
+        if any(place.channel == channel for place in diagnosis.location)
+        else OTHER_RUNS
+    )
+    caption = sentence(f"{_error_words(diagnosis, channel)} over all runs")
+    return figures.figure(caption, figures.traces(of, most), legend=_key(diagnosis, of))
 
 
-def _error_words(found: Diagnosis, channel: str) -> str:
+def _error_words(diagnosis: Diagnosis, channel: str) -> str:
     """The channel with its held-out error, where one was computed."""
-    if channel not in found.fit.before or channel not in found.fit.after:
+    if channel not in diagnosis.fit.before or channel not in diagnosis.fit.after:
         return name_of(channel)
-    change, floor = _change(found, channel)
+    change, floor = _change(diagnosis, channel)
     return f"{name_of(channel)} with an error of {change} (noise {floor})"
 
 
-def _key(found: Diagnosis, of: Sequence[Trace]) -> Markup:
-    name = explanation(found)
+def _key(diagnosis: Diagnosis, of: Sequence[Trace]) -> Markup:
+    name = explanation(diagnosis)
     series = {"before": f"simulated without {name}", "after": f"simulated with {name}"}
     if not any(figures.differs(trace) for trace in of):
         series = {"before": "simulated"}
     return figures.legend({"measured": "recorded", **series, "unused": "not compared"})
 
 
-def _misfit(found: Diagnosis) -> Markup | None:
-    if not found.scatters:
+def _misfit(diagnosis: Diagnosis) -> Markup | None:
+    if not diagnosis.scatters:
         return None
-    title = "Where the misfit lives" if found.verdict != "consistent" else "What is left"
-    by_picture = {(s.channel, figures.drawn_against(s)): s for s in reversed(found.scatters)}
-    return section(title, (_scatter(found, scatter) for scatter in reversed(by_picture.values())))
+    title = "Where the misfit lives" if diagnosis.verdict != "consistent" else "What is left"
+    by_picture = {(s.channel, figures.drawn_against(s)): s for s in reversed(diagnosis.scatters)}
+    return section(
+        title, (_scatter(diagnosis, scatter) for scatter in reversed(by_picture.values()))
+    )
 
 
-def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
+def _scatter(diagnosis: Diagnosis, scatter: Scatter) -> Markup:
     here = (scatter.channel, scatter.covariate)
-    places = [place for place in found.location if (place.channel, place.covariate) == here]
+    places = [place for place in diagnosis.location if (place.channel, place.covariate) == here]
 
     against = figures.drawn_against(scatter)
     about = f"Residual of {name_of(scatter.channel)} against {name_of(against)}"
@@ -257,63 +269,70 @@ def _scatter(found: Diagnosis, scatter: Scatter) -> Markup:
     key = figures.legend({"mean": "mean", "band": "± 2σ of the noise", **marks})
 
     caption = (
-        f"{about}. {sentence(tables.named(found, places[0].where))}" if places else f"{about}."
+        f"{about}. {sentence(tables.named(diagnosis, places[0].where))}" if places else f"{about}."
     )
 
-    runs = list(dict.fromkeys(trace.run for trace in found.traces))
-    drawn = figures.scatter(scatter, explanation(found), runs, changes)
+    runs = list(dict.fromkeys(trace.run for trace in diagnosis.traces))
+    drawn = figures.scatter(scatter, explanation(diagnosis), runs, changes)
     return figures.figure(caption, drawn, legend=key, small=True)
 
 
-def _hypotheses(found: Diagnosis) -> Markup | None:
-    if not found.hypotheses:
+def _hypotheses(diagnosis: Diagnosis) -> Markup | None:
+    if not diagnosis.hypotheses:
         return None
-    title = "What was left out" if found.accepted else "What was tried"
+    title = "What was left out" if diagnosis.accepted else "What was tried"
     return section(
-        title, paragraph(hypotheses.introduction(found)), hypotheses.groups(found.hypotheses)
+        title,
+        paragraph(hypotheses.introduction(diagnosis)),
+        hypotheses.groups(diagnosis.hypotheses),
     )
 
 
-def _soil(found: Diagnosis) -> Markup | None:
-    if found.soil is None:
+def _soil(diagnosis: Diagnosis) -> Markup | None:
+    if diagnosis.soil is None:
         return None
 
-    legend = {"prior": "known before", **_fitted(found)}
+    legend = {"prior": "known before", **_fitted(diagnosis)}
     strain = (
-        found.soil.strained()
+        diagnosis.soil.strained()
         or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
     )
     caption = f"Soil, ± 1σ thick and ± 2σ thin. {strain}"
 
     drawn = figures.figure(
-        caption, figures.soil(found.soil), legend=figures.legend(legend), small=True
+        caption, figures.soil(diagnosis.soil), legend=figures.legend(legend), small=True
     )
     return section("The soil", drawn)
 
 
-def _fitted(found: Diagnosis) -> dict[str, str]:
-    if found.soil is None or found.soil.before == found.soil.after:
+def _fitted(diagnosis: Diagnosis) -> dict[str, str]:
+    if diagnosis.soil is None or diagnosis.soil.before == diagnosis.soil.after:
         return {"after": "fitted"}
     return {
-        "before": f"fitted without {explanation(found)}",
-        "after": f"fitted with {explanation(found)}",
+        "before": f"fitted without {explanation(diagnosis)}",
+        "after": f"fitted with {explanation(diagnosis)}",
     }
 
 
 # --- the end ---
 
 
-def _caveats(found: Diagnosis) -> Markup | None:
-    said = list(found.caveats)
-    if found.baseline:
-        said.insert(
-            0, f"The configuration already models {listed([name_of(b) for b in found.baseline])}"
+def _caveats(diagnosis: Diagnosis) -> Markup | None:
+    caveats = list(diagnosis.caveats)
+    if diagnosis.baseline:
+        caveats.insert(
+            0,
+            f"The configuration already models {listed([name_of(b) for b in diagnosis.baseline])}",
         )
-    return section("Caveats", tag("ul", (tag("li", sentence(c)) for c in said))) if said else None
+    return (
+        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in caveats)))
+        if caveats
+        else None
+    )
 
 
-def _next(found: Diagnosis) -> Markup | None:
-    following = found.next_experiment
+def _next(diagnosis: Diagnosis) -> Markup | None:
+    following = diagnosis.next_experiment
     if following is None:
         return None
 
@@ -337,33 +356,33 @@ def _next(found: Diagnosis) -> Markup | None:
     )
 
 
-def _redo(found: Diagnosis, name: str) -> Markup:
+def _redo(diagnosis: Diagnosis, name: str) -> Markup:
     noise = [
-        (name_of(channel), _noise(found, channel, values))
-        for channel, values in found.noise.items()
+        (name_of(channel), _noise(diagnosis, channel, values))
+        for channel, values in diagnosis.noise.items()
     ]
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
-    return section("To redo it", _again(found, name), redo.content(found.redo), noise_table)
+    return section("To redo it", _again(diagnosis, name), redo.content(diagnosis.redo), noise_table)
 
 
-def _again(found: Diagnosis, name: str) -> list[Markup] | None:
+def _again(diagnosis: Diagnosis, name: str) -> list[Markup] | None:
     """The command that does it again from this page, and what the command reads from it."""
-    if not isinstance(found.redo.get("files"), Mapping):
+    if not isinstance(diagnosis.redo.get("files"), Mapping):
         return None
     command = shlex.join(["gritd", "diagnose", "--redo", name])
-    said = (
+    note = (
         "This page holds what it takes beside the recordings: they are checked by their hashes, "
         "and results compared."
     )
-    embedded = tag("pre", record.as_json(found), id=record.EMBEDDED, hidden="hidden")
-    return [paragraph(said), tag("pre", command, class_="command"), embedded]
+    embedded = tag("pre", record.as_json(diagnosis), id=record.EMBEDDED, hidden="hidden")
+    return [paragraph(note), tag("pre", command, class_="command"), embedded]
 
 
-def _noise(found: Diagnosis, channel: str, values: Mapping[str, float]) -> str:
+def _noise(diagnosis: Diagnosis, channel: str, values: Mapping[str, float]) -> str:
     """Sizes are in the channel's unit, times in seconds."""
-    size = shown(found.fit.unit.get(channel, ""))
-    said = []
+    size = shown(diagnosis.fit.unit.get(channel, ""))
+    parts = []
     for key, value in values.items():
         unit, factor = ("s", 1.0) if "time" in key else size if key in NOISE_SIZES else ("", 1.0)
-        said.append(f"{name_of(key)} {spaced(value * factor, unit)}")
-    return ", ".join(said)
+        parts.append(f"{name_of(key)} {spaced(value * factor, unit)}")
+    return ", ".join(parts)

@@ -60,7 +60,7 @@ def legend(entries: Mapping[str, str]) -> Markup:
     """Class of a mark -> what it is."""
     return tag(
         "ul",
-        (tag("li", tag("i", class_=f"swatch {c}"), said) for c, said in entries.items()),
+        (tag("li", tag("i", class_=f"swatch {c}"), meaning) for c, meaning in entries.items()),
         class_="legend",
     )
 
@@ -306,8 +306,8 @@ def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Ma
         _interval(across, 14.0 + 24.0 * i, label, q, kind)
         for i, (label, q, kind) in enumerate(there)
     ]
-    said = "; ".join(f"{label} {quantity(q)}" for label, q, _ in there)
-    return plot.picture(8.0 + 24.0 * len(there), f"{name}: {said}", *marks)
+    values = "; ".join(f"{label} {quantity(q)}" for label, q, _ in there)
+    return plot.picture(8.0 + 24.0 * len(there), f"{name}: {values}", *marks)
 
 
 def _interval(across: plot.Scale, y: float, label: str, q: Quantity, kind: str) -> Markup:

@@ -53,13 +53,13 @@ def tag(name: str, /, *children: Child, **attributes: str | float | None) -> Mar
     """`<name …>children</name>`. In attribute names `class_` is class and `_` is `-`; None leaves
     one out.
     """
-    said = "".join(
+    written = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_attribute(value)}"'
         for key, value in attributes.items()
         if value is not None
     )
     return Markup(
-        f"<{name}{said}/>" if name in VOID else f"<{name}{said}>{join(*children)}</{name}>"
+        f"<{name}{written}/>" if name in VOID else f"<{name}{written}>{join(*children)}</{name}>"
     )
 
 

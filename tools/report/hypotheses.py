@@ -15,9 +15,9 @@ UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
 
 
-def introduction(found: Diagnosis) -> str:
-    tried = counted(len(found.hypotheses), "effect")
-    beside = "the soil" if found.soil else "what is known of the rig"
+def introduction(diagnosis: Diagnosis) -> str:
+    tried = counted(len(diagnosis.hypotheses), "effect")
+    beside = "the soil" if diagnosis.soil else "what is known of the rig"
     return (
         f"{tried} considered together with {beside} in all channels, "
         "scored on runs and conditions not fitted to. "
@@ -61,12 +61,12 @@ def _group(group: Sequence[Hypothesis]) -> Markup:
         return tag("div", _bar(group[0]), class_="group")
 
     total = min(sum(h.probability for h in group), 1.0)
-    said = f"Not told apart by these recordings; together {percent(total)}."
+    note = f"Not told apart by these recordings; together {percent(total)}."
     bars = (_bar(h) for h in group)
 
     return tag(
         "div",
-        tag("p", held(said), class_="apart"),
+        tag("p", held(note), class_="apart"),
         bars,
         _separation(group),
         class_="group several",

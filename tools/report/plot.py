@@ -112,10 +112,10 @@ def frame(
     """
     heights = ticks(at.y.low, at.y.high, most)
     parts = []
-    for value, said in zip(heights, tick_labels(heights), strict=True):
+    for value, words in zip(heights, tick_labels(heights), strict=True):
         height = float(at.y(value))
         parts.append(tag("line", class_="grid", x1=at.x.start, x2=at.x.end, y1=height, y2=height))
-        parts.append(text(at.x.start - 6, height + 3.5, said, "end"))
+        parts.append(text(at.x.start - 6, height + 3.5, words, "end"))
 
     parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
 
@@ -125,17 +125,19 @@ def frame(
             if names is None
             else [float(i) for i in range(len(names))]
         )
-        for value, said in zip(
+        for value, words in zip(
             widths, names if names is not None else tick_labels(widths), strict=True
         ):
-            parts.append(text(float(at.x(value)), at.y.start + 14, said, "middle"))
+            parts.append(text(float(at.x(value)), at.y.start + 14, words, "middle"))
         parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
 
     return tag("g", parts)
 
 
-def text(x: float, y: float, said: str, anchor: str = "start", class_: str | None = None) -> Markup:
-    return tag("text", said, x=x, y=y, text_anchor=anchor, class_=class_)
+def text(
+    x: float, y: float, words: str, anchor: str = "start", class_: str | None = None
+) -> Markup:
+    return tag("text", words, x=x, y=y, text_anchor=anchor, class_=class_)
 
 
 def line(at: Axes, x: Array | Sequence[float], y: Array | Sequence[float], class_: str) -> Markup:

@@ -47,8 +47,8 @@ class Record:
         return Given(tuple(self.known), self.bed)
 
     @classmethod
-    def of(cls, found: Diagnosis) -> Record:
-        return cls.parsed(json.loads(as_json(found)), Path("/"))
+    def of(cls, diagnosis: Diagnosis) -> Record:
+        return cls.parsed(json.loads(as_json(diagnosis)), Path("/"))
 
     @classmethod
     def parsed(cls, document: Mapping[str, Any], folder: Path) -> Record:
@@ -82,14 +82,14 @@ def _lies_in(folder: Path, path: Path) -> bool:
     return path.is_file() and path.resolve().is_relative_to(folder.resolve())
 
 
-def as_json(found: Diagnosis) -> str:
+def as_json(diagnosis: Diagnosis) -> str:
     """What a report holds of the JSON, so that it is enough to do the diagnosis again."""
     kept = [
         {"effect": h.effect, "probability": h.probability, "accepted": h.accepted}
-        for h in found.hypotheses
+        for h in diagnosis.hypotheses
     ]
     return json.dumps(
-        plain({"verdict": found.verdict, "hypotheses": kept, "redo": found.redo}),
+        plain({"verdict": diagnosis.verdict, "hypotheses": kept, "redo": diagnosis.redo}),
         ensure_ascii=False,
     )
 

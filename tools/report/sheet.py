@@ -20,9 +20,9 @@ ACROSS = 4  # runs side by side
 COLUMN, ROW = 4.8, 2.6  # [in] of one run, of one channel
 
 
-def draw(path: Path, found: Comparison) -> None:
+def draw(path: Path, comparison: Comparison) -> None:
     """Raises OSError."""
-    runs, channels = found.runs, found.channels
+    runs, channels = comparison.runs, comparison.channels
     down = -(-len(runs) // ACROSS)
     across = -(-len(runs) // down)
 
@@ -40,7 +40,7 @@ def draw(path: Path, found: Comparison) -> None:
         )
         block.suptitle(_plain_text(run), fontsize=11)
         for at, channel in enumerate(channels):
-            trace = next(t for t in found.traces if (t.run, t.channel) == (run, channel))
+            trace = next(t for t in comparison.traces if (t.run, t.channel) == (run, channel))
             _trace(axes[2 * at, 0], axes[2 * at + 1, 0], trace, legend=number_of == at == 0)
         axes[-1, 0].set_xlabel("time [s]")
 

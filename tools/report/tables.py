@@ -21,9 +21,11 @@ STRAYED = 2.0  # [σ]
 DECADE = 10.0  # values from here on carry a third digit
 
 
-def parameters(found: Diagnosis) -> Markup | None:
-    parameters = [(h.effect, name, q) for h in found.accepted for name, q in h.parameters.items()]
-    parameters += [("calibration", name, q) for name, q in _strayed(found.nuisance).items()]
+def parameters(diagnosis: Diagnosis) -> Markup | None:
+    parameters = [
+        (h.effect, name, q) for h in diagnosis.accepted for name, q in h.parameters.items()
+    ]
+    parameters += [("calibration", name, q) for name, q in _strayed(diagnosis.nuisance).items()]
     rows = [(f"{name_of(of)}: {name_of(name)}", quantity(q)) for of, name, q in parameters]
     if not rows:
         return None
@@ -39,19 +41,19 @@ def _strayed(nuisance: Mapping[str, Quantity]) -> dict[str, Quantity]:
     }
 
 
-def location(found: Diagnosis) -> Markup | None:
-    if not found.location:
+def location(diagnosis: Diagnosis) -> Markup | None:
+    if not diagnosis.location:
         return None
 
     rows = [
         (
             name_of(p.channel),
             name_of(p.covariate),
-            sentence(named(found, p.where)),
-            _changes(found, p),
+            sentence(named(diagnosis, p.where)),
+            _changes(diagnosis, p),
             probability(p.q),
         )
-        for p in found.location
+        for p in diagnosis.location
     ]
 
     head = ("channel", "against", "in words", "starts or stops at", "q")
@@ -64,10 +66,10 @@ def location(found: Diagnosis) -> Markup | None:
     return section("Where, in words", table(head, rows, numbers=4), tag("p", note, class_="note"))
 
 
-def _changes(found: Diagnosis, place: Location) -> str:
+def _changes(diagnosis: Diagnosis, place: Location) -> str:
     """Values of the covariate at which the misfit starts or stops."""
     if place.covariate == "run":
-        return listed([run_name(found, change) for change in place.changes])
+        return listed([run_name(diagnosis, change) for change in place.changes])
     unit, factor = covariate_shown(place.covariate, UNITS.get(place.covariate, ""))
     return listed(
         [
@@ -77,16 +79,16 @@ def _changes(found: Diagnosis, place: Location) -> str:
     )
 
 
-def run_name(found: Diagnosis, number_of: float) -> str:
+def run_name(diagnosis: Diagnosis, number_of: float) -> str:
     """The name of the n-th run in order of time, from 1."""
-    began = {trace.run: trace.time[0] for trace in found.traces}
+    began = {trace.run: trace.time[0] for trace in diagnosis.traces}
     names = sorted(began, key=lambda run: began[run])
     at = int(number_of) - 1 if math.isfinite(number_of) else -1
     return names[at] if 0 <= at < len(names) else f"run {number(number_of)}"
 
 
-def held_out(found: Diagnosis) -> Markup | None:
-    fit = found.fit
+def held_out(diagnosis: Diagnosis) -> Markup | None:
+    fit = diagnosis.fit
     if not fit.before:
         return None
 
@@ -106,7 +108,7 @@ def held_out(found: Diagnosis) -> Markup | None:
         errors = (before, after) if len(sides) == 2 else (after,)
         values = (with_unit(v, fit.unit.get(channel, "")) for v in (*errors, floor))
         ratio = after / floor if after is not None and floor else None
-        innovation = [_innovation(found, channel)] if innovations else []
+        innovation = [_innovation(diagnosis, channel)] if innovations else []
         rows.append((name_of(channel), *values, number(ratio, 2), *innovation))
 
     notes = [tag("p", UNSEEN)]
@@ -120,22 +122,22 @@ def held_out(found: Diagnosis) -> Markup | None:
         )
     if fit.innovation_note:
         notes.append(tag("p", fit.innovation_note))
-    if found.remaining_words:
-        notes.append(tag("p", sentence(named(found, found.remaining_words))))
+    if diagnosis.remaining_words:
+        notes.append(tag("p", sentence(named(diagnosis, diagnosis.remaining_words))))
 
     return section(
         "Held-out errors", table(head, rows, numbers=1), tag("div", notes, class_="note")
     )
 
 
-def _innovation(found: Diagnosis, channel: str) -> str:
-    sides = (found.fit.innovation_before, found.fit.innovation_after)
-    said = [number((side or {}).get(channel), 2) for side in sides]
-    return NOTHING if said == [NOTHING, NOTHING] else " → ".join(said)
+def _innovation(diagnosis: Diagnosis, channel: str) -> str:
+    sides = (diagnosis.fit.innovation_before, diagnosis.fit.innovation_after)
+    values = [number((side or {}).get(channel), 2) for side in sides]
+    return NOTHING if values == [NOTHING, NOTHING] else " → ".join(values)
 
 
-def law(found: Diagnosis) -> Markup | None:
-    law = found.law
+def law(diagnosis: Diagnosis) -> Markup | None:
+    law = diagnosis.law
     if law is None:
         return None
 
@@ -155,9 +157,9 @@ def law(found: Diagnosis) -> Markup | None:
     )
 
 
-def named(found: Diagnosis, text: str) -> str:
+def named(diagnosis: Diagnosis, text: str) -> str:
     """Effects and channels in words instead of by their keys."""
-    for key in (*(h.effect for h in found.hypotheses), *found.fit.unit):
+    for key in (*(h.effect for h in diagnosis.hypotheses), *diagnosis.fit.unit):
         text = text.replace(key, name_of(key))
     return text
 

@@ -32,14 +32,14 @@ def write_truth(
     path: Path, settings: Settings, soil: Soil, acting: Sequence[Effect], run: Run, seed: int
 ) -> None:
     """PATH.truth.json with soil, effects and seed; PATH.truth.npz with the true arrays."""
-    said = {
+    truth = {
         "wheel": asdict(settings.wheel),
         "soil": asdict(soil),
         "effects": {effect.name: asdict(effect) for effect in acting},
         "seed": seed,
         "overloaded_samples": int(run.response.overloaded.sum()),
     }
-    path.with_suffix(".truth.json").write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+    path.with_suffix(".truth.json").write_text(json.dumps(truth, indent=2) + "\n", encoding="utf-8")
 
     sensed = {f"sensed_{name}": value for name, value in vars(run.response.sensed).items()}
     arrays = {**sensed, **vars(run.motion), **vars(run.response)}

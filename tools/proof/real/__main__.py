@@ -80,13 +80,13 @@ def _prove(proof: Proof, data: Path, folder: Path, place: str) -> None:
 
 def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
     print(
-        f"{proof.title}: {sum(a.met for a in finding.asked)} of {len(finding.asked)} as wanted, "
+        f"{proof.title}: {sum(a.met for a in finding.checks)} of {len(finding.checks)} as wanted, "
         f"{seconds:.0f} s"
     )
-    for asked in finding.asked:
+    for check in finding.checks:
         print(
-            f"  {'yes' if asked.met else 'NO '} {asked.question} wanted {asked.wanted}; "
-            f"found {asked.found}"
+            f"  {'yes' if check.met else 'NO '} {check.question} wanted {check.wanted}; "
+            f"found {check.found}"
         )
 
 

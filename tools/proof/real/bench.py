@@ -20,23 +20,23 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
-class Said:
+class DiagnosisRun:
     """What one diagnosis printed, and its JSON."""
 
     command: str
     text: str
-    found: dict[str, Any]
+    result: dict[str, Any]
     seconds: float
 
     @property
     def accepted(self) -> dict[str, dict[str, Any]]:
         """Accepted effects by name, most probable first."""
-        return {h["effect"]: h for h in self.found["hypotheses"] if h["accepted"]}
+        return {h["effect"]: h for h in self.result["hypotheses"] if h["accepted"]}
 
     def values(self, effect: str) -> dict[str, float]:
         """Parameters of an accepted effect; empty if it was not accepted."""
-        found = self.accepted.get(effect)
-        return {name: q["value"] for name, q in found["parameters"].items()} if found else {}
+        accepted = self.accepted.get(effect)
+        return {name: q["value"] for name, q in accepted["parameters"].items()} if accepted else {}
 
     @property
     def group(self) -> set[str]:
@@ -62,7 +62,7 @@ class Bench:
         self._gritd("import", importer, *paths, "-o", str(self.folder / name), *arguments)
         return self.folder / name
 
-    def diagnosed(self, recordings: Sequence[Path], configuration: Path, name: str) -> Said:
+    def diagnosis(self, recordings: Sequence[Path], configuration: Path, name: str) -> DiagnosisRun:
         """One diagnosis, in a process that is given these files alone. Raises CommandError."""
         self.step(f"diagnosing {name}")
         result = self.folder / f"{name}.json"
@@ -70,9 +70,9 @@ class Bench:
         given = [str(p.relative_to(self.folder)) for p in sorted(recordings)]
         given += ["--config", str(configuration.relative_to(self.folder))]
         outputs = ("--json", result.name, "--apply", f"{name}.yaml")
-        said = self._gritd("diagnose", *given, *outputs, "--jobs", "1")
+        printed = self._gritd("diagnose", *given, *outputs, "--jobs", "1")
         found = json.loads(result.read_text(encoding="utf-8"))
-        return Said(self.commands[-1], said.rstrip(), found, time.monotonic() - began)
+        return DiagnosisRun(self.commands[-1], printed.rstrip(), found, time.monotonic() - began)
 
     def _gritd(self, *arguments: str) -> str:
         """What the command printed. Raises CommandError with its one line."""

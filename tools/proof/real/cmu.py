@@ -10,9 +10,9 @@ import numpy as np
 import yaml
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.bench import Bench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
 
 DRIVEN = ("10", "12", "20", "40", "100")  # [mm/s] commanded rim speeds; the carriage has 10
 FIT, HELD = ("10", "20", "100"), ("12", "40")
@@ -35,13 +35,13 @@ PLATE, DEPTHS = (
 
 def _run(bench: Bench) -> Finding:
     smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
-    first = bench.diagnosed(
+    first = bench.diagnosis(
         list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth"
     )
 
     learnt = bench.folder / "cmu-learnt.yaml"
     learnt.write_text(
-        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.found),
+        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.result),
         encoding="utf-8",
     )
 
@@ -50,10 +50,10 @@ def _run(bench: Bench) -> Finding:
         / "grouser-table"
         for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
     )
-    second = bench.diagnosed(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
+    second = bench.diagnosis(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
 
     seen, unseen = (
-        _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.found) for f in (fit, held)
+        _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.result) for f in (fit, held)
     )
 
     rows = [
@@ -73,7 +73,7 @@ def _run(bench: Bench) -> Finding:
 
     return Finding(
         [first, second],
-        _asked(first, second, unseen, smooth / "penetration.csv"),
+        _checks(first, second, unseen, smooth / "penetration.csv"),
         Table(heads, rows),
         panels,
     )
@@ -160,22 +160,24 @@ def moduli(path: Path) -> tuple[float, float]:
     return float(n), float(np.exp(log_k))
 
 
-def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -> list[Asked]:
-    channels = dict.fromkeys(place["channel"] for place in second.found["location"])
-    group = listed(sorted(second.group)) or second.found["verdict"]
+def _checks(
+    first: DiagnosisRun, second: DiagnosisRun, unseen: dict[str, Array], pressed: Path
+) -> list[Check]:
+    channels = dict.fromkeys(place["channel"] for place in second.result["location"])
+    group = listed(sorted(second.group)) or second.result["verdict"]
     differ = "Do grip and sinking differ?"
     named = "Does it name grousers, or a group that holds them?"
 
-    asked = [
+    checks = [
         _of_modulus(first, pressed),
-        Asked(
+        Check(
             differ,
             "drawbar_pull, sinkage",
             listed(channels),
             set(CHANNELS) <= set(channels),
             REASON,
         ),
-        Asked(named, "grousers", group, "grousers" in second.group, REASON),
+        Check(named, "grousers", group, "grousers" in second.group, REASON),
         _of_frame(first, second),
     ]
 
@@ -184,8 +186,8 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
 
         worse, better = rms(before - measured), rms(after - measured)
         question = f"Is the {label} of unseen states predicted better?"
-        asked.append(
-            Asked(
+        checks.append(
+            Check(
                 question,
                 "error halved",
                 f"{worse:.2f} before, {better:.2f} after",
@@ -194,13 +196,13 @@ def _asked(first: Said, second: Said, unseen: dict[str, Array], pressed: Path) -
             )
         )
 
-    return asked
+    return checks
 
 
-def _of_modulus(first: Said, pressed: Path) -> Asked:
-    after, (n, modulus) = first.found["soil"]["after"], moduli(pressed)
+def _of_modulus(first: DiagnosisRun, pressed: Path) -> Check:
+    after, (n, modulus) = first.result["soil"]["after"], moduli(pressed)
     plate, wheel = modulus * DEPTH**n, after["K"]["value"] * DEPTH ** after["n"]["value"]
-    return Asked(
+    return Check(
         f"Is the pressure of the soil learnt, {DEPTH * 1e3:.0f} mm deep, that under the plates?",
         f"{plate / 1e3:.0f} kPa (n {n:.2f}), within a factor of {FACTOR:g}",
         f"{wheel / 1e3:.0f} kPa (n {after['n']['value']:.2f})",
@@ -209,10 +211,10 @@ def _of_modulus(first: Said, pressed: Path) -> Asked:
     )
 
 
-def _of_frame(*said: Said) -> Asked:
-    values = [v["compliance"] for s in said if (v := s.values("frame_compliance"))]
+def _of_frame(*diagnosis: DiagnosisRun) -> Check:
+    values = [v["compliance"] for s in diagnosis if (v := s.values("frame_compliance"))]
     found = f"{1e3 * max(values):.3f} mm/N" if values else "nothing said"
-    return Asked(
+    return Check(
         "Is nothing said of the frame's yielding that the rigid stop denies?",
         f"at most {2e3 * YIELDS:.3f} mm/N, twice the stop's",
         found,

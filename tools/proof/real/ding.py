@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.bench import Bench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
 
 COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
 CHANNELS = {
@@ -25,7 +25,7 @@ def _run(bench: Bench) -> Finding:
     folder = bench.imported("table", "ding", files=["ding"])
     recordings = sorted(folder.glob("*.mcap"))
     configuration = folder / "ding2011_smooth.yaml"
-    said = bench.diagnosed(recordings, configuration, "ding-points")
+    diagnosis = bench.diagnosis(recordings, configuration, "ding-points")
 
     judge = Judge(recordings, configuration)
     published = bench.imported("table", "published", "--soil-strength", "table", files=["ding"])
@@ -33,8 +33,8 @@ def _run(bench: Bench) -> Finding:
     models = (
         [r.measured for r in judge.rig.runs],
         Judge(recordings, published / configuration.name).predicted(None),
-        judge.predicted(said.found, "before"),
-        judge.predicted(said.found),
+        judge.predicted(diagnosis.result, "before"),
+        judge.predicted(diagnosis.result),
     )
 
     panels, columns = [], []
@@ -45,7 +45,7 @@ def _run(bench: Bench) -> Finding:
         panels.append(Panel(label, means[[0, 1, 3, 4]], "slip [–]", label, LABELS, points=True))
         columns.append(means)
 
-    return Finding([said], _asked(said), _table(columns), panels)
+    return Finding([diagnosis], _checks(diagnosis), _table(columns), panels)
 
 
 def _table(columns: list[Array]) -> Table:
@@ -69,8 +69,8 @@ def _four(values: Array) -> str:
     return " / ".join(f"{v:.1f}" for v in values)
 
 
-def _asked(said: Said) -> list[Asked]:
-    after = said.found["soil"]["after"]
+def _checks(diagnosis: DiagnosisRun) -> list[Check]:
+    after = diagnosis.result["soil"]["after"]
     c, tan_phi = (after[n] for n in ("c", "tan_phi"))
     phi = np.degrees(np.arctan(tan_phi["value"]))
     sigma = np.degrees(tan_phi["sigma"] / (1.0 + tan_phi["value"] ** 2))
@@ -78,18 +78,18 @@ def _asked(said: Said) -> list[Asked]:
     cohesion, angle = f"{c['value']:.0f} ± {c['sigma']:.0f} Pa", f"{phi:.1f} ± {sigma:.1f}°"
     near = abs(c["value"] - COHESION) <= SIGMAS * c["sigma"], abs(phi - FRICTION) <= SIGMAS * sigma
     grows = "Does it find that sinkage grows with slip, as that paper does?"
-    found = listed(said.accepted) or said.found["verdict"]
+    found = listed(diagnosis.accepted) or diagnosis.result["verdict"]
 
     return [
-        Asked("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
-        Asked(
+        Check("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
+        Check(
             "Is the measured friction angle within two sigma?",
             f"{FRICTION:g}°",
             angle,
             near[1],
             REASON,
         ),
-        Asked(grows, "slip_sinkage", found, "slip_sinkage" in said.group),
+        Check(grows, "slip_sinkage", found, "slip_sinkage" in diagnosis.group),
     ]
 
 

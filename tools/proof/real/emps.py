@@ -13,8 +13,8 @@ from scipy.signal import butter, sosfiltfilt
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording import salvage
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, Said
-from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.bench import Bench, DiagnosisRun
+from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
 
 PUBLISHED = {"M": (95.11, "kg"), "Fv": (203.5, "N·s/m"), "Fc": (20.39, "N")}
 WITHIN = 0.03
@@ -26,13 +26,13 @@ SPAN = (2.0, 9.0)  # [s] that are drawn
 
 def _run(bench: Bench) -> Finding:
     folder = bench.imported("emps", "emps", files=["emps"])
-    said = bench.diagnosed([folder / "data-emps.mcap"], folder / "emps.yaml", "emps-data")
+    diagnosis = bench.diagnosis([folder / "data-emps.mcap"], folder / "emps.yaml", "emps-data")
     fitted, unseen = (_regression(folder / f"data-emps{name}.mcap") for name in ("", "-pulses"))
 
     bare = np.append(
         np.linalg.lstsq(fitted.columns[:, :2], fitted.force, rcond=None)[0], (0.0, 0.0)
     )
-    found = stated(said)
+    found = stated(diagnosis)
 
     rows = [
         (
@@ -70,8 +70,8 @@ def _run(bench: Bench) -> Finding:
         "DATA_EMPS_PULSES, which the diagnosis did not see", curves, "time [s]", "force [N]", labels
     )
 
-    asked = _asked(said, found, unseen.error(bare), unseen.error(found))
-    return Finding([said], asked, Table(heads, rows), [panel])
+    checks = _checks(diagnosis, found, unseen.error(bare), unseen.error(found))
+    return Finding([diagnosis], checks, Table(heads, rows), [panel])
 
 
 @dataclass(frozen=True)
@@ -121,39 +121,41 @@ def _low_passed(values: Array, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(butter(4, cutoff, output="sos", fs=RATE), values, axis=0))
 
 
-def stated(said: Said) -> Array:
+def stated(diagnosis: DiagnosisRun) -> Array:
     """Mass, viscous friction, Coulomb friction and offset (4,) that the diagnosis states; 0 where
     it states none.
     """
     gain = config.loads(
-        said.found["redo"]["configuration"], "emps.yaml"
+        diagnosis.result["redo"]["configuration"], "emps.yaml"
     ).settings.drive.torque_constant.value
-    constants = said.found["nuisance"]
-    asymmetry = said.values("asymmetric_friction").get("difference", 0.0)
-    offset = gain * said.values("current_offset").get("offset", 0.0)
-    coulomb = said.values("coulomb_friction").get("loss", 0.0)
+    constants = diagnosis.result["nuisance"]
+    asymmetry = diagnosis.values("asymmetric_friction").get("difference", 0.0)
+    offset = gain * diagnosis.values("current_offset").get("offset", 0.0)
+    coulomb = diagnosis.values("coulomb_friction").get("loss", 0.0)
     return np.array(
         [constants["inertia"]["value"], constants["damping"]["value"], coulomb, asymmetry + offset]
     )
 
 
-def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]:
-    first = said.found["hypotheses"][0]["effect"] if said.found["hypotheses"] else "nothing"
-    group = listed(sorted(said.group)) or "nothing"
-    remains = said.found["remaining_words"]
+def _checks(diagnosis: DiagnosisRun, found: Array, before: float, after: float) -> list[Check]:
+    first = (
+        diagnosis.result["hypotheses"][0]["effect"] if diagnosis.result["hypotheses"] else "nothing"
+    )
+    group = listed(sorted(diagnosis.group)) or "nothing"
+    remains = diagnosis.result["remaining_words"]
 
-    asked = [
-        Asked(
+    checks = [
+        Check(
             "Which friction does it name first?",
             "coulomb_friction",
             first,
             first == "coulomb_friction",
         ),
-        Asked(
+        Check(
             "Does it name the asymmetry, or a group that holds it?",
             "asymmetric_friction",
             group,
-            "asymmetric_friction" in said.group,
+            "asymmetric_friction" in diagnosis.group,
             "The drive never stands in this log, so an offset of the voltage is the same thing.",
         ),
     ]
@@ -161,19 +163,19 @@ def _asked(said: Said, found: Array, before: float, after: float) -> list[Asked]
     for (name, (value, unit)), estimate in zip(PUBLISHED.items(), found.tolist(), strict=False):
         off = estimate / value - 1.0
         shown = f"{estimate:.2f} {unit} ({off:+.1%})"
-        asked.append(
-            Asked(f"{name}?", f"{value} {unit} ± {WITHIN:.0%}", shown, abs(off) <= WITHIN, REASON)
+        checks.append(
+            Check(f"{name}?", f"{value} {unit} ± {WITHIN:.0%}", shown, abs(off) <= WITHIN, REASON)
         )
 
-    asked.append(
-        Asked("Does it say that something remains?", "yes", remains, "something remains" in remains)
+    checks.append(
+        Check("Does it say that something remains?", "yes", remains, "something remains" in remains)
     )
 
     question = "Is the force of the unseen log predicted better?"
     errors = f"{before:.2%} before, {after:.2%} after"
-    asked.append(Asked(question, "error more than halved", errors, after < 0.5 * before))
+    checks.append(Check(question, "error more than halved", errors, after < 0.5 * before))
 
-    return asked
+    return checks
 
 
 REASON = """

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.bench import Bench, DiagnosisRun
 from gritd.tools.proof.real.judge import Judge, rms
-from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table, listed
+from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
 
 BEGIN = (
     "--begin",
@@ -67,14 +67,14 @@ class Hidden:
     read: str
     true: str
     unit: str
-    ask: Callable[[Said, Sequence[Held]], list[Asked]]
+    ask: Callable[[DiagnosisRun, Sequence[Held]], list[Check]]
 
 
 def _run(hidden: Hidden, bench: Bench) -> Finding:
     seen = bench.imported("mgst", hidden.name, *hidden.arguments, *BEGIN, files=["mgst"])
     whole = bench.imported("mgst", "judge", *BEGIN, files=["mgst"])
     trials = sorted(seen.glob("*.mcap"))
-    said = bench.diagnosed(trials, seen / "mgst.yaml", f"{hidden.name}-all")
+    diagnosis = bench.diagnosis(trials, seen / "mgst.yaml", f"{hidden.name}-all")
 
     held = sorted(
         (h for fold in FOLDS for h in _held(hidden, bench, trials, fold, whole)),
@@ -105,7 +105,7 @@ def _run(hidden: Hidden, bench: Bench) -> Finding:
         for h in (held[n] for n in DRAWN)
     ]
 
-    return Finding([said], hidden.ask(said, held), Table(heads, rows), panels)
+    return Finding([diagnosis], hidden.ask(diagnosis, held), Table(heads, rows), panels)
 
 
 def _held(
@@ -114,7 +114,7 @@ def _held(
     configuration = trials[0].parent / "mgst.yaml"
     others = [t for n, t in enumerate(trials) if n not in fold]
 
-    said = bench.diagnosed(
+    diagnosis = bench.diagnosis(
         others, configuration, f"{hidden.name}-without-{'-'.join(str(n + 1) for n in fold)}"
     )
 
@@ -124,7 +124,7 @@ def _held(
         Judge([whole / t.name for t in here], whole / "mgst.yaml"),
     )
 
-    freed = reads.freed(said.found, hidden.read)
+    freed = reads.freed(diagnosis.result, hidden.read)
 
     return [
         Held(
@@ -138,9 +138,9 @@ def _held(
     ]
 
 
-def _differs(said: Said, channel: str) -> Asked:
-    channels = dict.fromkeys(place["channel"] for place in said.found["location"])
-    return Asked(
+def _differs(diagnosis: DiagnosisRun, channel: str) -> Check:
+    channels = dict.fromkeys(place["channel"] for place in diagnosis.result["location"])
+    return Check(
         f"Is {channel} among the channels that differ?",
         channel,
         listed(channels),
@@ -148,24 +148,24 @@ def _differs(said: Said, channel: str) -> Asked:
     )
 
 
-def _names(said: Said, what: str, wanted: Sequence[str], reason: str) -> Asked:
-    found = listed(said.accepted) or said.found["verdict"]
+def _names(diagnosis: DiagnosisRun, what: str, wanted: Sequence[str], reason: str) -> Check:
+    found = listed(diagnosis.accepted) or diagnosis.result["verdict"]
     question = f"Does it name {what}, or a group that holds one?"
-    return Asked(
-        question, f"one of {listed(wanted)}", found, bool(said.group & set(wanted)), reason
+    return Check(
+        question, f"one of {listed(wanted)}", found, bool(diagnosis.group & set(wanted)), reason
     )
 
 
-def _nearer(said: Said, held: Sequence[Held], unit: str) -> Asked:
+def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str) -> Check:
     before, after = (rms(np.array(e)) for e in zip(*(h.errors for h in held), strict=True))
     better = sum(h.errors[1] < h.errors[0] for h in held)
-    return Asked(
+    return Check(
         "Is the freed channel nearer to the concealed one, on trials that were held out?",
         f"in all {len(held)}, error more than halved",
         f"in {better}; error {before:.2f} {unit} before, {after:.2f} after",
         better == len(held) and after < 0.5 * before,
         ""
-        if said.accepted
+        if diagnosis.accepted
         else "No effect was accepted, so only the strain of the channel's calibration frees it.",
     )
 
@@ -191,21 +191,23 @@ LOST: Mapping[
 }
 
 
-def _of_drivetrain(said: Said, held: Sequence[Held]) -> list[Asked]:
-    loss = sum(LOST[n](said.values(n)) for n in said.accepted if n in LOST)
+def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
+    loss = sum(LOST[n](diagnosis.values(n)) for n in diagnosis.accepted if n in LOST)
     found = f"{loss:.2f} N·m" if loss else "none"
 
     return [
-        _differs(said, "torque"),
-        _names(said, "a torque loss that does not depend on speed", STEADY_LOSSES, REASON_LOSS),
-        Asked(
+        _differs(diagnosis, "torque"),
+        _names(
+            diagnosis, "a torque loss that does not depend on speed", STEADY_LOSSES, REASON_LOSS
+        ),
+        Check(
             "How large is it?",
             f"{LOSS} ± {LOSS_ABOUT} N·m",
             found,
             abs(loss - LOSS) <= LOSS_ABOUT,
             REASON_LOSS,
         ),
-        _nearer(said, held, "N·m"),
+        _nearer(diagnosis, held, "N·m"),
     ]
 
 
@@ -247,21 +249,21 @@ DRIVETRAIN = Proof(
 # --- the side wall ---
 
 
-def _of_wall(said: Said, held: Sequence[Held]) -> list[Asked]:
+def _of_wall(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
     taken = float(np.mean([np.nanmean(h.freed - h.read) for h in held]))
     question = "How much drawbar pull does it say is taken, on trials that were held out?"
 
     return [
-        _differs(said, "drawbar_pull"),
-        _names(said, "the wall's drag", DRAGS, REASON_WALL),
-        Asked(
+        _differs(diagnosis, "drawbar_pull"),
+        _names(diagnosis, "the wall's drag", DRAGS, REASON_WALL),
+        Check(
             question,
             f"{WALL:g} ± {WALL_ABOUT:g} N",
             f"{taken:.1f} N",
             abs(taken - WALL) <= WALL_ABOUT,
             REASON_WALL,
         ),
-        _nearer(said, held, "N"),
+        _nearer(diagnosis, held, "N"),
     ]
 
 

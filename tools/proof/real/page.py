@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from gritd.tools.proof.real.proof import Asked, Finding, Proof, Table
+from gritd.tools.proof.real.proof import Check, Finding, Proof, Table
 
 BEGIN = "<!-- {name}: from here on written by `make proof` -->\n"
 END = "<!-- {name}: to here -->\n"
@@ -35,10 +35,12 @@ def _lines(
     yield f"**Seen.** {flowing(proof.saw)}"
     yield ""
 
-    yield "**Judged.** " + _verdict(finding.asked)
+    yield "**Judged.** " + _verdict(finding.checks)
     yield ""
 
-    yield from _table(Table(("", "asked", "wanted", "found"), [_row(a) for a in finding.asked]))
+    yield from _table(
+        Table(("", "asked", "wanted", "found"), [_row(check) for check in finding.checks])
+    )
     yield ""
     yield from _table(finding.table)
     yield ""
@@ -46,29 +48,29 @@ def _lines(
     yield f"![{proof.title}](proof-{proof.name}.png)"
     yield ""
 
-    yield from _missed([a for a in finding.asked if not a.met])
+    yield from _missed([check for check in finding.checks if not check.met])
 
     yield f"**Said**, unedited, in {seconds:.0f} s for all commands of this proof:"
     yield ""
 
-    for said in finding.said:
+    for diagnosis in finding.diagnoses:
         yield "```"
-        yield f"$ {said.command}"
-        yield said.text
+        yield f"$ {diagnosis.command}"
+        yield diagnosis.text
         yield "```"
         yield ""
 
-    others = [c for c in commands if c not in {s.command for s in finding.said}]
+    others = [c for c in commands if c not in {s.command for s in finding.diagnoses}]
     yield "The other commands:"
     yield ""
     yield from ("```sh", *others, "```")
     yield ""
 
 
-def _missed(asked: Sequence[Asked]) -> Iterator[str]:
+def _missed(checks: Sequence[Check]) -> Iterator[str]:
     """Each reason once, after the questions it stands for."""
     reasons: dict[str, list[str]] = {}
-    for a in asked:
+    for a in checks:
         reasons.setdefault(flowing(a.reason) or "The reason was not found.", []).append(
             f"*{a.question}*"
         )
@@ -84,12 +86,12 @@ def flowing(prose: str) -> str:
     return " ".join(prose.split())
 
 
-def _verdict(asked: Sequence[Asked]) -> str:
-    return f"{sum(a.met for a in asked)} of {len(asked)} as wanted."
+def _verdict(checks: Sequence[Check]) -> str:
+    return f"{sum(check.met for check in checks)} of {len(checks)} as wanted."
 
 
-def _row(asked: Asked) -> tuple[str, str, str, str]:
-    return "yes" if asked.met else "**no**", asked.question, asked.wanted, asked.found
+def _row(check: Check) -> tuple[str, str, str, str]:
+    return "yes" if check.met else "**no**", check.question, check.wanted, check.found
 
 
 def _table(table: Table) -> Iterator[str]:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.proof.real.bench import Bench, Said
+from gritd.tools.proof.real.bench import Bench, DiagnosisRun
 
 
 @dataclass(frozen=True)
-class Asked:
+class Check:
     """One question of the judge. `reason`: why it was missed, as far as it was found out; shown
     only if it was.
     """
@@ -46,8 +46,8 @@ class Panel:
 
 @dataclass(frozen=True)
 class Finding:
-    said: Sequence[Said]  # quoted unedited
-    asked: Sequence[Asked]
+    diagnoses: Sequence[DiagnosisRun]  # quoted unedited
+    checks: Sequence[Check]
     table: Table
     panels: Sequence[Panel]
 

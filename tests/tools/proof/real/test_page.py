@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from gritd.tools.proof.real.__main__ import main
-from gritd.tools.proof.real.bench import Said
+from gritd.tools.proof.real.bench import DiagnosisRun
 from gritd.tools.proof.real.cmu import moduli, with_soil
 from gritd.tools.proof.real.figure import draw
 from gritd.tools.proof.real.page import page, section
-from gritd.tools.proof.real.proof import Asked, Finding, Panel, Proof, Table
+from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table
 
 LABELS = ("concealed", "as read", "freed")
 
@@ -26,17 +26,19 @@ def hypothesis(effect: str, accepted: bool, *alike: str) -> dict[str, object]:
     }
 
 
-def said(*hypotheses: dict[str, object]) -> Said:
-    return Said("gritd diagnose a.mcap", "verdict: unlisted", {"hypotheses": list(hypotheses)}, 1.0)
+def diagnosis(*hypotheses: dict[str, object]) -> DiagnosisRun:
+    return DiagnosisRun(
+        "gritd diagnose a.mcap", "verdict: unlisted", {"hypotheses": list(hypotheses)}, 1.0
+    )
 
 
 def finding() -> Finding:
-    asked = [
-        Asked("Is it found?", "1.8", "none", False, "A reason\n  over two lines."),
-        Asked("How large?", "1.8", "none", False, "A reason over two lines."),
-        Asked("Is it said?", "yes", "yes", True, "not shown"),
+    checks = [
+        Check("Is it found?", "1.8", "none", False, "A reason\n  over two lines."),
+        Check("How large?", "1.8", "none", False, "A reason over two lines."),
+        Check("Is it said?", "yes", "yes", True, "not shown"),
     ]
-    return Finding([said()], asked, Table(("a", "b"), [("1|2", "3")]), [])
+    return Finding([diagnosis()], checks, Table(("a", "b"), [("1|2", "3")]), [])
 
 
 def proof() -> Proof:
@@ -63,7 +65,7 @@ def test_a_section_is_replaced_in_its_place_and_the_rest_is_left() -> None:
 
 
 def test_a_group_is_what_was_accepted_and_what_cannot_be_told_from_it() -> None:
-    one = said(
+    one = diagnosis(
         hypothesis("coulomb_friction", True, "current_offset"),
         hypothesis("grousers", False, "bulldozing"),
     )

@@ -15,17 +15,17 @@ from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.signals import drive_series
 from gritd.tools.proof.real import cmu, ding, emps, mgst
 from gritd.tools.proof.real.bench import Bench
-from gritd.tools.proof.real.proof import Asked, Finding, Proof
+from gritd.tools.proof.real.proof import Check, Finding, Proof
 from tests.real_recordings import REAL, needs
 from tests.tools.diagnose.rig.drives import fitted
 
 
-def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Asked]]:
+def proved(proof: Proof, folder: Path) -> tuple[Finding, dict[str, Check]]:
     """What a proof found, and the judge's questions by how they begin."""
     finding = proof.run(Bench(REAL, folder))
-    assert finding.said and all(s.text.startswith("verdict: ") for s in finding.said)
+    assert finding.diagnoses and all(s.text.startswith("verdict: ") for s in finding.diagnoses)
     assert finding.table.rows and finding.panels
-    return finding, {a.question.split(",")[0].split("?")[0]: a for a in finding.asked}
+    return finding, {a.question.split(",")[0].split("?")[0]: a for a in finding.checks}
 
 
 @needs("emps")
@@ -44,7 +44,7 @@ def test_the_adapter_of_a_drive_recovers_the_published_parameters(tmp_path: Path
 @needs("emps")
 @pytest.mark.slow
 def test_emps_names_the_friction_and_recovers_the_published_parameters(tmp_path: Path) -> None:
-    _, asked = proved(emps.FRICTION, tmp_path)
+    _, checks = proved(emps.FRICTION, tmp_path)
     for question in (
         "Which friction does it name first",
         "M",
@@ -52,15 +52,15 @@ def test_emps_names_the_friction_and_recovers_the_published_parameters(tmp_path:
         "Fc",
         "Does it say that something remains",
     ):
-        assert asked[question].met, f"{question}: {asked[question].found}"
-    assert asked["Is the force of the unseen log predicted better"].met
+        assert checks[question].met, f"{question}: {checks[question].found}"
+    assert checks["Is the force of the unseen log predicted better"].met
 
 
 @needs("ding")
 @pytest.mark.slow
 def test_ding_finds_that_sinkage_grows_with_slip(tmp_path: Path) -> None:
-    finding, asked = proved(ding.STRENGTH, tmp_path)
-    assert asked["Does it find that sinkage grows with slip"].met
+    finding, checks = proved(ding.STRENGTH, tmp_path)
+    assert checks["Does it find that sinkage grows with slip"].met
     _, _, fitted, found = map(float, finding.table.rows[-1][-1].split(" / "))
     assert found < 0.3 * fitted, "error of the sinkage with the effect, and without"
 
@@ -68,24 +68,24 @@ def test_ding_finds_that_sinkage_grows_with_slip(tmp_path: Path) -> None:
 @needs("cmu")
 @pytest.mark.slow
 def test_cmu_predicts_the_pull_of_unseen_states_of_the_other_wheel(tmp_path: Path) -> None:
-    finding, asked = proved(cmu.GROUSERS, tmp_path)
-    smooth = finding.said[0]
+    finding, checks = proved(cmu.GROUSERS, tmp_path)
+    smooth = finding.diagnoses[0]
     assert "slip_sinkage" in smooth.group, "the smooth wheel sinks deeper with slip"
-    assert asked["Does it name grousers"].met
-    assert asked["Is nothing said of the frame's yielding that the rigid stop denies"].met
-    assert asked["Is the sinkage [mm] of unseen states predicted better"].met
-    assert asked["Is the drawbar pull [N] of unseen states predicted better"].met
+    assert checks["Does it name grousers"].met
+    assert checks["Is nothing said of the frame's yielding that the rigid stop denies"].met
+    assert checks["Is the sinkage [mm] of unseen states predicted better"].met
+    assert checks["Is the drawbar pull [N] of unseen states predicted better"].met
 
 
 @needs("mgst")
 @pytest.mark.slow
 def test_mgst_places_the_misfit_of_a_concealed_drivetrain_in_the_torque(tmp_path: Path) -> None:
-    _, asked = proved(mgst.DRIVETRAIN, tmp_path)
-    assert asked["Is torque among the channels that differ"].met
+    _, checks = proved(mgst.DRIVETRAIN, tmp_path)
+    assert checks["Is torque among the channels that differ"].met
 
 
 @needs("mgst")
 @pytest.mark.slow
 def test_mgst_places_the_misfit_of_a_concealed_wall_in_the_drawbar_pull(tmp_path: Path) -> None:
-    _, asked = proved(mgst.SIDE_WALL, tmp_path)
-    assert asked["Is drawbar_pull among the channels that differ"].met
+    _, checks = proved(mgst.SIDE_WALL, tmp_path)
+    assert checks["Is drawbar_pull among the channels that differ"].met

@@ -1,0 +1,71 @@
+"""Imports point one way: from tools to the estimator, and within tools from the commands to what
+all of them share. A room that imports one above it, or beside it, would make a circle.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+# the lowest first; a room imports itself and those of lower rows
+ROOMS = (
+    ("config",),
+    ("estimator",),
+    ("drivers",),
+    ("tools.cli",),
+    ("tools.testbed", "tools.service", "tools.diagnose", "tools.importers"),
+    ("tools.bench", "tools.report"),
+    ("tools.proof",),
+    ("tools.commands",),
+    ("tools.main", "tools.dev"),
+)
+HEIGHT = {room: height for height, row in enumerate(ROOMS) for room in row}
+FILES = sorted(
+    path.relative_to(ROOT)
+    for part in ("config", "estimator", "drivers", "tools")
+    for path in (ROOT / part).rglob("*.py")
+)
+
+
+def room_of(module: str) -> str:
+    """The room of a module's name without `gritd.`."""
+    parts = module.split(".")
+    return ".".join(parts[: 2 if parts[0] == "tools" else 1])
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Modules of gritd that a file imports, without `gritd.`; also those it names as text, as the
+    table of commands does.
+    """
+    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            names = [node.value]
+        else:
+            continue
+        yield from (name.removeprefix("gritd.") for name in names if name.startswith("gritd."))
+
+
+def test_every_file_has_a_room() -> None:
+    rooms = {room_of(".".join(path.with_suffix("").parts)) for path in FILES}
+    assert rooms - {"tools.__init__"} == set(HEIGHT)
+
+
+def test_imports_point_down() -> None:
+    wrong = []
+    for path in FILES:
+        here = room_of(".".join(path.with_suffix("").parts))
+        others = [(room_of(module), module) for module in imported(path)]
+        wrong += [
+            f"{path} imports {module}"
+            for room, module in others
+            if room in HEIGHT and room != here and HEIGHT[room] >= HEIGHT[here]
+        ]
+
+    assert wrong == []

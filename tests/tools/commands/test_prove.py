@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from shutil import copytree, rmtree
 
 import pytest
 
@@ -31,11 +32,24 @@ SMALL = ["--cases", "2", "--seed", "3", "--jobs", "1", "--strata", "none"]
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two cases, done."""
-    output = tmp_path_factory.mktemp("proof") / "batch"
-    assert prove.main([*SMALL, "--output", str(output)], STUB) == 0
+def sealed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two cases, drawn and sealed: copied by the tests that go on from there."""
+    output = tmp_path_factory.mktemp("sealed") / "batch"
+    assert prove.main([*SMALL, "--seal-only", "--output", str(output)], STUB) == 0
     return output
+
+
+@pytest.fixture(scope="module")
+def finished(sealed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The two cases, done."""
+    output = copytree(sealed, tmp_path_factory.mktemp("finished") / "batch")
+    assert resumed(output) == 0
+    return output
+
+
+def resumed(output: Path, *options: str, diagnose: tuple[str, ...] = STUB) -> int:
+    """The exit code of `gritd prove --resume`."""
+    return prove.main(["--resume", "--jobs", "1", "--output", str(output), *options], diagnose)
 
 
 def test_the_diagnosis_sees_recordings_and_configuration_only(finished: Path) -> None:
@@ -94,37 +108,44 @@ def test_a_finished_batch_resumes_to_the_same_score(
     assert (finished / "score.json").read_text(encoding="utf-8") == before
 
 
-def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(tmp_path: Path) -> None:
+def test_a_batch_that_was_stopped_goes_on_with_the_same_cases(sealed: Path, tmp_path: Path) -> None:
     """Stopped after one case was sealed but not diagnosed, and before the other was drawn."""
-    begun = batch.started(tmp_path, 2, ("none",), 3)
-    first, second = begun.specs(keep=True, diagnose=STUB)
-    sealed = trial.prepare(first)
-    assert not first.done and not second.folder.exists()
-    assert prove.main(["--resume", "--keep", "--jobs", "1", "--output", str(tmp_path)], STUB) == 0
+    output = copytree(sealed, tmp_path / "batch")
+    first, second = batch.resumed(output).specs(keep=True, diagnose=STUB)
+    seal, drawn = first.seal.read_text(encoding="utf-8"), answers(second)
+    rmtree(second.folder)
+    second.answers.unlink()
+
+    assert resumed(output, "--keep") == 0
     assert first.done and second.done
-    assert first.seal.read_text(encoding="utf-8").strip() == sealed
+    assert first.seal.read_text(encoding="utf-8") == seal
     assert list(first.folder.glob("given/*.mcap"))
+    again = answers(second)
+    assert {name: again[name] for name in DRAWN} == {name: drawn[name] for name in DRAWN}
 
 
-def test_cases_are_sealed_now_and_diagnosed_later(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    output = tmp_path / "batch"
-    assert prove.main([*SMALL, "--seal-only", "--output", str(output)], STUB) == 0
-    sealed = (output / "seals.txt").read_text(encoding="utf-8")
-    assert len(sealed.splitlines()) == 2 and not list(output.glob("cases/*/outcome.json"))
-    assert prove.main(["--resume", "--jobs", "1", "--output", str(output)], STUB) == 0
-    assert (output / "seals.txt").read_text(encoding="utf-8") == sealed
-    assert len(list(output.glob("cases/*/outcome.json"))) == 2
+def answers(spec: trial.Spec) -> dict[str, object]:
+    """The sealed answers of a case."""
+    sealed: dict[str, object] = json.loads(spec.answers.read_text(encoding="utf-8"))["answers"]
+    return sealed
 
 
-def test_a_batch_that_is_stopped_leaves_nothing_running(tmp_path: Path) -> None:
+def test_cases_are_sealed_now_and_diagnosed_later(sealed: Path, finished: Path) -> None:
+    before = (sealed / "seals.txt").read_text(encoding="utf-8")
+    assert len(before.splitlines()) == 2 and not list(sealed.glob("cases/*/outcome.json"))
+
+    assert (finished / "seals.txt").read_text(encoding="utf-8") == before
+    assert len(list(finished.glob("cases/*/outcome.json"))) == 2
+
+
+def test_a_batch_that_is_stopped_leaves_nothing_running(sealed: Path, tmp_path: Path) -> None:
     """SIGTERM while a diagnosis runs that would never end."""
     pid = tmp_path / "pid"
     endless = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
     code = "import sys; from gritd.tools.commands import prove; "
     code += f"prove.main(sys.argv[1:], (sys.executable, '-c', {endless!r}))"
-    arguments = [*SMALL, "--output", str(tmp_path / "batch")]
+    output = copytree(sealed, tmp_path / "batch")
+    arguments = ["--resume", "--jobs", "1", "--output", str(output)]
 
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], cwd=ROOT, stdout=subprocess.DEVNULL
@@ -155,22 +176,11 @@ def test_a_changed_answer_is_noticed(finished: Path) -> None:
 
 
 def test_a_diagnosis_that_fails_counts_as_failed(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    sealed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     crash = (sys.executable, "-c", "import sys; sys.exit('gritd: cannot')")
-    arguments = [
-        "--cases",
-        "1",
-        "--seed",
-        "3",
-        "--jobs",
-        "1",
-        "--strata",
-        "none",
-        "--output",
-        str(tmp_path / "b"),
-    ]
-    assert prove.main(arguments, crash) == 1
+    output = copytree(sealed, tmp_path / "batch")
+    assert resumed(output, diagnose=crash) == 1
 
     out = capsys.readouterr().out
     assert "none → (failed)" in out and "gritd: cannot" in out

@@ -155,7 +155,7 @@ def _listed(times: Array, names: Sequence[str]) -> str:
 
 
 def headline(estimates: Sequence[Estimate], plant: PlantKind, ticks: Rows) -> str:
-    """The run in one line, for the figure."""
+    """The run in one line, for the figure. ticks: /tick (n,)."""
     seconds = (ticks["stamp"][-1] - ticks["stamp"][0]) / NS
     errors = ", ".join(
         f"{SHOWN[f.name][0]} {f.relative:+.1%} ({f.in_sigmas:+.1f} σ)" for f in estimates

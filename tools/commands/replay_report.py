@@ -16,7 +16,9 @@ SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
 
 
 def report(path: Path, rows: Rows, each: str) -> str:
-    """`each` says what a row is, "ticks" or "windows". What the rows lack is left out."""
+    """rows: fields of /tick (n,). `each` says what a row is, "ticks" or "windows". What the rows
+    lack is left out.
+    """
     last = {name: rows[name][-1] for name in rows.dtype.names or ()}
     seconds = (int(last["evaluated"]) - int(rows["evaluated"][0])) * 1e-9
 

@@ -143,8 +143,8 @@ def closed_form_differences(seed: int) -> dict[str, Array]:
 def triangular_contact(
     theta_1: Array, slip: Array, f: Array, sigma_m: Array, c: Array, tan_phi: Array
 ) -> original.Contact:
-    """The stresses of the linear model at quadrature nodes: triangular σ, and τ with the exponent
-    f(θ₁ − θ).
+    """The stresses [Pa] of the linear model at quadrature nodes: triangular σ, and τ with the
+    exponent f(θ₁ − θ). All arguments (n,): angles [rad], σₘ and c [Pa].
     """
     any_soil = Soil(0.0, 0.0, 1.0, 1.0, 1.0)
     nodes = contact(WHEEL, any_soil, theta_1, slip, order=48)
@@ -178,7 +178,7 @@ def figure_3() -> Lines:
 
 
 def exponents(slip: float, theta_1: float = np.pi / 4) -> tuple[Array, Array]:
-    """j/k and f(θ₁ − θ) at θ/θ₁ = 0, 0.01 … 1."""
+    """j/k and f(θ₁ − θ) at θ/θ₁ = 0, 0.01 … 1, each (101,); θ₁ [rad]."""
     k = float(DRY_SAND.shear_modulus)
     points = arc(theta_1, theta_1 * np.linspace(0.0, 1.0, 101))
     exact = shear_displacement(WHEEL, slip, points) / k
@@ -242,7 +242,7 @@ def simulations(count: int, seed: int) -> Lines:
 
 
 def draw(count: int, seed: int) -> tuple[Soil, Array, Array, Array]:
-    """Soils, slip, θ₁ [rad] and load [N], uniform in RANGES."""
+    """Soils, slip, θ₁ [rad] and load [N], uniform in RANGES; all arrays (count,)."""
     rng = np.random.default_rng(seed)
     value = {name: rng.uniform(low, high, count) for name, (low, high) in RANGES.items()}
     modulus = value["k_c"] / WHEEL.width + value["k_phi"]
@@ -261,7 +261,7 @@ class Row(NamedTuple):
 
 def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[Row]:
     """Closed forms with σₘ from W by (21), and with σₘ of (3) at θₘ, against the original's DP and
-    T.
+    T. θ₁ [rad] and slip (n,).
     """
     exact = original.forces(WHEEL, soil, theta_1, slip)
     state = (soil.cohesion, soil.tan_phi, soil.shear_modulus, theta_1, slip)
@@ -326,7 +326,7 @@ def separability() -> Lines:
 
 
 def sensitivity_ratio(named: NamedSoil, slip: Array, load: float) -> Array:
-    """∂T/∂c per 100 Pa over ∂T/∂tan φ per 0.01 at each slip, at the θ₁ of the original model."""
+    """∂T/∂c per 100 Pa over ∂T/∂tan φ per 0.01 at each slip (n,), with the original model's θ₁."""
     soil = named.under(WHEEL.width)
     loads = np.full_like(slip, load)
     theta_1 = balance.solve(WHEEL, balance.Contact(soil, ContactLaw(0.5), slip, loads)).theta_1

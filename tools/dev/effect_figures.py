@@ -129,8 +129,8 @@ def _order(effect: type[Effect]) -> float:
 
 
 def sweep(covariate: str, turns: float = 1.0) -> tuple[Motion, Array]:
-    """A motion in which the covariate varies and as little else as possible, and the x axis that
-    shows it.
+    """A motion in which the covariate varies and as little else as possible, and the x axis (N,)
+    that shows it.
     """
     time, ramp = np.linspace(0.0, 60.0, N), np.linspace(0.0, 1.0, N)
     load, slip, speed = np.full(N, LOAD), np.full(N, SLIP), np.full(N, SPEED)

@@ -265,7 +265,7 @@ def _some(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def running_mean(x: Array, y: Array) -> tuple[Array, Array]:
-    """Means of x and y in bins of equal width; bins with too few values are left out."""
+    """Means of x and y (n,) in bins of equal width; bins with too few values are left out."""
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if x.size == 0 or np.ptp(x) == 0.0:

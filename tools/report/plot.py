@@ -71,7 +71,9 @@ def axes(x: tuple[float, float], y: tuple[float, float], top: float, bottom: flo
 def limits(
     *values: Array | Sequence[float], margin: float = 0.06, keep: float | None = None
 ) -> tuple[float, float]:
-    """Least and greatest finite value with a margin; `keep` is inside too. Never empty."""
+    """Least and greatest finite value with a margin; `keep` is inside too. Never empty. values: of
+    any shape.
+    """
     every = np.concatenate([np.ravel(np.asarray(v, dtype=float)) for v in values] or [np.zeros(0)])
     every = every[np.isfinite(every)]
     if keep is not None:
@@ -141,7 +143,7 @@ def text(
 
 
 def line(at: Axes, x: Array | Sequence[float], y: Array | Sequence[float], class_: str) -> Markup:
-    """Broken where a value is not finite; thinned without losing an extreme."""
+    """Through x, y (n,); broken where a value is not finite, thinned without losing an extreme."""
     xs, ys = thinned(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
     pieces, pen = [], "M"
     for px, py in zip(at.x(xs).tolist(), at.y(ys).tolist(), strict=True):
@@ -164,7 +166,7 @@ def uprights(at: Axes, places: Sequence[float], class_: str) -> Markup:
 
 
 def thinned(x: Array, y: Array, most: int = MOST) -> tuple[Array, Array]:
-    """Of each stretch its least and greatest value, in order; all where there are few points."""
+    """Of each stretch of x, y (n,) its least and greatest value, in order; all where n is small."""
     if len(x) <= most:
         return x, y
     kept = [
@@ -183,7 +185,7 @@ def _extremes(y: Array) -> tuple[int, int]:
 
 
 def dots(at: Axes, x: Array, y: Array, class_: str) -> Markup:
-    """One path of round dots: a tenth of the size of as many circles."""
+    """One path of round dots at x, y (n,): a tenth of the size of as many circles."""
     good = np.isfinite(x) & np.isfinite(y)
     places = zip(at.x(x[good]).tolist(), at.y(y[good]).tolist(), strict=True)
     return at.clipped(

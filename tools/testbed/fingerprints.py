@@ -68,15 +68,15 @@ def _run(rng: np.random.Generator, number: int, reversing: bool) -> Motion:
 
 
 def ramped(time: Array, levels: Array) -> Array:
-    """Levels held for SEGMENT seconds each, joined by ramps of RAMP seconds."""
+    """Levels (m,) held for SEGMENT seconds each, joined by ramps of RAMP seconds; at times (n,)."""
     starts = SEGMENT * np.arange(len(levels))
     knots = np.stack((starts, starts + SEGMENT - RAMP)).T.ravel()
     return np.interp(time, knots, np.repeat(levels, 2))
 
 
 def channels(response: Response) -> dict[str, Array]:
-    """What the channels say of one run; torque is the motor's, from the current and the configured
-    constant.
+    """What the channels say of one run, each (n,); torque [N·m] is the motor's, from the current and
+    the configured constant.
     """
     sensed = response.sensed
     return {
@@ -177,7 +177,7 @@ def _plain(reversing: bool) -> list[Response]:
 
 
 def shares(change: Array, by: dict[str, Array]) -> dict[str, float]:
-    """Share of the change explained: `constant` by its mean, other covariates beyond the mean."""
+    """Share of a change (n,) explained: `constant` by its mean, covariates (n,) beyond the mean."""
     total = float(np.mean(change**2))
     if total == 0.0:
         return dict.fromkeys(("constant", *by), 0.0)

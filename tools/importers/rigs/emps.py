@@ -60,7 +60,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 
 
 def read_log(path: Path) -> dict[str, Array]:
-    """t [s], qm [m], vir [V], gtau [N/V]: arrays of one dimension. Raises RigFileError."""
+    """t [s], qm [m], vir [V], each (n,), and gtau [N/V] (1,). Raises RigFileError."""
     try:
         content = loadmat(path)
     except Exception as error:  # scipy raises a different one for each kind of damage

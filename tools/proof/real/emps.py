@@ -85,7 +85,7 @@ class Regression:
     force: Array
 
     def error(self, model: Array) -> float:
-        """Relative error of the force, as the benchmark has it."""
+        """Relative error of the force by a model (4,), as the benchmark has it."""
         return float(np.linalg.norm(self.force - self.columns @ model) / np.linalg.norm(self.force))
 
     def solved(self, slowest: float) -> Array:

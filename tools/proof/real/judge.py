@@ -36,16 +36,18 @@ class Judge:
         )
 
     def time(self, run: int) -> Array:
+        """Seconds since the beginning of a run (n,)."""
         return np.asarray(self.rig.runs[run].time - self.rig.runs[run].time[0])
 
     def measured(self, run: int, channel: str) -> Array:
+        """A channel of a run (n,), in its unit."""
         return np.asarray(self.rig.runs[run].measured[channel])
 
     def predicted(
         self, found: dict[str, Any] | None, when: str = "after"
     ) -> list[dict[str, Array]]:
-        """Every channel of every run: by the configuration alone (None), 'before' with the soil
-        fitted without effects, 'after' with both.
+        """Every channel (n,) of every run: by the configuration alone (None), 'before' with the
+        soil fitted without effects, 'after' with both.
         """
         if found is None:
             return self.rig.predict(np.zeros(len(self.rig.constants)), ())
@@ -54,8 +56,8 @@ class Judge:
         )
 
     def freed(self, found: dict[str, Any], channel: str) -> list[Array]:
-        """A channel of every run less what the accepted effects of the rig, and its calibration,
-        put on it.
+        """A channel (n,) of every run less what the accepted effects of the rig, and its
+        calibration, put on it.
         """
         u = self._constants(found, "after")
         acting = effects(found)
@@ -89,6 +91,7 @@ class Judge:
         return np.array(parts).T
 
     def covariate(self, name: str) -> list[Array]:
+        """A covariate (n,) of every run."""
         return [np.asarray(run.covariates[name]) for run in self.rig.runs]
 
     def _constants(self, found: dict[str, Any], when: str) -> Array:
@@ -119,5 +122,5 @@ def _strain(known: Constant, value: float) -> float:
 
 
 def rms(values: Array) -> float:
-    """Root mean square of what is finite."""
+    """Root mean square of what is finite of values (n,)."""
     return float(np.sqrt(np.nanmean(np.asarray(values) ** 2)))

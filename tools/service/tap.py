@@ -1,4 +1,4 @@
-"""The raw bytes of every device: kept while the daemon runs, and played through the drivers again."""
+"""The raw bytes of every device: kept while the daemon runs, played through the drivers again."""
 
 from __future__ import annotations
 

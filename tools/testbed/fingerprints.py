@@ -75,8 +75,8 @@ def ramped(time: Array, levels: Array) -> Array:
 
 
 def channels(response: Response) -> dict[str, Array]:
-    """What the channels say of one run, each (n,); torque [N·m] is the motor's, from the current and
-    the configured constant.
+    """What the channels say of one run, each (n,); torque [N·m] is the motor's, from the current
+    and the configured constant.
     """
     sensed = response.sensed
     return {

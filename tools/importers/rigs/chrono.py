@@ -1,9 +1,9 @@
-"""Project Chrono's single wheel on SCM terrain: motion and forces of a simulator, read by the packaged
-testbed's sensors.
+"""Project Chrono's single wheel on SCM terrain: motion and forces of a simulator, read by the
+packaged testbed's sensors.
 
-A log holds t, angle, x, z, W, DP, T, omega, v at 250 Hz, without any sensor. Encoders, potentiometer,
-motor shunt and force/torque sensor of the packaged configuration read it, with noise of the size
-that is configured there. T resists in the log where it is negative; the motor's torque is its
+A log holds t, angle, x, z, W, DP, T, omega, v at 250 Hz, without any sensor. Encoders,
+potentiometer, motor shunt and force/torque sensor of the packaged configuration read it, with noise
+of the size that is configured there. T resists in the log where it is negative; the motor's torque is its
 opposite. Every file name is a campaign and the number of a run: `base_0.csv.gz`.
 """
 

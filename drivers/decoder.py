@@ -5,7 +5,6 @@ clock.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 
 from gritd.drivers.device_clock import DeviceClock
 from gritd.drivers.framing import Frame, Framing
@@ -24,8 +23,21 @@ class Decoder:
         self._listeners = {
             key: [s for s in sensors if key in s.keys] for s in sensors for key in s.keys
         }
-        self._clocks: dict[str, DeviceClock] = {}
+        self._clocks = {key: DeviceClock(framing.clock_modulus(key)) for key in self._listeners}
         self._last: dict[str, tuple[int, int | None]] = {}
+
+    @property
+    def mistimed(self) -> int:
+        """Frames whose device time cannot be right; their values are not passed on."""
+        return sum(clock.rejected for clock in self._clocks.values())
+
+    @property
+    def step(self) -> tuple[int, float]:
+        """How often the device's clock has stepped, and how far the last time [s]. Its keys notice
+        one after the other.
+        """
+        steps = [(clock.steps, clock.step) for clock in self._clocks.values()]
+        return max(steps, default=(0, 0.0), key=lambda found: found[0])
 
     def decode(self, received: int, data: bytes) -> list[Reading]:
         """The readings completed by a chunk that came at `received` [ns]. Never raises on any
@@ -35,6 +47,8 @@ class Decoder:
         stamps = self._stamps(frames, received)
         readings = []
         for frame, stamp in zip(frames, stamps, strict=True):
+            if stamp is None:  # nobody knows when it was taken
+                continue
             for sensor in self._listeners[frame.key]:
                 value = sensor.value(frame)
                 if value is not None:
@@ -62,28 +76,31 @@ class Decoder:
         self.duplicates += twice
         return not twice
 
-    def _stamps(self, frames: Sequence[Frame], received: int) -> list[int]:
+    def _stamps(self, frames: Sequence[Frame], received: int) -> list[int | None]:
         """When each frame's sample was taken: by the device's clock where it sends one, else the
-        receive time.
+        receive time. None where the device's time is wrong.
+
+        Each key has a mapping of its own: its frames are in order, and wait equally long.
         """
-        stamps = [received] * len(frames)
-        timed = [
-            (self.framing.clock(f.key), i) for i, f in enumerate(frames) if f.device_us is not None
-        ]
-        for (name, modulus), group in groupby(sorted(timed), key=lambda item: item[0]):
-            indices = [i for _, i in group]
-            clock = self._clocks.setdefault(name, DeviceClock(modulus))
-            resets = clock.resets
-            times = clock.stamps([frames[i].device_us or 0 for i in indices], received)
-            for i, time in zip(indices, times, strict=True):
-                stamps[i] = time
-            if clock.resets != resets:
-                self._device_started_anew(name)
+        stamps: list[int | None] = [received] * len(frames)
+        timed: dict[str, list[int]] = {}
+        for place, frame in enumerate(frames):
+            if frame.device_us is not None:
+                timed.setdefault(frame.key, []).append(place)
+        for key, places in timed.items():
+            found = self._mapped(key, [frames[i].device_us or 0 for i in places], received)
+            for place, stamp in zip(places, found, strict=True):
+                stamps[place] = stamp
         return stamps
 
-    def _device_started_anew(self, clock: str) -> None:
-        """Its counters began again: the sensors behind this clock take a new base."""
-        for key, sensors in self._listeners.items():
-            if self.framing.clock(key)[0] == clock:
-                for sensor in sensors:
-                    sensor.reset()
+    def _mapped(self, key: str, device_us: Sequence[int], received: int) -> list[int | None]:
+        """The stamps of one key's frames. Where the device started anew its counters did too: the
+        sensors take a new base.
+        """
+        clock = self._clocks[key]
+        restarts = clock.restarts
+        stamps = clock.stamps(device_us, received)
+        if clock.restarts != restarts:
+            for sensor in self._listeners[key]:
+                sensor.reset()
+        return stamps

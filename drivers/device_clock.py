@@ -1,48 +1,40 @@
 """A device's wrapping microsecond clock mapped to ours, so that batching on the way is not read as
-speed.
+speed, and a wrong stamp costs one sample.
 
 Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms,
-schedulers add more. The difference receive time − device time is therefore a line (offset and drift
-between two crystals) plus a positive delay, and the line is its lower envelope. A sliding window
-keeps the smallest difference of each block of time; the edge of their lower convex hull over the
-middle of the window gives the drift, and the line is pushed down until it touches the lowest point.
-
-S. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay
-measurements, IEEE INFOCOM 1999, Eq. (4): the line under all points that is closest to them is that
-edge of the hull.
+schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or one
+whose time goes back, has a wrong time: it gets no stamp, and the line does not see it. Where frames
+agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's clock has
+stepped.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
+from statistics import median
 
-Point = tuple[
-    float, float
-]  # (device time [ns since the first frame], receive − device [ns, less the first one])
+from gritd.drivers.clock_line import STRAY, Line
+from gritd.drivers.clock_step import FLAT, Doubt, Rival
 
-BLOCK = 0.5e9  # [ns]
-BLOCKS = 40  # a window of 20 s
-SLOPE_AFTER = 2e9  # [ns] a shorter window does not tell drift from delay
-MAX_DRIFT = 200e-6  # two crystals of ±100 ppm
-RESTART_DROP = 10e6  # [ns] a point this far below the line says that the line knows nothing
-RESET_STEP = 500_000_000  # [ns] a device clock going back by this much, or forward, was reset
+LATE = 20e6  # [ns] longer than a USB adapter holds a frame back
+SILENCE = 10e9  # [ns] after which the drift is not trusted
+MARGIN = 10e6  # [ns] for the drift
 
 
 class DeviceClock:
-    """Stamps for the frames of one device clock that wraps at `modulus_us` µs.
+    """Stamps for the frames of one key, in the order sent; their clock wraps at `modulus_us` µs.
 
     A stamp is never later than the receive time and grows with the device time. What remains is the
     smallest delay of the last 20 s, a constant that belongs into the channel's latency.
     """
 
-    _newest: int  # latest device time [ns], unwrapped
-    _newest_received: int  # and when it came [ns]
-
     def __init__(self, modulus_us: int = 1 << 32) -> None:
-        self.resets = 0  # times the device clock was seen to start anew
+        self.rejected = 0  # frames of a time that cannot be
+        self.steps = 0  # times the device's clock jumped
+        self.step = 0.0  # how far, the last time [s]
+        self.restarts = 0  # times it began at zero: the device was switched on
         self._modulus = modulus_us * 1000
-        self._slope = 0.0
+        self._line = Line()
         self._start(0, 0)
         self.restart()
 
@@ -51,44 +43,27 @@ class DeviceClock:
         self._started = False
         self._last: tuple[int, int] | None = None  # the newest sample's device time and stamp
 
-    def stamps(self, device_us: Sequence[int], received: int) -> list[int]:
-        """When the samples of one chunk were taken [ns, our clock]; `received` [ns] is when the
-        chunk came.
+    def stamps(self, device_us: Sequence[int], received: int) -> list[int | None]:
+        """When the samples of one chunk were taken [ns, our clock], None where the device's time
+        cannot be right; `received` [ns] is when the chunk came.
 
         The whole chunk is looked at before any of it is stamped: its last frame waited least.
         """
-        stamps: list[int] = []
-        times: list[int] = []
-        for us in device_us:
-            time = self._unwrap(us * 1000, received)
-            if time < self._newest - RESET_STEP:
-                stamps += self._settle(times, received)
-                times = []
-                self.resets += 1
-                self._last = None
-                self._start(time, received)
-            elif time > self._newest:
-                self._newest = time
-                self._newest_received = received
-            times.append(time)
-        return stamps + self._settle(times, received)
+        if self._started and received - self._newest_received > SILENCE:
+            self._line.unsettle()
+        times = [self._unwrap(us * 1000, received) for us in device_us]
+        right = self._judged(times, received) if times else []
+        kept = [time for time, is_right in zip(times, right, strict=True) if is_right]
+        self.rejected += len(times) - len(kept)
+        if kept:
+            self._follow(max(kept), received)
+        end = self._squeezed(kept, received)
+        return [
+            self._stamp(time, received, end) if is_right else None
+            for time, is_right in zip(times, right, strict=True)
+        ]
 
-    def _settle(self, times: list[int], received: int) -> list[int]:
-        """Look at the samples of one chunk, then stamp them."""
-        for time in sorted(times, reverse=True):
-            self._observe(time, received)
-        end = self._squeezed(times, received)
-        return [self._stamp(time, received, end) for time in times]
-
-    def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
-        """Device time and stamp of the chunk's newest sample where its oldest new one would be
-        stamped before the last chunk's: the line was pushed down below that.
-        """
-        last = self._last
-        fresh = [time for time in times if last is not None and time > last[0]]
-        if last is None or not fresh or self._mapped(min(fresh), received) > last[1]:
-            return None
-        return max(fresh), self._mapped(max(fresh), received)
+    # --- which times are right --------------------------------------------------------------------
 
     def _unwrap(self, wrapped: int, received: int) -> int:
         """Device time without wraps [ns]: the turn of the clock nearest to where our own clock
@@ -105,45 +80,101 @@ class DeviceClock:
         self._started = True
         self._origin = received - time
         self._first = time
-        self._newest = time
+        self._newest = self._second = time  # the two latest that came without much delay
         self._newest_received = received
-        self._intercept = 0.0
-        self._blocks: deque[Point] = deque(maxlen=BLOCKS)
-        self._lowest: Point = (0.0, 0.0)
-        self._block_end = BLOCK
+        self._line = Line(self._line.slope)
+        self._doubt = Doubt()
 
-    def _observe(self, time: int, received: int) -> None:
-        at, offset = float(time - self._first), float(received - time - self._origin)
-        below = self._line(at) - offset
-        if below > RESTART_DROP:
-            self.resets += below > RESET_STEP
-            self._start(time, received)
-            return
-        if below > 0.0:
-            self._intercept -= below
-        if at >= self._block_end:
-            self._close_block(at, offset)
-        elif offset - self._slope * at < self._lowest[1] - self._slope * self._lowest[0]:
-            self._lowest = (at, offset)
+    def _judged(self, times: list[int], received: int) -> list[bool]:
+        """Whether the time of each frame of a chunk can be right."""
+        if not self._line.settled:
+            if max(times) < self._newest - LATE:
+                self._begin_again(max(times), received)
+            return [True] * len(times)
+        delays = [
+            self._offset(time, received) - self._line.at(time - self._first) for time in times
+        ]
+        possible = self._possible(times, delays)
+        if -STRAY <= min(delays) <= LATE:
+            self._doubt = self._doubt.calmed(received)
+            return possible
+        impossible = [delay for delay, ok in zip(delays, possible, strict=True) if not ok]
+        self._doubt.add(Rival(max(times), received, min(delays)), impossible)
+        if agreed := self._doubt.agreed():
+            self._step(agreed, received)
+            return self._judged(times, received)
+        if self._doubt.is_hopeless():
+            self._begin_again(times[-1], received)
+            return [True] * len(times)
+        return [
+            ok and not (delay > LATE and self._doubt.suspects(delay))
+            for ok, delay in zip(possible, delays, strict=True)
+        ]
 
-    def _close_block(self, at: float, offset: float) -> None:
-        """Keep the block's lowest point, begin the next block, and fit the line anew."""
-        self._blocks.append(self._lowest)
-        self._lowest = (at, offset)
-        self._block_end = at + BLOCK
-        closed = sorted(self._blocks)
-        if closed[-1][0] - closed[0][0] >= SLOPE_AFTER:
-            self._slope = max(-MAX_DRIFT, min(MAX_DRIFT, hull_slope(closed)))
-        self._intercept = min(y - self._slope * x for x, y in [*closed, self._lowest])
+    def _possible(self, times: list[int], delays: list[float]) -> list[bool]:
+        """False for a frame from before the line, and for a late one whose time goes back."""
+        possible, newest, second = [], self._newest, self._second
+        for time, delay in zip(times, delays, strict=True):
+            possible.append(delay >= -STRAY and not (delay > LATE and time < second))
+            if -STRAY <= delay <= LATE:
+                newest, second = max(newest, time), max(second, min(newest, time))
+        return possible
 
-    def _line(self, at: float) -> float:
-        return self._intercept + self._slope * at
+    def _step(self, agreed: list[Rival], now: int) -> None:
+        """The device's clock has jumped: go on from the frames that say so, but for a wrong one. The
+        present chunk is followed later.
+        """
+        least = median(rival.delay for rival in agreed) - FLAT
+        rivals = [rival for rival in agreed if rival.delay >= least]
+        self.steps += 1
+        self.step = -min(rival.delay for rival in rivals) * 1e-9
+        self._begin_again(rivals[0].time, rivals[0].received)
+        for rival in rivals:
+            if rival.received < now:
+                self._follow(rival.time, rival.received)
 
-    def _mapped(self, time: int, received: int) -> int:
-        return min(time + self._origin + round(self._line(float(time - self._first))), received)
+    def _begin_again(self, time: int, received: int) -> None:
+        """Forget the mapping and begin it at a frame of the same device."""
+        self.restarts += self._has_restarted(time % self._modulus, received)
+        self._last = None
+        self._start(time, received)
+
+    def _has_restarted(self, shown: int, received: int) -> bool:
+        """Whether the device's clock went back and shows no more than the time since it was heard."""
+        silent = received - self._newest_received
+        return shown < self._newest % self._modulus and shown <= silent + MARGIN
+
+    # --- stamps -----------------------------------------------------------------------------------
+
+    def _follow(self, time: int, received: int) -> None:
+        """Let the line see the frame of a chunk that waited least."""
+        at, offset = float(time - self._first), self._offset(time, received)
+        self._line.add((at, offset))
+        if offset - self._line.at(at) <= LATE:
+            self._second = max(self._second, min(self._newest, time))
+            if time > self._newest:
+                self._newest, self._newest_received = time, received
+
+    def _offset(self, time: int, received: int) -> float:
+        return float(received - time - self._origin)
+
+    def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
+        """Device time and stamp of the chunk's newest sample where the line does not fit between the
+        last stamp and the receive time: it was pushed down since, or has yet to be.
+        """
+        last = self._last
+        fresh = sorted(time for time in times if last is not None and time > last[0])
+        if last is None or not fresh:
+            return None
+        second = fresh[-2] if len(fresh) > 1 else fresh[0]  # the newest may be wrong
+        fits = self._mapped(fresh[0]) > last[1] and self._mapped(second) <= received
+        return None if fits else (fresh[-1], min(self._mapped(fresh[-1]), received))
+
+    def _mapped(self, time: int) -> int:
+        return time + self._origin + round(self._line.at(float(time - self._first)))
 
     def _stamp(self, time: int, received: int, end: tuple[int, int] | None) -> int:
-        stamp = self._mapped(time, received)
+        stamp = min(self._mapped(time), received)
         if self._last is None or time > self._last[0]:
             if self._last is not None and end is not None:
                 stamp = min(max(_between(self._last, end, time), self._last[1] + 1), received)
@@ -158,23 +189,3 @@ def _between(last: tuple[int, int], end: tuple[int, int], time: int) -> int:
     look like a jump.
     """
     return last[1] + (end[1] - last[1]) * (time - last[0]) // (end[0] - last[0])
-
-
-def hull_slope(points: Sequence[Point]) -> float:
-    """Slope of the lower convex hull's edge over the mean abscissa; points sorted by abscissa, two
-    or more.
-    """
-    hull: list[Point] = []
-    for point in points:
-        while len(hull) >= 2 and _turns_down(hull[-2], hull[-1], point):
-            hull.pop()
-        hull.append(point)
-    middle = sum(x for x, _ in points) / len(points)
-    right = next((i for i, (x, _) in enumerate(hull) if x > middle and i > 0), len(hull) - 1)
-    (x0, y0), (x1, y1) = hull[right - 1], hull[right]
-    return (y1 - y0) / (x1 - x0)
-
-
-def _turns_down(a: Point, b: Point, c: Point) -> bool:
-    """Whether b lies on or above the line from a to c."""
-    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])

@@ -53,12 +53,8 @@ class Framing(Protocol):
         """The frames completed by this chunk, in the order of the wire. Never raises."""
         ...
 
-    def clock(self, key: str) -> tuple[str, int]:
-        """Which clock stamps the frames of this key, and at how many µs it wraps.
-
-        All keys of a serial device share one; on a CAN bus every message may come from another
-        node.
-        """
+    def clock_modulus(self, key: str) -> int:
+        """At how many µs the clock that stamps the frames of this key wraps."""
         ...
 
     def reset(self) -> None:

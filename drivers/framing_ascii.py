@@ -46,8 +46,8 @@ class AsciiFraming:
         """Bytes of the unfinished line."""
         return len(self._pending)
 
-    def clock(self, key: str) -> tuple[str, int]:
-        return "", CLOCK_MODULUS
+    def clock_modulus(self, key: str) -> int:
+        return CLOCK_MODULUS
 
     def reset(self) -> None:
         self.counts.garbage += self.pending

@@ -94,9 +94,8 @@ class CanFraming:
         """Whether the key's message carries a `Sequence` or `Cycle` counter."""
         return self._by_message[key.partition(".")[0]].counter is not None
 
-    def clock(self, key: str) -> tuple[str, int]:
-        message = key.partition(".")[0]
-        return message, self._by_message[message].clock_modulus
+    def clock_modulus(self, key: str) -> int:
+        return self._by_message[key.partition(".")[0]].clock_modulus
 
     def reset(self) -> None:
         for wanted in self._wanted.values():

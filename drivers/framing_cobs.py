@@ -92,8 +92,8 @@ class CobsFraming:
         """Bytes of the unfinished frame."""
         return len(self._pending)
 
-    def clock(self, key: str) -> tuple[str, int]:
-        return "", CLOCK_MODULUS
+    def clock_modulus(self, key: str) -> int:
+        return CLOCK_MODULUS
 
     def reset(self) -> None:
         self.counts.garbage += self.pending

@@ -36,6 +36,9 @@ class ReaderStats:
     unknown: int  # good frames no channel wants
     quarantined: int  # impossible values refused
     incomplete: int  # wrench cycles with a missing frame
+    mistimed: int  # frames whose device time cannot be right
+    clock_steps: int  # times the device's clock jumped
+    clock_step: float  # how far, the last time [s]
     readings: int
     reopened: int  # times the device was opened again
 
@@ -89,6 +92,7 @@ class Reader:
     def stats(self) -> ReaderStats:
         counts = self.decoder.framing.counts
         sensors = self.decoder.sensors
+        steps, step = self.decoder.step
         return ReaderStats(
             device=self.device,
             state=self._state,
@@ -104,6 +108,9 @@ class Reader:
             unknown=self.decoder.unknown,
             quarantined=sum(sensor.quarantined for sensor in sensors),
             incomplete=sum(sensor.incomplete for sensor in sensors),
+            mistimed=self.decoder.mistimed,
+            clock_steps=steps,
+            clock_step=step,
             readings=self._readings,
             reopened=max(self._opened - 1, 0),
         )

@@ -88,7 +88,7 @@ def test_float_volts_arrive_as_they_are(volts):
 
 
 def test_the_clock_of_each_message_is_its_own_and_wraps_at_its_width():
-    assert framing().clock("WheelEncoder.Count") == ("WheelEncoder", 1 << 24)
+    assert framing().clock_modulus("WheelEncoder.Count") == 1 << 24
 
 
 # ---- what is listened to

@@ -55,6 +55,7 @@ class Watcher:
         self._every = every
 
         self._states = {reader.device: "" for reader in readers}
+        self._steps = {reader.device: 0 for reader in readers}
         self._writing, self._files, self._hanging, self._untidy = "writing", 1, "", ""
         self._dropped, self._overflowing, self._unconfirmed = 0, False, False
 
@@ -98,6 +99,10 @@ class Watcher:
     # ---------------------------------------------------------------------------------------------
 
     def _follow(self, daemon: Daemon, stats: ReaderStats) -> None:
+        if stats.clock_steps > self._steps[stats.device]:
+            self._steps[stats.device] = stats.clock_steps
+            step = f"device {stats.device}: its clock stepped by {stats.clock_step:+.3f} s"
+            self.tell(daemon, WARNING, step)
         beginning = stats.state == "WAITING" and not stats.last_error  # for its first attempt
         if stats.state == self._states[stats.device] or beginning:
             return
@@ -250,8 +255,8 @@ class Watcher:
             say(
                 f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, "
                 f"{s.garbage} garbage bytes, {s.lost} lost, {s.duplicates} duplicates, "
-                f"{s.quarantined} quarantined, {s.incomplete} incomplete, {s.unknown} unknown, "
-                f"{s.errors} bus errors, reopened {s.reopened} times"
+                f"{s.quarantined} quarantined, {s.incomplete} incomplete, {s.mistimed} mistimed, "
+                f"{s.unknown} unknown, {s.errors} bus errors, reopened {s.reopened} times"
             )
 
         say(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")

@@ -1,0 +1,116 @@
+"""Device clocks that are wrong: one stamp, a step, and random histories of everything."""
+
+from __future__ import annotations
+
+import random
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from gritd.tools.testbed.clocks import history, judged, with_pot
+from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, rows, service, verified
+
+WRONG = "one wrong stamp of a device clock"
+STEP = "step of a device clock"
+HISTORIES = "random histories of a device clock"
+DECODER = "drivers' decoder, bytes and clocks simulated"
+SECOND = 250  # frames of the wheel encoder
+
+
+class Meddled:
+    """The far end of the encoders' wire, whose clock can be set and whose stamps can be spoilt."""
+
+    def __init__(self, wires):
+        self._send, self.off, self.once = wires.encoders.send, 0, 0
+        wires.encoders.send = self.send
+
+    def send(self, key, values, device_us):
+        """off: of the clock, from now on [µs]; once: of the next frame of the wheel encoder."""
+        wrong = 0
+        if key == "wheel_encoder":
+            wrong, self.once = self.once, 0
+        self._send(key, values, device_us + self.off + wrong + 60_000_000)
+
+
+@contextmanager
+def tracking(folder):
+    """A daemon that tracks, and the encoders' clock."""
+    with service(folder) as (wires, daemon):
+        encoders = Meddled(wires)
+        wires.play(driven(40.0, 1, skip=1.0))
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        time.sleep(0.5)
+        yield daemon, encoders
+
+
+@pytest.mark.parametrize("off", [-490e-3, -65.536e-3, 65.536e-3, 200e-3, 3.0])
+def test_one_wrong_stamp(tmp_path, off, figure):
+    with tracking(tmp_path) as (daemon, encoders):
+        for _ in range(3):
+            encoders.once = round(off * 1e6)
+            time.sleep(0.4)
+        device = daemon.status()["devices"]["encoders"]
+        daemon.stop()
+
+    assert device["clock_steps"] == 0
+    figure(WRONG, WIRES, "frames lost for each", device["mistimed"] / 3, "", 1)
+    gap = largest_gap(daemon.path(), "/raw/wheel_encoder")
+    figure(WRONG, WIRES, "largest gap between stamps", gap, "s", 0.2, real=True)
+    assert verified(daemon.path())
+
+
+def largest_gap(path, topic):
+    """Between the stamps of a topic [s], without its first tenth of a second."""
+    return float(np.max(np.diff(rows(path, topic)["stamp"][SECOND // 10 :]))) * 1e-9
+
+
+@pytest.mark.parametrize("step", [-490e-3, -60e-3, 65.536e-3, 200e-3, 7.0])
+def test_step(tmp_path, step, figure):
+    with tracking(tmp_path) as (daemon, encoders):
+        encoders.off = round(step * 1e6)
+        daemon.heard("device encoders: its clock stepped by ")
+        time.sleep(1.5)
+        report = daemon.wait_status(lambda report: report["channels"]["wheel_encoder"] == "ok")
+        daemon.stop()
+
+    ((_, line),) = daemon.lines("its clock stepped")
+    assert f"stepped by {step:+.3f} s" in line, line
+    assert sum("its clock stepped" in line for line in log_lines(daemon.path())) == 1
+    device = report["devices"]["encoders"]
+    assert device["clock_steps"] == 1
+    lost = device["mistimed"] / 2 / SECOND
+    figure(STEP, WIRES, "readings lost, as time", lost, "s", 0.2, real=True)
+    gap = largest_gap(daemon.path(), "/raw/wheel_encoder")
+    figure(STEP, WIRES, "largest gap between stamps", gap, "s", 0.2, real=True)
+    assert verified(daemon.path())
+
+
+def play_histories(count, figure):
+    settings, lost, in_step, error, wrong, believed = with_pot(TESTBED.settings), 0, 0, 0.0, 0, 0
+    for number in range(count):
+        played = history(settings, random.Random(f"clocks/{number}"))
+        verdict = judged(played, settings)
+        lost += verdict.lost
+        in_step = max(in_step, verdict.in_step)
+        error = max(error, verdict.error)
+        wrong += sum(bool(sample.wrong) for sample in played.samples)
+        believed += len(verdict.accepted)
+        assert not verdict.lost and verdict.error <= 1e-3, f"history {number}: {played.words}"
+
+    what = f"of {count:,} histories"
+    figure(HISTORIES, DECODER, f"good frames lost but for 0.2 s after a step, {what}", lost, "", 0)
+    name = f"largest error of a stamp a second after a step, {what}"
+    figure(HISTORIES, DECODER, name, error * 1e3, "ms", 1)
+    name = f"wrong stamps believed, {what}"
+    figure(HISTORIES, DECODER, name, 100.0 * believed / wrong, "%")
+
+
+def test_random_histories(figure):
+    play_histories(300, figure)
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_histories(figure):
+    play_histories(10_000, figure)

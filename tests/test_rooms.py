@@ -16,7 +16,7 @@ ROOMS = (
     ("estimator",),
     ("drivers",),
     ("tools.cli",),
-    ("tools.testbed", "tools.service", "tools.diagnose", "tools.importers"),
+    ("tools.testbed", "tools.service", "tools.diagnose", "tools.importers", "tools.paper"),
     ("tools.bench", "tools.report"),
     ("tools.proof",),
     ("tools.commands",),

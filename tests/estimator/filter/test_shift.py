@@ -16,7 +16,7 @@ from gritd.estimator.stages.situation import ContactLaw
 from gritd.estimator.terramechanics import linear, original
 from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.estimator.terramechanics.soils import DRY_SAND, LOOSE_SAND, MARS_LIKE, SANDY_LOAM
-from gritd.tools.commands.reproduce import fit
+from gritd.tools.paper.separability import fit
 
 WHEEL = Wheel(radius=0.072, width=0.071)
 SAND = DRY_SAND.under(WHEEL.width)

@@ -3,8 +3,8 @@ packaged testbed's sensors.
 
 A log holds t, angle, x, z, W, DP, T, omega, v at 250 Hz, without any sensor. Encoders,
 potentiometer, motor shunt and force/torque sensor of the packaged configuration read it, with noise
-of the size that is configured there. T resists in the log where it is negative; the motor's torque is its
-opposite. Every file name is a campaign and the number of a run: `base_0.csv.gz`.
+of the size that is configured there. T resists in the log where it is negative; the motor's torque
+is its opposite. Every file name is a campaign and the number of a run: `base_0.csv.gz`.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import pty
+import random
 import select
 import time
 import tty
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from hypothesis import settings
 
+from gritd.drivers.framing_can import EXTENDED, pack
 from gritd.estimator.config.settings import Channel, Device, Settings, Wrench
 from tests.rig import SETTINGS, calibration
 
@@ -115,3 +117,21 @@ def wait_until(condition, limit=120.0) -> bool:
             return False
         time.sleep(0.002)
     return True
+
+
+def damage(rng: random.Random, data: bytes, at: int) -> bytes:
+    """One fault at a byte: flipped bits, deleted, inserted or overwritten bytes."""
+    length = rng.randint(1, 3)
+    kind = rng.randrange(4)
+    if kind == 0:
+        return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :]
+    if kind == 1:
+        return data[:at] + data[at + length :]
+    noise = rng.randbytes(length)
+    return data[:at] + noise + data[at if kind == 2 else at + length :]
+
+
+def chunk(message):
+    return pack(
+        message.arbitration_id | (EXTENDED if message.is_extended_id else 0), bytes(message.data)
+    )

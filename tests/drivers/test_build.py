@@ -17,11 +17,11 @@ from tests.drivers.rig import (
     Ticking,
     can_device,
     channel,
+    chunk,
     serial_device,
     wiring,
     wrench,
 )
-from tests.drivers.test_framing_can import chunk
 
 VALUES = {name: (70_000 if name in ENCODERS else 1.25,) for name in CHANNELS}
 VALUES["wrench"] = (1.0, 2.0, 3.0, 0.5, 0.25, -0.5)

@@ -16,7 +16,7 @@ from gritd.drivers.framing import Frame
 from gritd.drivers.framing_can import ERROR, EXTENDED, REMOTE, CanFraming, pack
 from gritd.drivers.wire import CanWire
 from gritd.estimator.messages.readings import CHANNELS, WRENCH_FIELDS
-from tests.drivers.rig import CAN_SIGNALS, FUZZ, can_device
+from tests.drivers.rig import CAN_SIGNALS, FUZZ, can_device, chunk
 
 ALL_KEYS = [*CAN_SIGNALS.values(), "WrenchForce", "WrenchTorque"]
 
@@ -24,12 +24,6 @@ ALL_KEYS = [*CAN_SIGNALS.values(), "WrenchForce", "WrenchTorque"]
 def framing(keys=ALL_KEYS, **device):
     bus = can_device(**device)
     return CanFraming(bus.name, database(bus), keys)
-
-
-def chunk(message):
-    return pack(
-        message.arbitration_id | (EXTENDED if message.is_extended_id else 0), bytes(message.data)
-    )
 
 
 def inline(**signals):

@@ -18,7 +18,7 @@ from gritd.drivers import framing_ascii, framing_cobs
 from gritd.drivers.framing import MAX_VALUES, Frame
 from gritd.drivers.framing_ascii import AsciiFraming
 from gritd.drivers.framing_cobs import CobsFraming
-from tests.drivers.rig import FUZZ
+from tests.drivers.rig import FUZZ, damage
 
 FRAMINGS = [
     pytest.param(framing_ascii.encode, AsciiFraming, id="ascii"),
@@ -93,18 +93,6 @@ def test_any_bytes_are_survived_counted_and_forgotten(encode, framing, chunks):
         assert decoder.decode(chunk) == []
         assert decoder.pending <= max(framing_ascii.MAX_LINE, framing_cobs.MAX_STUFFED)
     assert decoder.counts.garbage + decoder.pending == sum(map(len, chunks))
-
-
-def damage(rng: random.Random, data: bytes, at: int) -> bytes:
-    """One fault at a byte: flipped bits, deleted, inserted or overwritten bytes."""
-    length = rng.randint(1, 3)
-    kind = rng.randrange(4)
-    if kind == 0:
-        return data[:at] + bytes([data[at] ^ (1 << rng.randrange(8))]) + data[at + 1 :]
-    if kind == 1:
-        return data[:at] + data[at + length :]
-    noise = rng.randbytes(length)
-    return data[:at] + noise + data[at if kind == 2 else at + length :]
 
 
 @both

@@ -17,7 +17,7 @@ from gritd.drivers.recorded import Playback, decoded
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.drivers.wire_log import MAGIC, WireWriter, read_wire, wire_path
 from tests.drivers.rig import Plug, Ticking, can_device, channel, serial_device, wait_until, wiring
-from tests.drivers.test_framing_can import chunk as can_chunk
+from tests.drivers.rig import chunk as can_chunk
 
 SERIAL = [
     channel("wheel_encoder", "encoders", bits=16),

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
+from pathlib import Path
 
 import pytest
 
@@ -60,3 +62,11 @@ def figure(request):
         )
 
     return state
+
+
+@pytest.fixture
+def folder_of_nobody():
+    """Below /tmp: pytest's own folders are closed to others."""
+    with tempfile.TemporaryDirectory() as name:
+        os.chmod(name, 0o755)
+        yield Path(name)

@@ -16,7 +16,7 @@ import yaml
 from gritd.config import packaged
 from gritd.estimator.config.configuration import ConfigError, load, loads, reload
 from gritd.estimator.config.yamltree import dumped
-from tests.estimator.config.test_config import HOSTILE
+from tests.estimator.config.rig import HOSTILE
 from tests.scenarios.rig import (
     TESTBED,
     WIRES,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.messages.status import CHANNEL_BITS, Status
-from tests.drivers.test_framing_serial import damage
+from tests.drivers.rig import damage
 from tests.scenarios.rig import WIRES, driven, rows, service, verified
 
 ENCODERS = CHANNEL_BITS["wheel_encoder"] | CHANNEL_BITS["carriage_encoder"]

@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gritd.estimator.recording.cdr import TIME, Topic
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import CHECKPOINT
+from tests.scenarios import killed_writer
 from tests.scenarios.rig import (
     ROOT,
     WIRES,
@@ -33,9 +33,8 @@ from tests.scenarios.rig import (
     service,
     verified,
 )
-from tests.scenarios.test_users import as_root, folder_of_nobody, hand_over
+from tests.scenarios.users import as_root, hand_over
 
-__all__ = ["folder_of_nobody"]
 
 FULL = "disk full"
 READ_ONLY = "log folder read-only"
@@ -240,43 +239,6 @@ def test_killed_while_logging(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-WRITER = """
-import mmap, os, struct, sys, time
-from gritd.estimator.daemon.scheduling import real_time
-from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.recording.writer import WriterThread
-from gritd.estimator.messages.readings import Reading
-from tests.scenarios.test_disk import MARK, PART
-
-folder, kind, number = sys.argv[1], sys.argv[2], int(sys.argv[3])
-for name in range(number):
-    shared = open(f"{folder}/{name}.put", "w+b")
-    shared.truncate(16)
-    child = os.fork()
-    if not child:
-        real_time()
-        put = mmap.mmap(shared.fileno(), 16)  # what the loop has handed over, as the kernel remembers it
-        writer = WriterThread(f"{folder}/{name}.mcap", [PART], "a: 1", RunInfo())
-        writer.start()
-        count, end = 0, time.monotonic() + (0.3 if kind == "closing" else 60.0)
-        while time.monotonic() < end:
-            now = time.time_ns()
-            if kind == "rotating" and count % 25 == 24:
-                writer.begin_part("a: 1", (PART.name, now, (now,)))
-            writer.put([Reading(now, "wheel_encoder", count, now)] * 5)
-            put[:] = struct.pack("<qq", count + 1, now)
-            count += 1
-            time.sleep(0.004)
-        os.write(1, MARK)
-        writer.stop()
-        time.sleep(60.0)
-    print(child, flush=True)
-    os.waitpid(child, 0)
-"""
-MARK = b"closing\n"
-PART = Topic("/part", "gritd_msgs/msg/Part", (("stamp", TIME, "when"),))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "kills"), [("logging", KILLS), ("rotating", 150), ("closing", 150)]
@@ -286,12 +248,12 @@ def test_many_kills(tmp_path, kind, kills, figure):
     part begins every 0.1 s, or within the few milliseconds in which it closes. What was lost counts
     from what had been handed over.
     """
-    command = [sys.executable, "-c", WRITER, str(tmp_path), kind, str(kills)]
+    command = [sys.executable, "-m", killed_writer.__name__, str(tmp_path), kind, str(kills)]
     parent, rng = subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT), random.Random(1)
     for _ in range(kills):
         child = int(parent.stdout.readline())
         if kind == "closing":
-            assert parent.stdout.readline() == MARK
+            assert parent.stdout.readline() == killed_writer.MARK
         time.sleep(rng.uniform(0.0, 0.02) if kind == "closing" else rng.uniform(0.25, 0.7))
         os.kill(child, signal.SIGKILL)
     assert parent.wait() == 0

@@ -16,7 +16,7 @@ from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.wheel.geometry import entry_angle
-from tests.estimator.filter.test_tracker import RIG, TRUTH, run
+from tests.estimator.filter.rig import RIG, TRUTH, run
 from tests.linear_plant import THREE_LOADS, readings
 
 QUICK = True  # all seeds in every run

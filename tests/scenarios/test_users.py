@@ -10,14 +10,11 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 from contextlib import ExitStack, suppress
-from pathlib import Path
 from threading import Thread
 
 import numpy as np
-import pytest
 
 from gritd.estimator.daemon.publish import MAX_CLIENTS
 from gritd.estimator.recording.salvage import read
@@ -34,6 +31,7 @@ from tests.scenarios.rig import (
     service,
     verified,
 )
+from tests.scenarios.users import as_root, hand_over
 
 
 def test_second_instance(tmp_path, seed, figure):
@@ -133,11 +131,6 @@ def read_on(client):
             pass
 
 
-as_root = pytest.mark.skipif(
-    os.geteuid() != 0, reason="only root can become nobody; these tests run unprivileged already"
-)
-
-
 @as_root
 def test_unprivileged_user(folder_of_nobody, seed, figure):
     nobody = pwd.getpwnam("nobody").pw_uid
@@ -176,17 +169,3 @@ def test_a_device_it_may_not_open_is_a_clear_error(folder_of_nobody, figure):
         1,
         "",
     )
-
-
-@pytest.fixture
-def folder_of_nobody():
-    """Below /tmp: pytest's own folders are closed to others."""
-    with tempfile.TemporaryDirectory() as name:
-        os.chmod(name, 0o755)
-        yield Path(name)
-
-
-def hand_over(folder, wires, uid):
-    """Folder, files and the terminal's slave to another user."""
-    for path in (folder, *folder.iterdir()):
-        os.chown(path, uid, uid)

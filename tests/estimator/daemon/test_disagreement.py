@@ -10,7 +10,7 @@ from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.tools.commands.status import summary
-from tests.estimator.filter.test_tracker import RIG, TRUTH
+from tests.estimator.filter.rig import RIG, TRUTH
 from tests.linear_plant import THREE_LOADS, readings
 
 SHUNT = RIG.channels["motor_shunt"].calibration.scale.value

@@ -11,7 +11,7 @@ from gritd.estimator.config.settings import Uncertain
 from gritd.tools.testbed.plant import schedule
 from gritd.tools.testbed.schedule import motion_of
 from gritd.tools.testbed.simulation import simulate_run, soil_of
-from tests.estimator.online.test_online import SETTINGS, last_tick
+from tests.estimator.online.rig import SETTINGS, last_tick
 
 MOTION = motion_of(schedule(60.0), SETTINGS.wheel.radius, 50.0)
 

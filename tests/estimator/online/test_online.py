@@ -7,44 +7,19 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from gritd.config import packaged
-from gritd.estimator.config.configuration import load
-from gritd.estimator.config.settings import ConfiguredEffect, Rates, Uncertain
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import EFFECTS
-from gritd.estimator.messages.tick import TICK_NAMES
-from gritd.estimator.online.pipeline import Pipeline
 from gritd.tools.testbed.fingerprints import typical
 from gritd.tools.testbed.plant import schedule
 from gritd.tools.testbed.schedule import motion_of
 from gritd.tools.testbed.simulation import simulate_run, soil_of
+from tests.estimator.online.rig import SETTINGS, last_tick
 
-TESTBED = load(packaged()).settings
-SETTINGS = replace(
-    TESTBED,
-    rates=Rates(tick=10.0, update=10.0),
-    filter=replace(TESTBED.filter, engine="plain"),
-    channels={
-        name: replace(channel, stale_after=1.0) for name, channel in TESTBED.channels.items()
-    },
-    wrench=replace(TESTBED.wrench, stale_after=1.0),
-)
 SOIL = soil_of(SETTINGS, {"cohesion": 750.0, "tan_phi": 0.62, "shear_modulus": 0.0225})
 MOTION = motion_of(schedule(45.0), SETTINGS.wheel.radius, 50.0)
 ACTING = sorted(
     name for name, effect in EFFECTS.items() if not effect.filter_only and name != "empirical_law"
 )
-
-
-def last_tick(settings, readings):
-    """The last tick of a run in ticks of 0.1 s."""
-    pipeline = Pipeline(settings)
-    state, t, batch, tick = pipeline.start(), readings[0].received + 100_000_000, [], ()
-    for reading in readings:
-        while reading.received > t:
-            state, tick = pipeline.step(state, batch, t)
-            batch, t = [], t + 100_000_000
-        batch.append(reading)
-    return dict(zip(TICK_NAMES, tick, strict=True))
 
 
 def configure(effect, sigma=0.0):

@@ -35,7 +35,6 @@ from tests.scenarios.rig import (
 )
 from tests.scenarios.users import as_root, hand_over
 
-
 FULL = "disk full"
 READ_ONLY = "log folder read-only"
 KILLED = "kill -9 while logging"

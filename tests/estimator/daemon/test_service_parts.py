@@ -1,6 +1,4 @@
-"""What the service is made of: notifications, pulses, the disk cap, the status socket and those who
-read it.
-"""
+"""What the service is made of: notifications, pulses, the disk cap, the status socket."""
 
 from __future__ import annotations
 
@@ -8,14 +6,9 @@ import errno
 import json
 import math
 import os
-import pty
 import re
-import signal
 import socket
 import stat
-import subprocess
-import sys
-import termios
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -28,7 +21,6 @@ from gritd.estimator.daemon.notify import Notifier
 from gritd.estimator.daemon.publish import MAX_CLIENTS, Publisher, PublishError, line_of
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.retention import sweep, trim
 from gritd.estimator.recording.salvage import read
@@ -36,41 +28,10 @@ from gritd.estimator.recording.writer import WriterThread
 from gritd.estimator.threads import waiting
 from gritd.estimator.threads.pulse import Pulse, silent
 from gritd.tools.cli.command import CommandError
-from gritd.tools.commands import monitor, status
 from gritd.tools.service import client
+from tests.estimator.daemon.reports import REPORT, publishing
 
 ROOT = Path(__file__).parents[3]
-REPORT = {
-    "pid": 1,
-    "uptime": 3.0,
-    "healthy": True,
-    "hanging": "",
-    "real_time": "yes",
-    "configuration": "rig.yaml",
-    "status": "STARTING",
-    "flags": [],
-    "channels": {"wheel_encoder": "stale"},
-    "tick": {},
-    "loop": {"ticks": 7, "missed": 2, "lateness": 1e-4, "late_50": 1e-5},
-    "queue": {"received": 5, "processed": 5, "dropped": 0, "queued": 0},
-    "devices": {
-        'a"b': {
-            **dict.fromkeys(
-                ("readings", "frames", "bad", "lost", "errors", "quarantined", "reopened"), 3
-            ),
-            **{"state": "WAITING", "rate": 0.0, "last_error": "cannot open"},
-        }
-    },
-    "log": {
-        "state": "writing",
-        "error": "",
-        "queued": 0,
-        "dropped": 0,
-        "written": 9,
-        "files": 1,
-        "file": "run.mcap",
-    },
-}
 
 
 @pytest.fixture
@@ -266,11 +227,8 @@ def test_what_is_no_draft_is_not_waited_for(tmp_path):
 
 @pytest.fixture
 def publisher(tmp_path):
-    publisher = Publisher(tmp_path / "gritd.sock", lambda: REPORT)
-    publisher.start()
-    yield publisher
-    publisher.close()
-    assert not publisher.path.exists()
+    with publishing(tmp_path / "gritd.sock") as publisher:
+        yield publisher
 
 
 def test_the_socket_is_for_user_and_group_only(publisher):
@@ -318,128 +276,3 @@ def test_a_socket_that_a_dead_daemon_left_is_replaced_and_a_file_is_not(tmp_path
         Publisher(path, lambda: REPORT)
     with pytest.raises(PublishError, match="longer than 107 bytes"):
         Publisher(tmp_path / ("x" * 120), lambda: REPORT)
-
-
-@pytest.mark.parametrize("form", [[], ["--json"], ["--prometheus"]])
-def test_status_in_every_form(publisher, capsys, form):
-    assert status.main(["--socket", str(publisher.path), *form]) == 0
-    out = capsys.readouterr().out
-    if form == ["--json"]:
-        assert json.loads(out) == json.loads(json.dumps(REPORT))
-    elif form:
-        assert (
-            "gritd_ticks_missed_total 2\n" in out
-            and 'gritd_device_bad_total{device="a\\"b"} 3' in out
-        )
-        assert all(
-            re.fullmatch(r'#.*|[a-z_]+(\{device=".*"\})? [-+.\de]+', line)
-            for line in out.splitlines()
-        )
-    else:
-        assert "STARTING" in out and "WAITING" in out
-
-
-def test_status_of_a_daemon_that_hangs_is_code_1(publisher, monkeypatch):
-    monkeypatch.setattr(
-        publisher, "_report", lambda: {**REPORT, "healthy": False, "hanging": "loop"}
-    )
-    assert status.main(["--socket", str(publisher.path)]) == 1
-
-
-def test_no_daemon_is_one_line(tmp_path):
-    with pytest.raises(CommandError, match="no daemon answers: no such file or directory"):
-        status.main(["--socket", str(tmp_path / "none")])
-
-
-@pytest.mark.parametrize("line", [b"hello\n", b"[]\n", b"{}\n", b"[" * 5000 + b"\n"])
-def test_what_is_no_daemon_is_one_line(tmp_path, line):
-    path = tmp_path / "other"
-    with socket.socket(socket.AF_UNIX) as other:
-        other.bind(str(path))
-        other.listen()
-        connection = client.connected(str(path))
-        other.accept()[0].sendall(line)
-        with connection, pytest.raises(CommandError, match="no gritd"):
-            next(client.reports(connection))
-
-
-def test_the_monitor_shows_channels_devices_and_log(publisher, capsys):
-    assert monitor.main(["--socket", str(publisher.path), "--once"]) == 0
-    out = capsys.readouterr().out
-    for words in ("wheel_encoder stale", "WAITING", "cannot open", "7 ticks, 2 missed", "run.mcap"):
-        assert words in out
-
-
-TICK = {
-    **{key: 12345.678 for _, name, sigma, *_ in monitor.SHOWN for key in (name, sigma)},
-    **{"separability": 1.0, "consistency": 1.0, "updates": 10**6, "resets": 10},
-    **dict.fromkeys(("late", "duplicates", "invalid", "jumps"), 10**5),
-}
-LATE = dict.fromkeys(("late_50", "late_99", "late_999", "late_max"), 0.01234)
-DEVICE = {**REPORT["devices"]['a"b'], "state": "OPEN", "rate": 1000.0, "last_error": ""}
-HEALTHY = {
-    **REPORT,
-    **{
-        "status": "STANDSTILL",
-        "flags": ["NOT_SEPARABLE", "K_ESTIMATED"],
-        "uptime": 1e6,
-        "tick": TICK,
-    },
-    "channels": dict.fromkeys(CHANNEL_BITS, "stale"),
-    "loop": {**REPORT["loop"], **LATE, "ticks": 10**8, "missed": 10**5},
-    "devices": {"encoders": DEVICE, "bus": DEVICE},
-}
-
-
-def test_the_monitor_fits_a_terminal_of_80_by_24_and_tells_of_trouble_first():
-    picture = list(monitor.lines(HEALTHY))
-    assert len(picture) <= 24 and max(map(len, picture)) <= 80
-    log = {
-        **REPORT["log"],
-        "state": "degraded",
-        "error": "run.mcap: cannot write: No space left on device",
-    }
-    sick = list(monitor.lines({**REPORT, "hanging": "loop", "log": log}))
-    assert sick[1:4] == [
-        "! hanging: loop",
-        '! a"b WAITING cannot open',
-        "! log degraded run.mcap: cannot write: No space left on device",
-    ]
-
-
-def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
-    found = {"channel": "drawbar_pull", "since": 3723.0, "sigmas": 4.21}
-    picture = list(monitor.lines({**HEALTHY, "disagreement": found}))
-    assert picture[1] == "! model disagrees with drawbar pull since 01:02:03 UTC, 4.2 σ off"
-    assert len(picture) <= 24 and list(monitor.lines({**HEALTHY, "disagreement": None})) == list(
-        monitor.lines(HEALTHY)
-    )
-
-
-def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
-    """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never
-    wrapped.
-    """
-    master, slave = pty.openpty()
-    termios.tcsetwinsize(slave, (10, 40))
-    command = [sys.executable, "-m", "gritd", "monitor", "--socket", str(publisher.path)]
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # if we ignore it, so does a child
-    child = subprocess.Popen(command, stdout=slave, cwd=ROOT, env={**os.environ, "TERM": "xterm"})
-    signal.signal(signal.SIGINT, before)
-    os.close(slave)
-    seen = ""
-    while seen.count(monitor.HOME) < 3:
-        seen += os.read(master, 4096).decode(errors="replace")
-    child.send_signal(signal.SIGINT)
-    assert child.wait(120) == 130
-    seen += os.read(master, 4096).decode(errors="replace")
-    os.close(master)
-    assert seen.startswith(monitor.OPEN) and seen.endswith(monitor.CLOSE)
-    picture = re.sub(r"\033\[[?\d]*[A-Za-z]", "", seen.split(monitor.HOME)[2]).splitlines()
-    assert (
-        len(picture) == 10
-        and max(map(len, picture)) <= 40
-        and picture[1] == '! a"b WAITING cannot open'
-    )

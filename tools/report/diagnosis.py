@@ -11,13 +11,13 @@ from pathlib import Path
 
 from gritd.tools.cli.wording import listed, number, percent, shown, spaced
 from gritd.tools.diagnose.explain.result import (
-    STRAINED,
     Diagnosis,
     Hypothesis,
     Scatter,
     SoilFit,
     Trace,
 )
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.report import figures, hypotheses, record, redo, tables
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
@@ -295,7 +295,8 @@ def _soil(diagnosis: Diagnosis) -> Markup | None:
     legend = {"prior": "known before", **_fitted(diagnosis)}
     strain = (
         diagnosis.soil.strained()
-        or f"Without an effect no parameter is {STRAINED:g} σ from what was known before."
+        or "Without an effect no parameter is"
+        f" {TUNING.explain.strained_soil:g} σ from what was known before."
     )
     caption = f"Soil, ± 1σ thick and ± 2σ thin. {strain}"
 

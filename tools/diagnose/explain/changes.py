@@ -20,33 +20,17 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_evidence_singly
-from gritd.tools.diagnose.fit.functions import LEVELS as VARIES
-from gritd.tools.diagnose.fit.functions import SIZE
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.projection import WIDE, Projected, Projection
+from gritd.tools.diagnose.fit.projection import Projected, Projection
 from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.screen.screen import tail_quantile
 from gritd.tools.diagnose.screen.screening import Screening
+from gritd.tools.diagnose.tuning import TUNING
 
 ALONG = ("position", "time", "slip", "run")
 # along which a misfit may curve; not tried for a start
 CURVES = ("load", "speed", "sinkage", "heat", "elapsed")
-PLACES = 32  # tried along a covariate
-# of a change, relative to the whole stretch: a wheel is on both sides of it for a while
-WIDTHS = (0.015, 0.05)
-# cosines of a smooth function; their size falls with the square of their number, as a kink's does
-WAVES = 12
-FEW = 8  # values on either side of a change
-# least number of levels of a covariate, and share of the values that makes one
-LEVELS, HELD = 8, 0.015
-LEVEL = 0.01  # chance of any change point by noise alone
-LEAST = 3.0  # [nats]
-ROUNDS = 6
-# of a channel's misfit that offsets of the runs must take before one looks for changes between runs
-MOSTLY = 0.5
-NEARLY, FEW_RUNS = 0.93, 2  # of that, what so few steps between runs must take
-WORTH = 0.1  # of the evidence of the first part: a later change that gains less is detail
 
 Changes = dict[tuple[str, str], tuple[float, ...]]  # channel and covariate -> places in order
 
@@ -103,7 +87,7 @@ def find_changes(screening: Screening, model: Model) -> Changes:
         return {}
 
     nulls = np.max([largest for each in competitions for largest in _nulls(each)], axis=0)
-    threshold = max(tail_quantile(nulls, LEVEL), LEAST)
+    threshold = max(tail_quantile(nulls, TUNING.explain.change_chance), TUNING.explain.change_least)
 
     changes: Changes = {}
     for competition in competitions:
@@ -137,8 +121,10 @@ def columns(stack: Stack, channel: str, covariate: str, places: Sequence[float])
     along, own = values(stack, covariate), stack.of(channel)
     assert along is not None
     moving = own & (stack.covariate("speed") > 0.0)
-    size = SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
-    rise = _rise(along, np.array(places), WIDTHS[0] * float(np.ptp(along[moving])))
+    size = TUNING.fit.misfit_size * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    rise = _rise(
+        along, np.array(places), TUNING.explain.change_widths[0] * float(np.ptp(along[moving]))
+    )
     return np.where(moving[:, None], size * rise, 0.0)
 
 
@@ -151,10 +137,10 @@ def _competition(
     moving = stack.covariate("speed")[own] > 0.0
     if not moving.any():
         return None
-    size = SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+    size = TUNING.fit.misfit_size * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
     forms = [
         np.where(moving, size, 0.0)[:, None],
-        np.where(moving, SIZE * model.fitted.predicted[own], 0.0)[:, None],
+        np.where(moving, TUNING.fit.misfit_size * model.fitted.predicted[own], 0.0)[:, None],
     ]
     blocks = [
         (name, places, form * block)
@@ -182,7 +168,10 @@ def _along(
     """Covariates (n,) of a channel's values that vary while the wheel moves."""
     for name in names:
         along = values(stack, name)
-        if along is not None and np.ptp(along[own][moving]) > VARIES * np.abs(along[own]).max():
+        if (
+            along is not None
+            and np.ptp(along[own][moving]) > TUNING.fit.varies * np.abs(along[own]).max()
+        ):
             yield name, along[own]
 
 
@@ -194,22 +183,29 @@ def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array
             yield name, places, (along[:, None] > places).astype(float)
             continue
         if _swept(along[moving]):
-            low, high = np.quantile(along[moving], (0.01, 0.99))
-            places = _distinct(np.linspace(low, high, PLACES + 2)[1:-1], along[moving])
+            low, high = np.quantile(along[moving], TUNING.explain.change_range)
+            places = _distinct(
+                np.linspace(low, high, TUNING.explain.change_places + 2)[1:-1], along[moving]
+            )
             if name == "time":
                 inside = [(r.time[0] < places) & (places < r.time[-1]) for r in stack.rig.runs]
                 places = places[np.any(inside, axis=0)]
             if places.size:
                 span = float(np.ptp(along[moving]))
-                yield from ((name, places, _rise(along, places, width * span)) for width in WIDTHS)
+                yield from (
+                    (name, places, _rise(along, places, width * span))
+                    for width in TUNING.explain.change_widths
+                )
 
 
 def _swept(along: Array) -> bool:
     """Whether a covariate was driven through rather than held at a few levels, between which
     nothing can be placed.
     """
-    count, _ = np.histogram(along, PLACES)
-    return bool(np.sum(count >= HELD * along.size) >= LEVELS)
+    count, _ = np.histogram(along, TUNING.explain.change_places)
+    return bool(
+        np.sum(count >= TUNING.explain.level_held * along.size) >= TUNING.explain.swept_levels
+    )
 
 
 def _rise(along: Array, places: Array, width: float) -> Array:
@@ -223,14 +219,14 @@ def _distinct(places: Array, along: Array) -> Array:
     kept = [
         np.flatnonzero(beyond == count)
         for count in np.unique(beyond)
-        if FEW <= count <= along.size - FEW
+        if TUNING.explain.change_values <= count <= along.size - TUNING.explain.change_values
     ]
     return np.array([places[same].mean() for same in kept])
 
 
 def _curves(stack: Stack, own: Bools, moving: Bools) -> Iterator[Array]:
     """Smooth functions along each covariate (n, WAVES)."""
-    number = np.arange(1, WAVES + 1)
+    number = np.arange(1, TUNING.explain.change_waves + 1)
     for name, along in _along(stack, (*ALONG, *CURVES), own, moving):
         if name != "run":
             share = (along - along[moving].min()) / np.ptp(along[moving])
@@ -261,7 +257,7 @@ def _weighed(
     a, b = of.a[steps.own, steps.own], of.b[steps.own, which]
     count = len(a)
     # of the choice of step or window, form, covariate and width
-    price = np.log(4.0 * len(ALONG) * len(WIDTHS))
+    price = np.log(4.0 * len(ALONG) * len(TUNING.explain.change_widths))
 
     single = log_evidence_singly(np.diag(a), b)
     yield single - np.log(count) - price, [(i,) for i in range(count)]
@@ -284,7 +280,7 @@ def _taken_apart(
     for part in runs:
         left = left.without(part.direction(len(left.a)))
 
-    for _ in range(ROUNDS):
+    for _ in range(TUNING.explain.change_rounds):
         part = max(
             (_best(left, s) for s in competition.steps if s.covariate != "run"),
             key=lambda p: p.evidence,
@@ -293,7 +289,7 @@ def _taken_apart(
         curves = [_evidence(left, block) for block in competition.smooth]
         curve = max(curves, default=-np.inf)
         first = first or max(part.evidence, curve)
-        if max(part.evidence, curve) < max(threshold, WORTH * first):
+        if max(part.evidence, curve) < max(threshold, TUNING.explain.change_worth * first):
             return
         if curve >= part.evidence:
             left = left.without_columns(competition.smooth[int(np.argmax(curves))])
@@ -310,17 +306,20 @@ def _between_runs(competition: Competition, threshold: float) -> list[Part]:
     if not runs:
         return []
     offsets = max(_nats(whole, steps.own) for steps in runs)
-    if offsets < MOSTLY * _nats(whole, slice(0, len(whole.a))):
+    if offsets < TUNING.explain.run_share * _nats(whole, slice(0, len(whole.a))):
         return []
 
     left, parts = whole, list[Part]()
-    while len(parts) < min(FEW_RUNS, len(runs[0].places) - 1):
+    while len(parts) < min(TUNING.explain.few_run_steps, len(runs[0].places) - 1):
         part = max((_best(left, steps, windows=False) for steps in runs), key=lambda p: p.evidence)
         if part.evidence < threshold:
             return []
         parts.append(part)
         taken = np.column_stack([p.direction(len(left.a)) for p in parts])
-        if _nats(whole.combined(taken), slice(0, len(parts))) >= NEARLY * offsets:
+        if (
+            _nats(whole.combined(taken), slice(0, len(parts)))
+            >= TUNING.explain.run_nearly * offsets
+        ):
             return parts
         left = left.without(part.direction(len(left.a)))
     return []
@@ -329,7 +328,7 @@ def _between_runs(competition: Competition, threshold: float) -> list[Part]:
 def _nats(of: Projected, own: slice) -> float:
     """Log likelihood that a block gains."""
     a, b = of.a[own, own], of.b[own, 0]
-    return float(0.5 * b @ np.linalg.solve(a + np.eye(b.size) / WIDE**2, b))
+    return float(0.5 * b @ np.linalg.solve(a + np.eye(b.size) / TUNING.fit.projected_prior**2, b))
 
 
 def _evidence(left: Projected, block: slice) -> float:

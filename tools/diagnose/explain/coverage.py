@@ -9,12 +9,9 @@ import numpy as np
 from gritd.estimator.model.discrepancy import features_of
 from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.tuning import TUNING
 
-KNOWN = 0.3  # share of the discrepancy's variance that the reference may leave open
-MOST, LEAST = 120, 0.02  # inducing points; variance at which there are enough
 NAMED = ("slip", "load", "speed", "position")
-BEYOND = 0.02  # share of the range beyond which a covariate is outside
-SLIGHT = 0.02  # share of the values that must be beyond to be told
 
 
 @dataclass(frozen=True)
@@ -33,9 +30,9 @@ def coverage(stack: Stack) -> Coverage:
     known, asked = (
         np.vstack([c[w != 0.0] for c, w, n in pairs if n == which]) for which in (False, True)
     )
-    features = features_of(known, MOST, LEAST)
+    features = features_of(known, TUNING.explain.coverage_points, TUNING.explain.coverage_left)
     left = 1.0 - np.sum(features.at(asked) ** 2, axis=1)
-    return Coverage(float(np.mean(left < KNOWN)), _outside(stack))
+    return Coverage(float(np.mean(left < TUNING.explain.reference_open)), _outside(stack))
 
 
 def _outside(stack: Stack) -> str:
@@ -45,11 +42,13 @@ def _outside(stack: Stack) -> str:
     for name in NAMED:
         values = stack.covariate(name)
         known, asked = values[driving & ~stack.new], values[driving & stack.new]
-        room = BEYOND * max(float(np.ptp(known)), 0.02 * abs(float(np.mean(known))))
+        room = TUNING.explain.beyond * max(
+            float(np.ptp(known)), TUNING.explain.beyond_floor * abs(float(np.mean(known)))
+        )
         for beyond, end, word in (
             (asked > known.max() + room, float(known.max()), "above"),
             (asked < known.min() - room, float(known.min()), "below"),
         ):
-            if np.mean(beyond) > SLIGHT:
+            if np.mean(beyond) > TUNING.explain.beyond_share:
                 parts.append(f"{np.mean(beyond):.0%} {word} {value_of(stack, name, end)}")
     return "; ".join(parts) or "nothing"

@@ -8,8 +8,7 @@ import numpy as np
 
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
-
-STRAINED = 3.0  # [σ] from what is known, beyond which a constant is told
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def doubts(rig: Rig, model: Model) -> tuple[str, ...]:
@@ -21,7 +20,7 @@ def _strained(rig: Rig, model: Model) -> Iterator[str]:
     """Constants far from what is known of them, the farthest first."""
     for place in np.argsort(-np.abs(model.fitted.u)).tolist():
         strain = float(model.fitted.u[place])
-        if abs(strain) >= STRAINED:
+        if abs(strain) >= TUNING.explain.doubtful_constant:
             name = rig.constants[place].name
             yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
 

@@ -22,6 +22,7 @@ from gritd.tools.diagnose.explain.result import NextExperiment
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Foreseen
 from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 DRIVEN = (  # by effort
@@ -49,13 +50,6 @@ ALONG = {  # the covariate along which a misfit lives -> what shows its shape
     "wheel_angle": "lifted_spin",
     "constant": "lifted_spin",
 }
-INSTRUMENT = 0.2  # of an expected size: what tape, level or clamp meter can tell
-MODELLED = 0.02  # of a channel's size: no rival predicts an experiment better than this
-EVERY = 10  # foreseen values that count as one: neighbours share their noise
-ENOUGH, MOST = 10.0, 50.0  # [nats] that decide; more than MOST are said as MOST
-RIVALS = 4
-WORTH = 1.0  # [nats] from which on two are said to be told apart
-STEP = 0.1  # [σ] of a constant, for differences
 
 
 def next_experiment(search: Search, decision: Decision) -> NextExperiment | None:
@@ -72,9 +66,15 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
 def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
     gains = {key: _told_apart(search, rivals, key) for key in DRIVEN} | _measured(rivals)
-    settled = {key: sum(gain >= ENOUGH for gain in each) for key, each in gains.items()}
+    settled = {
+        key: sum(gain >= TUNING.explain.gain_enough for gain in each) for key, each in gains.items()
+    }
     key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
-    told = [m for m, gain in zip(rivals[1:], gains[key], strict=True) if gain >= WORTH]
+    told = [
+        m
+        for m, gain in zip(rivals[1:], gains[key], strict=True)
+        if gain >= TUNING.explain.gain_worth
+    ]
     names = tuple(
         dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
     )
@@ -110,7 +110,7 @@ def _rivals(search: Search, decision: Decision) -> list[Model]:
     best, groups = decision.best, decision.groups.values()
     same = [m for m in search.models if len(m.names) == len(best.names)]
     close = [m for m in same if any(set(m.names) - set(best.names) <= set(g) for g in groups)]
-    return sorted(close, key=lambda m: -m.evidence)[:RIVALS] if best.names else []
+    return sorted(close, key=lambda m: -m.evidence)[: TUNING.explain.rivals] if best.names else []
 
 
 def _common(rivals: list[Model]) -> set[str]:
@@ -157,7 +157,10 @@ def _read(one: Model, other: Model, key: str) -> float:
         for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
             tells = any(EFFECTS[f.name].confusable_with.get(name) == key for name in rival.names)
             if tells and f.parameter.role == "strength":
-                gain = max(gain, min(0.5 * float(x / INSTRUMENT) ** 2, MOST))
+                gain = max(
+                    gain,
+                    min(0.5 * float(x / TUNING.explain.instrument) ** 2, TUNING.explain.gain_most),
+                )
     return gain
 
 
@@ -215,7 +218,13 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
         return None
     shape = max(evidence, key=lambda s: evidence[s])
     key = ALONG.get(shape.along[0], "slip_step")
-    gain = float(np.clip(evidence[shape] / max(len(search.problem.stack.rig.runs), 1), 0.0, MOST))
+    gain = float(
+        np.clip(
+            evidence[shape] / max(len(search.problem.stack.rig.runs), 1),
+            0.0,
+            TUNING.explain.gain_most,
+        )
+    )
     return _foretold(key, gain)
 
 
@@ -231,15 +240,17 @@ def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequenc
     for i, constant in enumerate(rig.constants):
         if constant.soil:
             moved = u.copy()
-            moved[i] += STEP
+            moved[i] += TUNING.explain.foreseen_step
             change = _values(rig.foresee(key, moved, effects)) - _values(here)
-            slopes.append(change / STEP * sigma[i])
+            slopes.append(change / TUNING.explain.foreseen_step * sigma[i])
     return np.column_stack(slopes)
 
 
 def _values(foreseen: Foreseen | None) -> Array:
     assert foreseen is not None
-    return np.concatenate([np.asarray(v)[::EVERY] for v in foreseen.channels.values()])
+    return np.concatenate(
+        [np.asarray(v)[:: TUNING.explain.foreseen_together] for v in foreseen.channels.values()]
+    )
 
 
 def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float:
@@ -250,11 +261,15 @@ def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float
     sigma = []
     for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
         usual = float(np.sqrt(np.mean(stack.measured[stack.of(channel)] ** 2)))
-        known = np.where(here.tells[channel], np.hypot(colour.sigma, MODELLED * usual), np.inf)
-        sigma.append(known[::EVERY])
+        known = np.where(
+            here.tells[channel],
+            np.hypot(colour.sigma, TUNING.explain.foreseen_error * usual),
+            np.inf,
+        )
+        sigma.append(known[:: TUNING.explain.foreseen_together])
 
     scale = np.concatenate(sigma)
     ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
     pulled = soil.T @ ready
     taken = pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)
-    return float(np.clip(0.5 * (ready @ ready - taken), 0.0, MOST))
+    return float(np.clip(0.5 * (ready @ ready - taken), 0.0, TUNING.explain.gain_most))

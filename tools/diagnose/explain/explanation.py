@@ -30,12 +30,10 @@ from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out,
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
-from gritd.tools.diagnose.screen.screen import LEVEL, Screen
+from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
-
-SHOWN = 12  # hypotheses
-SLIGHT = 1e-3  # probability below which an explanation does not count for the soil
 
 
 def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diagnosis:
@@ -80,7 +78,9 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
 
 def _test(found: Screen) -> Test:
     first, surprise = found.largest
-    return Test(label(first), surprise, found.threshold, found.p, LEVEL, len(found.nulls))
+    return Test(
+        label(first), surprise, found.threshold, found.p, TUNING.screen.level, len(found.nulls)
+    )
 
 
 def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location, ...]:
@@ -102,7 +102,7 @@ def _hypotheses(
     before = [held_out(search.base.fitted, f) for f in every]
     ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
     out = []
-    for name, probability in ranked[:SHOWN]:
+    for name, probability in ranked[: TUNING.explain.shown_hypotheses]:
         models = [m for m in search.models if name in m.names]
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
@@ -178,7 +178,7 @@ def _soil(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
         return None
     strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
     prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
-    return SoilFit(prior, _constants(rig, before, True), _averaged(rig, decision), strain)
+    return SoilFit(prior, _constants(rig, before, True), averaged_soil(rig, decision), strain)
 
 
 def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
@@ -192,11 +192,15 @@ def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
     }
 
 
-def _averaged(rig: Rig, decision: Decision) -> dict[str, Quantity]:
+def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
     """The soil, averaged over all explanations by their probabilities: which of them is true is
     part of what is not known.
     """
-    every = [(w.model, w.probability) for w in decision.weighed if w.probability > SLIGHT]
+    every = [
+        (w.model, w.probability)
+        for w in decision.weighed
+        if w.probability > TUNING.explain.slight_explanation
+    ]
     told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
     total = sum(share for _, share in told)
     out = {}

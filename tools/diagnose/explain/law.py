@@ -23,18 +23,16 @@ from gritd.tools.diagnose.explain.result import Law, Location, Quantity
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
 from gritd.tools.diagnose.fit.heldout import HeldOut, held_out, run_folds
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import WIDE, Fitted, Free, Maker, Problem
+from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import LawForm, Stack
 from gritd.tools.diagnose.screen.scans import in_step
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decide import taken_share
 from gritd.tools.diagnose.verdict.nameless import nameless_functions
-
-PAYS = 3.0  # [nats] a term must gain
-INSIDE = (0.005, 0.995)  # quantiles of a covariate between which its domain lies
 
 Domain = Mapping[str, tuple[float, float]]
 
@@ -94,7 +92,7 @@ def _with_functions(screening: Screening, model: Model) -> Start:
         return Start(problem, fitted, (), np.zeros((problem.stack.size, 0)))
 
     chosen = [in_step(screening.families, problem, fitted, s) for s in chosen]
-    columns = WIDE * np.column_stack([s.columns for s in chosen])
+    columns = TUNING.fit.strength_prior * np.column_stack([s.columns for s in chosen])
     beside = problem.beside(columns)
     refitted = beside.descend(fitted.effects, fitted.free, fitted.u, fitted.x)
     return Start(beside, refitted, tuple(chosen), columns)
@@ -141,7 +139,7 @@ def _forward(fitted: Fitted, columns: Array) -> list[int]:
     while len(kept) < len(b):
         tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
         i = max(tried, key=lambda k: tried[k])
-        if tried[i] < best + PAYS:
+        if tried[i] < best + TUNING.explain.term_pays:
             break
         kept, best = [*kept, i], tried[i]
     return kept
@@ -162,7 +160,10 @@ def _with_terms(start: Start, free: tuple[Free, ...], form: LawForm, domain: Dom
 
 def _domain(stack: Stack, form: LawForm) -> Domain:
     """Of each covariate the range that was driven, in the effect's units."""
-    ranges = {n: np.quantile(stack.covariate(n), INSIDE) / unit for n, unit in form.domain.items()}
+    ranges = {
+        n: np.quantile(stack.covariate(n), TUNING.explain.law_domain) / unit
+        for n, unit in form.domain.items()
+    }
     return {n: (float(v[0]), float(v[1])) for n, v in ranges.items()}
 
 

@@ -28,15 +28,9 @@ from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.screen.scans import candidates
 from gritd.tools.diagnose.screen.screen import tail_chance
 from gritd.tools.diagnose.screen.screening import Screening, chance_of
+from gritd.tools.diagnose.tuning import TUNING
 
-DISCOVERY = 0.05  # false-discovery rate of the list
-MOST = 8
-RIPPLE = 0.01  # chance of the strongest order by noise alone
-FAR = 3.0  # [σ]
 STRAINED = ("scale", "offset")  # constants of a channel's calibration
-LEAST = 0.05  # share below which a place is not worth naming
-# [nats] that a covariate gains beside those already named, and the LEAST share of what they gain
-BESIDE = 3.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +98,7 @@ def locate(
     places += _strains(stack, model) + _ripples(screening, projection, projected, families)
     places.sort(key=lambda place: -place.nats)
     named = {(p.location.channel, p.location.covariate): p.location for p in reversed(places)}
-    return tuple(named.values())[::-1][:MOST]
+    return tuple(named.values())[::-1][: TUNING.explain.places_listed]
 
 
 def _smooth_places(
@@ -126,7 +120,7 @@ def _smooth_places(
             before, told = _gain(projected, _joined(told))[0], [*told, family]
             nats = _gain(projected, _joined(told))[0] - before
             share = float(np.clip(nats / max(whole, 1e-9), 0.0, 1.0))
-            if q[family] <= DISCOVERY and share >= LEAST:
+            if q[family] <= TUNING.explain.false_discovery and share >= TUNING.explain.least_share:
                 chance = float(q[family])
                 location = _location(stack, residual, family, here, points, share, chance)
                 places.append(Place(nats, location))
@@ -281,7 +275,9 @@ def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
     while True:
         tried = {f: _evidence(projected, [*taken, f]) for f in families if f not in taken}
         first = max(tried, key=lambda f: tried[f], default=None)
-        if first is None or tried[first] < best + max(BESIDE, LEAST * best):
+        if first is None or tried[first] < best + max(
+            TUNING.explain.beside_gain, TUNING.explain.least_share * best
+        ):
             return taken
         taken, best = [*taken, first], tried[first]
 
@@ -313,7 +309,7 @@ def _ripples(
     every surrogate's.
     """
     stack = screening.problem.stack
-    orders = np.arange(3.0, highest_order(stack))
+    orders = np.arange(TUNING.explain.lowest_order, highest_order(stack))
     places = []
     for channel in stack.rig.channels if orders.size else ():
         here, size = [f for f in families if f.shape.channel == channel], size_of(stack, channel)
@@ -326,7 +322,7 @@ def _ripples(
         p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
         whole = _gain(projected, _joined(here))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
-        if p <= RIPPLE and share >= LEAST:
+        if p <= TUNING.explain.order_chance and share >= TUNING.explain.least_share:
             amplitude = size * _amplitude(left, best, best + orders.size)
             words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
             location = Location(channel, "wheel_angle", share, p, p, words)
@@ -375,7 +371,11 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
     constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
     for constant, u, taken in constants:
         channel, _, what = constant.name.rpartition("_")
-        if channel in stack.rig.channels and what in STRAINED and abs(u) > FAR:
+        if (
+            channel in stack.rig.channels
+            and what in STRAINED
+            and abs(u) > TUNING.explain.strain_far
+        ):
             words = wording.strain(channel, what, constant.of(u), constant.unit, u)
             p, share = float(2.0 * norm.sf(abs(u))), taken / float(nats.sum())
             places.append(Place(taken, Location(channel, "constant", share, p, p, words)))

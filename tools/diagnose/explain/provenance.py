@@ -15,8 +15,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.recording.salvage import Recording
-
-CLOSE = 1e-6  # relative difference below which two values are the same
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def remarks(recordings: Sequence[Recording], settings: Settings) -> list[str]:
@@ -40,7 +39,12 @@ def _differences(recording: Recording, settings: Settings) -> Iterator[str]:
         return  # of another version: nothing to compare
     for key, value in _values(settings):
         before = recorded.get(key, value)
-        if not math.isclose(before, value, rel_tol=CLOSE, abs_tol=CLOSE * abs(before)):
+        if not math.isclose(
+            before,
+            value,
+            rel_tol=TUNING.explain.same_value,
+            abs_tol=TUNING.explain.same_value * abs(before),
+        ):
             yield f"{key} {before:.6g} (configuration: {value:.6g})"
 
 

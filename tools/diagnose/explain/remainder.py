@@ -12,11 +12,9 @@ from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.tuning import TUNING
 
 ALONG = ("slip", "load", "speed", "position", "time", "wheel_angle")
-BENDS = 2  # powers of a covariate along which a remainder is described
-TELLS = 0.2  # share of a remainder's squares that a covariate must take to be named
-PARTS = 3  # of a covariate's range that are told apart
 
 
 def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
@@ -30,7 +28,11 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
         own = np.flatnonzero(stack.of(channel))
         squares = float(np.mean(left[own] ** 2)) - colour.sigma**2
         size = float(np.sqrt(max(squares, 0.0)))
-        where = _where(stack, channel, left) if size > 0.5 * colour.sigma else "within the noise"
+        where = (
+            _where(stack, channel, left)
+            if size > TUNING.explain.remainder_noise * colour.sigma
+            else "within the noise"
+        )
         found[channel] = Remainder(size, rig.units[channel], where)
     return found
 
@@ -43,11 +45,11 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
 
     shares = {name: _share(stack.covariate(name)[own], left[own]) for name in ALONG}
     name = max(shares, key=lambda n: shares[n])
-    if shares[name] < TELLS:
+    if shares[name] < TUNING.explain.remainder_share:
         return f"{mean:+.2g} {unit} on average, along no condition"
 
     along = stack.covariate(name)[own]
-    edges = np.quantile(along, np.linspace(0.0, 1.0, PARTS + 1))
+    edges = np.quantile(along, np.linspace(0.0, 1.0, TUNING.explain.remainder_parts + 1))
     low, high = along <= edges[1], along >= edges[-2]
     ends = [
         f"{float(np.mean(left[own][part])):+.2g} {unit} at {value_of(stack, name, float(along[part].mean()))}"
@@ -58,10 +60,10 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
 
 def _share(along: Array, left: Array) -> float:
     """Share of the squares about the mean that a smooth function of a covariate takes."""
-    if along.size < 10 or np.ptp(along) <= 1e-9:
+    if along.size < TUNING.explain.remainder_values or np.ptp(along) <= 1e-9:
         return 0.0
     scaled = (along - along.mean()) / np.ptp(along)
-    columns = np.vander(scaled, BENDS + 1)
+    columns = np.vander(scaled, TUNING.explain.remainder_bends + 1)
     fitted = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
     spread = float(np.sum((left - left.mean()) ** 2))
     return 1.0 - float(np.sum((left - fitted) ** 2)) / spread if spread > 0.0 else 0.0

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Verdict
 
 
@@ -91,7 +92,6 @@ SOIL = {  # in words
     "n": "sinkage exponent n",
     "K": "sinkage modulus K",
 }
-STRAINED = 2.0  # [σ] a soil parameter this far from what was known is worth a sentence
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,11 @@ class SoilFit:
         """In words, which parameters the fit without an effect moved far from what was known; empty
         if none.
         """
-        far = [(k, s) for k, s in self.strain.items() if math.isfinite(s) and abs(s) >= STRAINED]
+        far = [
+            (k, s)
+            for k, s in self.strain.items()
+            if math.isfinite(s) and abs(s) >= TUNING.explain.strained_soil
+        ]
         moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
         together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
         return f"Without an effect the fit moves {together} from what was known." if moved else ""

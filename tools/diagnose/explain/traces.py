@@ -13,8 +13,7 @@ from gritd.tools.diagnose.explain.result import Location, Scatter, Trace
 from gritd.tools.diagnose.fit.heldout import HeldOut
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools
-
-PICTURES = 4  # scatters at most
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def traces(problem: Problem, before: HeldOut, after: HeldOut) -> tuple[Trace, ...]:
@@ -55,7 +54,7 @@ def scatters(
 ) -> tuple[Scatter, ...]:
     stack, rig = problem.stack, problem.stack.rig
     out = []
-    for place in location[:PICTURES]:
+    for place in location[: TUNING.explain.pictures]:
         name = place.covariate
         own = stack.of(place.channel)
         x = stack.run.astype(float) if name == "run" else stack.covariate(name)

@@ -26,6 +26,7 @@ from gritd.tools.diagnose.explain import changes
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.tuning import TUNING
 
 AT = {  # a value of a covariate, in words
     "slip": "{} slip",
@@ -38,13 +39,6 @@ AT = {  # a value of a covariate, in words
     "heat": "∫I² dt of {}",
     "acceleration": "{}",
 }
-# quantiles of a covariate between which means are taken
-LOW, MIDDLE, HIGH = (0.0, 0.15), (0.4, 0.6), (0.85, 1.0)
-STANDS_OUT = 0.25  # of the difference between the ends: a middle that far outside them is said
-ALIKE = 0.15  # of a mean: two that are closer are called the same
-NAMED = 6  # runs that are all named; of more, the MOST that are farthest off
-MOST = 3
-SHOWS = 0.6  # of the squares of the runs' means
 WINDOW = 2  # change points between which something is another
 TIMES = {1: "once", 2: "twice"}
 
@@ -160,9 +154,13 @@ def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
     if not rest.any():
         return f"everywhere {say(mean)}"
     still = float(residual[rest].mean())
-    if abs(still - mean) < ALIKE * abs(mean):
+    if abs(still - mean) < TUNING.explain.means_alike * abs(mean):
         return f"at rest as while the wheel turns {say(mean)}"
-    known = "as the model" if abs(still) < ALIKE * abs(mean) else _brief(say(still))
+    known = (
+        "as the model"
+        if abs(still) < TUNING.explain.means_alike * abs(mean)
+        else _brief(say(still))
+    )
     return f"while the wheel turns {say(mean)}, at rest {known}"
 
 
@@ -192,10 +190,13 @@ def _digits(covariate: str, value: float) -> int:
 def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) -> str:
     """Means at the low and the high end, and in the middle where that stands out."""
     x = stack.covariate(covariate)
-    ends = [_quantiles(x, residual, own, part) for part in (LOW, MIDDLE, HIGH)]
+    ends = [
+        _quantiles(x, residual, own, part)
+        for part in (TUNING.explain.low_end, TUNING.explain.middle, TUNING.explain.high_end)
+    ]
     (_, low), (_, middle), (_, high) = ends
     outside = max(middle - max(low, high), min(low, high) - middle)
-    if outside <= STANDS_OUT * abs(high - low):
+    if outside <= TUNING.explain.middle_stands_out * abs(high - low):
         ends = [ends[0], ends[2]]
     (first, mean), *rest = ends
     others = [f"{_brief(say(m))} at {_value(stack, covariate, v)}" for v, m in rest]
@@ -253,7 +254,10 @@ def shows(stack: Stack, residual: Array, channel: str, places: Sequence[float]) 
 
     side = np.searchsorted(sorted(places), numbers)
     level = np.array([means[side == k].mean() for k in side])
-    return bool(np.sum((level - means.mean()) ** 2) >= SHOWS * np.sum((means - means.mean()) ** 2))
+    return bool(
+        np.sum((level - means.mean()) ** 2)
+        >= TUNING.explain.runs_show * np.sum((means - means.mean()) ** 2)
+    )
 
 
 def _contrast(inside: Array, rest: Array) -> tuple[float, float]:
@@ -291,8 +295,8 @@ def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], sa
         )
 
     told = list(names)
-    if len(told) > NAMED:
-        told = sorted(sorted(told, key=lambda n: -abs(means[n]))[:MOST])
+    if len(told) > TUNING.explain.runs_named:
+        told = sorted(sorted(told, key=lambda n: -abs(means[n]))[: TUNING.explain.runs_far_named])
     each = [f"{_brief(say(means[n]))} in {names[n]}" for n in told]
     return (
         f"{'from run to run' if len(told) == len(names) else 'most'}: {listed(each)} than the model"
@@ -332,8 +336,8 @@ def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say
     """Of the four corners of two covariates the one that is farthest off."""
     x, y = (stack.covariate(name) for name in names)
     corners = []
-    for first in (LOW, HIGH):
-        for second in (LOW, HIGH):
+    for first in (TUNING.explain.low_end, TUNING.explain.high_end):
+        for second in (TUNING.explain.low_end, TUNING.explain.high_end):
             inside = own & _within(x, own, first) & _within(y, own, second)
             if inside.any():
                 corners.append((float(residual[inside].mean()), inside))
@@ -350,6 +354,8 @@ def _corner(stack: Stack, residual: Array, own: Bools, names: Sequence[str], say
 
 def _within(x: Array, own: Bools, part: tuple[float, float]) -> Bools:
     """The lower or the upper third of a covariate: the outer ends of two may never meet."""
-    low, high = np.quantile(x[own], (0.0, 1.0 / 3.0) if part is LOW else (2.0 / 3.0, 1.0))
+    low, high = np.quantile(
+        x[own], (0.0, 1.0 / 3.0) if part == TUNING.explain.low_end else (2.0 / 3.0, 1.0)
+    )
     inside: Bools = (x >= low) & (x <= high)
     return inside

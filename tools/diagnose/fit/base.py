@@ -17,10 +17,7 @@ from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.noise.saturated import Explainable
 from gritd.tools.diagnose.rig.interface import Stack
-
-# of a channel's size: what integration rules and idealised servos may be off by, smoothly
-TOLERANCE = 1.5e-3
-ROUGH = 3  # rounds of the first fit, whose only use is to linearise
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -40,8 +37,10 @@ def fit_roughly(stack: Stack) -> BaseFit:
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
 
-    problem = Problem(stack, noise, tolerance(stack, TOLERANCE))
-    return BaseFit(problem, Model(problem.descend((), (), start, np.zeros(0), ROUGH)))
+    problem = Problem(stack, noise, tolerance(stack, TUNING.fit.tolerance))
+    return BaseFit(
+        problem, Model(problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds))
+    )
 
 
 def explainable(rough: BaseFit) -> Explainable:
@@ -84,5 +83,5 @@ def refit(rough: BaseFit, noise: Noise) -> BaseFit:
 
 def _problem(rough: BaseFit, noise: Noise) -> Problem:
     """Without freedoms, what each run does for itself allowed."""
-    allowed = tolerance(rough.problem.stack, TOLERANCE)
+    allowed = tolerance(rough.problem.stack, TUNING.fit.tolerance)
     return Problem(rough.problem.stack, noise, np.column_stack((allowed, noise.of_runs)))

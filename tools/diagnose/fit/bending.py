@@ -23,8 +23,12 @@ from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.tuning import TUNING
 
-FORMS = Sizes((0.05, 0.15, 0.4), (0.35, 0.45, 0.2))
+
+def bending_sizes() -> Sizes:
+    """Shares by which published forms of an effect differ, with their prior."""
+    return Sizes(TUNING.fit.bending_sizes, TUNING.fit.bending_prior)
 
 
 def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
@@ -36,7 +40,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
         if np.any(added):
             every = np.column_stack((functions, _harmonics(stack, fitted, number)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
-            found.append(freedom(effect.name, columns, noise, FORMS))
+            found.append(freedom(effect.name, columns, noise, bending_sizes()))
     return tuple(found)
 
 

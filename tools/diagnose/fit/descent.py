@@ -15,15 +15,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
-
-GAIN = 0.005  # [nats] a step that would gain less ends the descent
-NEAR = 1.0  # [nats] a good step that gains less leaves the slopes as they are
-START, LEAST, MOST = 1e-3, 1e-7, 1e7  # damping, in units of the curvature
-HARDER, SOFTER = 8.0, 0.2  # factors on the damping after a step that failed, and a good one
-FULFILLED, GOOD = 0.1, 0.75  # of the gain foretold: a step is taken; the damping falls
-TRIES = 12  # dampings tried from one place
-AT = 1e-9  # closer to a bound a coordinate is on it
-SETS = 8  # times the set of held coordinates may grow within one step
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +30,15 @@ class Bounds:
 
     def reached(self, centre: Array) -> Bools:
         """Coordinates (n,) that stand at a bound."""
-        at: Bools = (centre <= self.low + AT) | (centre >= self.high - AT)
+        at: Bools = (centre <= self.low + TUNING.fit.at_bound) | (
+            centre >= self.high - TUNING.fit.at_bound
+        )
         return at
 
     def held(self, centre: Array, gradient: Array) -> Bools:
         """Coordinates (n,) that stand at a bound and want out."""
-        held: Bools = ((centre <= self.low + AT) & (gradient > 0.0)) | (
-            (centre >= self.high - AT) & (gradient < 0.0)
+        held: Bools = ((centre <= self.low + TUNING.fit.at_bound) & (gradient > 0.0)) | (
+            (centre >= self.high - TUNING.fit.at_bound) & (gradient < 0.0)
         )
         return held
 
@@ -84,33 +78,38 @@ class Ground(Protocol[Linearised, Tried]):
 
 def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one."""
-    here, damping = start, START
+    here, damping = start, TUNING.fit.damping_start
     for _ in range(rounds):
         held = ground.bounds.held(here.centre, here.gradient)
         found = None
-        while found is None and damping < MOST:
+        while found is None and damping < TUNING.fit.damping_most:
             step = bounded_step(here, ground.bounds, held, damping)
             foretold = _gain(here, step)
-            if foretold < GAIN:
+            if foretold < TUNING.fit.gain:
                 return here, True
 
             tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
             share = (here.nats - nats) / foretold
-            if np.isfinite(nats) and share > FULFILLED:
+            if np.isfinite(nats) and share > TUNING.fit.fulfilled:
                 found = tried
-                damping = max(damping * (SOFTER if share > GOOD else 1.0), LEAST)
+                damping = max(
+                    damping * (TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0),
+                    TUNING.fit.damping_least,
+                )
             else:
-                damping *= HARDER
+                damping *= TUNING.fit.damping_harder
 
         if found is None:
             return here, False
-        near = foretold < NEAR and share > GOOD
+        near = foretold < TUNING.fit.near and share > TUNING.fit.good
         here = ground.moved(here, found) if near else ground.linearised(found)
-    return here, _gain(here, _undamped(here, ground.bounds)) < GAIN
+    return here, _gain(here, _undamped(here, ground.bounds)) < TUNING.fit.gain
 
 
 def _undamped(here: Place, bounds: Bounds) -> Array:
-    return bounded_step(here, bounds, bounds.held(here.centre, here.gradient), LEAST)
+    return bounded_step(
+        here, bounds, bounds.held(here.centre, here.gradient), TUNING.fit.damping_least
+    )
 
 
 def _gain(here: Place, step: Array) -> float:
@@ -122,7 +121,7 @@ def bounded_step(here: Place, bounds: Bounds, held: Bools, damping: float) -> Ar
     """The damped step (n,) that leaves no bound: coordinates that would are put on theirs."""
     held, step = held.copy(), np.zeros(here.centre.size)
     low, high = bounds.low - here.centre, bounds.high - here.centre
-    for _ in range(SETS):
+    for _ in range(TUNING.fit.held_sets):
         free = np.flatnonzero(~held)
         if not free.size:
             break
@@ -132,7 +131,7 @@ def bounded_step(here: Place, bounds: Bounds, held: Bools, damping: float) -> Ar
         damped = curvature + damping * np.diag(np.diag(curvature))
         step[free] = -np.linalg.solve(damped, pull)
 
-        beyond = ~held & ((step < low - AT) | (step > high + AT))
+        beyond = ~held & ((step < low - TUNING.fit.at_bound) | (step > high + TUNING.fit.at_bound))
         if not beyond.any():
             break
         step = np.asarray(np.clip(step, low, high))

@@ -16,12 +16,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Bools, FormSource, Stack
-
-FORM = Sizes((0.0, 0.003, 0.01, 0.03, 0.1, 0.3), (0.12, 0.12, 0.14, 0.22, 0.28, 0.12))
-DRIVE = Sizes((0.0, 0.003, 0.01, 0.03, 0.1), (0.3, 0.25, 0.25, 0.15, 0.05))
-MOST, LEAST = 36, 3e-3  # features of a source; variance of δ that may be left out
-TURN = 0.2  # size of what goes with the wheel's angle, in that of δ
-HARMONICS = (1.0, 2.0)  # a turn
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
@@ -30,9 +25,17 @@ def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
     for source in stack.rig.forms:
         columns = _columns(stack, source)
         if columns.shape[1]:
-            sizes = DRIVE if source.drive else FORM
+            sizes = _drive_sizes() if source.drive else _form_sizes()
             found.append(freedom(source.name, columns, noise, sizes))
     return tuple(found)
+
+
+def _form_sizes() -> Sizes:
+    return Sizes(TUNING.fit.form_sizes, TUNING.fit.form_prior)
+
+
+def _drive_sizes() -> Sizes:
+    return Sizes(TUNING.fit.drive_sizes, TUNING.fit.drive_prior)
 
 
 def _columns(stack: Stack, source: FormSource) -> Array:
@@ -46,12 +49,16 @@ def _columns(stack: Stack, source: FormSource) -> Array:
     conditions = np.column_stack(
         [_joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
     )
-    features = features_of(conditions[acting], MOST, LEAST)
+    features = features_of(conditions[acting], TUNING.fit.form_features, TUNING.fit.form_left_out)
     smooth = np.zeros((stack.size, len(features.points)))
     smooth[acting] = features.at(conditions[acting])
 
     angle = stack.covariate("wheel_angle")
-    turning = [TURN * wave(k * angle) for k in HARMONICS for wave in (np.cos, np.sin)]
+    turning = [
+        TUNING.fit.form_turn * wave(k * angle)
+        for k in TUNING.fit.form_harmonics
+        for wave in (np.cos, np.sin)
+    ]
     return np.asarray(
         np.column_stack((smooth, *turning)) * weight[:, None] * _size(stack, source, acting)
     )

@@ -19,8 +19,12 @@ from scipy.special import log_ndtr, logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.tuning import TUNING
 
-SCALES = np.array([0.1, 0.3, 1.0, 3.0])  # sizes of a strength tried, in units of the expected one
+
+def strength_sizes() -> Array:
+    """Sizes (s,) of a strength that are tried, in units of the expected one."""
+    return np.array(TUNING.fit.strength_sizes)
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,12 @@ def log_bayes(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
     turned = vectors.T @ b
 
     parts = []
-    for scale in SCALES:
+    for scale in strength_sizes():
         variance = 1.0 / (values + scale**-2)
         gain = 0.5 * np.tensordot(variance, turned**2, axes=(0, 0))
         part = gain - 0.5 * np.log1p(scale**2 * values).sum()
         parts.append(part + _one_sided(vectors, variance, turned, sign))
-    return np.asarray(logsumexp(np.stack(parts), axis=0) - np.log(len(SCALES)))
+    return np.asarray(logsumexp(np.stack(parts), axis=0) - np.log(len(strength_sizes())))
 
 
 def _one_sided(vectors: Array, variance: Array, turned: Array, sign: tuple[int, ...]) -> Array:
@@ -90,7 +94,7 @@ def log_evidence(a: Array, b: Array, sign: tuple[int, ...]) -> Array:
 
 
 def log_evidence_singly(a: Array, b: Array) -> Array:
-    """ln B (n, d) of each of n single columns: a (n,), b (n, d); averaged over SCALES."""
-    scale = SCALES[:, None, None]
+    """ln B (n, d) of each of n single columns: a (n,), b (n, d); averaged over the sizes."""
+    scale = strength_sizes()[:, None, None]
     gain = 0.5 * b**2 / (a[:, None] + scale**-2) - 0.5 * np.log1p(scale**2 * a[:, None])
-    return np.asarray(logsumexp(gain, axis=0) - np.log(len(SCALES)))
+    return np.asarray(logsumexp(gain, axis=0) - np.log(len(strength_sizes())))

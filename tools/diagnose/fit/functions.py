@@ -15,16 +15,10 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.tuning import TUNING
 
-# of the channel's size: the expected size of a misfit; a third and three times of it are tried too
-SIZE = 0.03
-WAVES = 4  # cosines along time or place
-LEVELS = 1e-3  # relative spread below which a covariate does not vary
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
 LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
-BENDS = 2  # cosines by which a share of an effect may vary along time or place
-# ripples a turn that a smooth term could not take; higher ones belong to listed effects
-ORDERS = (1.0, 2.0)
 
 
 def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
@@ -45,7 +39,11 @@ def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
 def size_of(stack: Stack, channel: str) -> float:
     """The expected size of a misfit of a channel, in its unit."""
     own = stack.of(channel)
-    return SIZE * float(np.sqrt(np.mean(stack.measured[own] ** 2))) if own.any() else 0.0
+    return (
+        TUNING.fit.misfit_size * float(np.sqrt(np.mean(stack.measured[own] ** 2)))
+        if own.any()
+        else 0.0
+    )
 
 
 def tolerance(stack: Stack, share: float) -> Array:
@@ -74,7 +72,7 @@ def shares(stack: Stack, own: Bools) -> Array:
     for along, family in _families(stack):
         if len(along) > 1 or along[0] not in ("run", "wheel_angle", "acceleration", "direction"):
             bent = len(along) == 1 and along[0] in LONG
-            columns.append(family[:, :BENDS] if bent else family)
+            columns.append(family[:, : TUNING.fit.bends] if bent else family)
     return _scaled(np.column_stack(columns), own, 1.0)
 
 
@@ -108,7 +106,7 @@ def _families(stack: Stack) -> Iterator[tuple[tuple[str, ...], Array]]:
 
     angle = stack.covariate("wheel_angle")
     if np.ptp(angle) > 2.0 * np.pi:
-        turns = [f(o * angle) * moving for o in ORDERS for f in (np.cos, np.sin)]
+        turns = [f(o * angle) * moving for o in TUNING.fit.turn_orders for f in (np.cos, np.sin)]
         yield ("wheel_angle",), np.column_stack(turns)
 
 
@@ -117,15 +115,17 @@ def _waves(values: Array) -> Array | None:
     if span <= 1e-9:
         return None
     along = (values - values.min()) / span
-    return np.column_stack([np.cos(np.pi * k * along) for k in range(1, WAVES + 1)])
+    return np.column_stack([np.cos(np.pi * k * along) for k in range(1, TUNING.fit.waves + 1)])
 
 
 def _standard(values: Array, where: Bools) -> Array | None:
     inside = values[where]
     spread = float(np.std(inside)) if inside.size else 0.0
-    if spread <= LEVELS * max(float(np.abs(values).max()), 1e-12):
+    if spread <= TUNING.fit.varies * max(float(np.abs(values).max()), 1e-12):
         return None
-    return np.asarray(np.clip((values - inside.mean()) / spread, -4.0, 4.0))
+    return np.asarray(
+        np.clip((values - inside.mean()) / spread, -TUNING.fit.outlying, TUNING.fit.outlying)
+    )
 
 
 def _scaled(columns: Array, own: Bools, size: float) -> Array:

@@ -16,8 +16,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
-
-BANDS = 3  # slip and load bands
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -45,14 +44,14 @@ def condition_folds(stack: Stack) -> list[Bools]:
     for name in ("load", "slip"):
         if name in stack.rig.runs[0].covariates:
             values = stack.covariate(name)
-            if np.ptp(values) > 0.05 * max(float(np.abs(values).max()), 1e-9):
+            if np.ptp(values) > TUNING.fit.band_spread * max(float(np.abs(values).max()), 1e-9):
                 band = _bands(values)
-                folds += [band == k for k in range(BANDS)]
+                folds += [band == k for k in range(TUNING.fit.bands)]
     return [f for f in folds if f.any() and not f.all()]
 
 
 def _bands(values: Array) -> Index:
-    edges = np.quantile(values, np.arange(1, BANDS) / BANDS)
+    edges = np.quantile(values, np.arange(1, TUNING.fit.bands) / TUNING.fit.bands)
     return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.intp)
 
 

@@ -24,9 +24,7 @@ from gritd.tools.diagnose.fit.evidence import log_bayes
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.problem import Fitted, Free
 from gritd.tools.diagnose.rig.interface import Bools
-
-SLIGHT = 1e-3  # weight of sizes below which they do not count
-SWEEPS = 4  # over the freedoms, each to its likeliest size
+from gritd.tools.diagnose.tuning import TUNING
 
 Chosen = tuple[int, ...]  # of each freedom, which of its sizes
 
@@ -70,7 +68,7 @@ class Marginal:
         the sizes about them.
         """
         chosen = start
-        for _ in range(SWEEPS):
+        for _ in range(TUNING.fit.size_sweeps):
             before = chosen
             for number in range(len(self.freedoms)):
                 chosen = max(self._along(chosen, number), key=self.log_evidence)
@@ -94,7 +92,7 @@ class Marginal:
         told = [
             (w, *self._posterior(c, count))
             for w, c in zip(weight, ordered, strict=True)
-            if w > SLIGHT
+            if w > TUNING.fit.slight_size
         ]
         total = sum(w for w, _, _ in told)
         mean = sum(w * m for w, m, _ in told) / total

@@ -10,8 +10,7 @@ from gritd.tools.diagnose.fit.bending import bending_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
-
-ROUNDS = 4  # of fit and sizes, one after the other; nearly always two are enough
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ def fit_model(
     """
     allowed = problem.with_freedoms(forms, _values(forms, sizes))
     fitted = allowed.descend(effects, free, *start)
-    for _ in range(ROUNDS):
+    for _ in range(TUNING.fit.size_rounds):
         bends = bending_freedoms(problem.stack, problem.noise, fitted)
         every = (*forms, *bends)
 

@@ -18,13 +18,9 @@ from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.projection import Projection, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
+from gritd.tools.diagnose.tuning import TUNING
 
 Maker = Callable[..., Effect]  # an effect's class, or one with some parameters given
-
-STEP = 2e-3  # of a prior σ or an expected size, for differences
-ROUNDS = 30  # linearisations at most; a descent that needs them all has not converged
-FAR = 8.0  # [σ] constants are kept this close to what is known of them
-WIDE = 3.0  # a strength's prior standard deviation, in units of the expected size
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,7 @@ class Free:
     @property
     def weight(self) -> float:
         """Square root of the prior precision of x."""
-        return 1.0 / WIDE if self.parameter.role == "strength" else 1.0
+        return 1.0 / TUNING.fit.strength_prior if self.parameter.role == "strength" else 1.0
 
 
 @dataclass(frozen=True)
@@ -161,20 +157,22 @@ class Problem:
         free: Sequence[Free],
         u: Array,
         x: Array,
-        rounds: int = ROUNDS,
+        rounds: int | None = None,
     ) -> Fitted:
         """The nearest optimum within bounds from constants u and effect parameters x."""
         ground = _Ground(self, tuple(effects), tuple(free))
         start = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))[0]
         here = ground.linearised(start)
-        fitted, converged = descent.descend(ground, here, rounds) if rounds else (here, False)
+        most = TUNING.fit.rounds if rounds is None else rounds
+        fitted, converged = descent.descend(ground, here, most) if most else (here, False)
         return replace(fitted, converged=converged)
 
-    def refit(self, fitted: Fitted, rounds: int = ROUNDS) -> Fitted:
+    def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
         """The nearest optimum from a fit with other tolerances, whose slopes are a start."""
         ground = _Ground(self, fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
-        found, converged = descent.descend(ground, ground.moved(fitted, start), rounds)
+        most = TUNING.fit.rounds if rounds is None else rounds
+        found, converged = descent.descend(ground, ground.moved(fitted, start), most)
         return replace(found, converged=converged)
 
 
@@ -257,7 +255,11 @@ class _Ground:
         """Of the prediction by every unknown (N, q + p); away from a bound."""
         stack, raw = self._problem.stack, np.zeros((predicted.size, centre.size))
         for i in (i for i in range(centre.size) if i not in stack.partial):
-            step = -STEP if centre[i] + STEP > self.bounds.high[i] else STEP
+            step = (
+                -TUNING.fit.step
+                if centre[i] + TUNING.fit.step > self.bounds.high[i]
+                else TUNING.fit.step
+            )
             moved = centre.copy()
             moved[i] += step
             raw[:, i] = (self._predicted(moved) - predicted) / step
@@ -269,9 +271,9 @@ class _Ground:
 def _ends(known: Constant) -> tuple[float, float]:
     """Bounds of a constant, in prior σ."""
     if known.log:
-        return -FAR, FAR
+        return -TUNING.fit.far, TUNING.fit.far
     low, high = ((end - known.value) / known.sigma for end in (known.low, known.high))
-    return max(low, -FAR), min(high, FAR)
+    return max(low, -TUNING.fit.far), min(high, TUNING.fit.far)
 
 
 def _ends_of(free: Free) -> tuple[float, float]:

@@ -20,8 +20,7 @@ from scipy.linalg import solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
-
-WIDE = 3.0  # prior standard deviation of what is projected out as well, in expected sizes
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class Projected:
     def without(self, directions: Array) -> Projected:
         """With combinations of the columns, (m, k), projected out too."""
         turned = self.a @ directions
-        gram = directions.T @ turned + np.eye(directions.shape[1]) / WIDE**2
+        gram = directions.T @ turned + np.eye(directions.shape[1]) / TUNING.fit.projected_prior**2
         taken = np.linalg.solve(gram, turned.T)
         return Projected(self.a - turned @ taken, self.b - taken.T @ (directions.T @ self.b))
 

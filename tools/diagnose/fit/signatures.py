@@ -13,15 +13,7 @@ from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.rig.interface import Index, Rig, Stack
-
-HIGHEST_ORDER = 200.0  # ripples a turn
-NYQUIST = 0.45  # of the grid's rate: the averaging damps faster ripples too much
-TURNS = 1.5  # ripples a run must hold to be told from a trend
-STRONGEST = 3  # orders of a channel that do not count as its noise
-ORDERS = 120  # at most
-STEPS = (1.0, 0.1, 0.01)  # of an expected size, for a derivative
-LARGEST = 10.0  # times the largest value measured: what changes by more runs away
-RELATIVE_TIMES = (0.1, 0.3, 1.0, 3.0)  # time constants tried, of the campaign's or the run's length
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def strengths(effect: type[Effect]) -> list[Parameter]:
@@ -72,8 +64,8 @@ def _derivative(
     """Change of all values (N,) per expected size; by a smaller step where the full one runs away,
     as a motor may that heats the more the more current it draws; NaN where every step does.
     """
-    largest = LARGEST * np.abs(stack.measured).max(initial=0.0)
-    for step in STEPS:
+    largest = TUNING.fit.runaway * np.abs(stack.measured).max(initial=0.0)
+    for step in TUNING.fit.derivative_steps:
         acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             change = stack.predict(u, (*others, acting)) - base
@@ -105,7 +97,7 @@ def _values(rig: Rig, parameter: Parameter) -> list[float]:
         return sorted(
             {
                 float(np.clip(f * t, parameter.low, parameter.high))
-                for f in RELATIVE_TIMES
+                for f in TUNING.fit.relative_times
                 for t in (length, campaign)
             }
         )
@@ -115,8 +107,8 @@ def _values(rig: Rig, parameter: Parameter) -> list[float]:
     if parameter.scan:
         return orders(rig, parameter)
 
-    if parameter.sigma >= 0.4 * abs(parameter.centre):
-        return [0.4 * parameter.centre, parameter.centre, 2.0 * parameter.centre]
+    if parameter.sigma >= TUNING.fit.shape_known * abs(parameter.centre):
+        return [factor * parameter.centre for factor in TUNING.fit.shape_factors]
     return [parameter.centre]
 
 
@@ -126,8 +118,8 @@ def _places(rig: Rig, parameter: Parameter) -> list[float]:
     low, high = float(along.min()), float(along.max())
     span = max(high - low, 1e-3)
     if "length" in parameter.name:
-        return [0.12 * span, 0.25 * span, 0.5 * span]
-    return [float(x) for x in np.linspace(low, high, 13)]
+        return [share * span for share in TUNING.fit.patch_lengths]
+    return [float(x) for x in np.linspace(low, high, TUNING.fit.patch_centres)]
 
 
 def orders(rig: Rig, parameter: Parameter) -> list[float]:
@@ -137,17 +129,23 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     speed = np.concatenate(
         [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
     )
-    turning = speed[speed > 0.05 * speed.max()] if speed.max() > 0.0 else speed
+    turning = speed[speed > TUNING.fit.turning_share * speed.max()] if speed.max() > 0.0 else speed
 
     rate = 1.0 / float(np.median(np.diff(rig.runs[0].time)))
-    highest = NYQUIST * rate * 2.0 * np.pi / max(float(np.quantile(turning, 0.8)), 1e-6)
+    highest = (
+        TUNING.fit.order_nyquist
+        * rate
+        * 2.0
+        * np.pi
+        / max(float(np.quantile(turning, TUNING.fit.usual_turning)), 1e-6)
+    )
 
-    top = min(parameter.high, HIGHEST_ORDER, highest)
+    top = min(parameter.high, TUNING.fit.highest_order, highest)
     turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
-    least = max(parameter.low, TURNS / max(turned, 1e-6))
+    least = max(parameter.low, TUNING.fit.least_turns / max(turned, 1e-6))
 
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
-    return [float(x) for x in whole[:: max(1, -(-len(whole) // ORDERS))]]
+    return [float(x) for x in whole[:: max(1, -(-len(whole) // TUNING.fit.most_orders))]]
 
 
 def highest_order(stack: Stack) -> float:
@@ -161,15 +159,22 @@ def highest_order(stack: Stack) -> float:
     )
 
     turned = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs)
-    usual = float(np.quantile(speed[speed > 0.05 * speed.max()], 0.8)) if speed.max() > 0.0 else 1.0
-    return 0.0 if turned < 2.0 * np.pi else float(min(NYQUIST * rate * 2.0 * np.pi / usual, ORDERS))
+    turning = speed[speed > TUNING.fit.turning_share * speed.max()]
+    usual = float(np.quantile(turning, TUNING.fit.usual_turning)) if speed.max() > 0.0 else 1.0
+    return (
+        0.0
+        if turned < 2.0 * np.pi
+        else float(
+            min(TUNING.fit.order_nyquist * rate * 2.0 * np.pi / usual, TUNING.fit.most_orders)
+        )
+    )
 
 
 def ripple_columns(stack: Stack, residual: Array) -> Array:
     """Cosine and sine of the strongest orders of each channel's residual (N, m), taken one after
     the other.
     """
-    orders = np.arange(3.0, highest_order(stack), 0.25)
+    orders = np.arange(TUNING.fit.lowest_ripple, highest_order(stack), TUNING.fit.ripple_spacing)
     if not orders.size:
         return np.zeros((stack.size, 0))
 
@@ -180,7 +185,7 @@ def ripple_columns(stack: Stack, residual: Array) -> Array:
         own = np.flatnonzero(stack.of(channel) & moving)
         waves = np.exp(1j * np.outer(angle[own], orders))
         left = residual[own] - np.mean(residual[own])
-        for _ in range(STRONGEST if own.size > 100 else 0):
+        for _ in range(TUNING.fit.strongest_orders if own.size > TUNING.fit.ripple_values else 0):
             best = waves[:, int(np.argmax(np.abs(left @ waves)))]
             pair = np.column_stack((best.real, best.imag))
             left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]

@@ -16,9 +16,7 @@ from scipy.signal import lfilter
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools, Stack
-
-FAST_TIME = 1.5  # correlation time of the fast part, in grid intervals
-NEGLIGIBLE = 1e-5  # weight of a value long past in an innovation
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ class Noise:
             colour = self.colours[self.stack.rig.channels.index(channel)]
             own = self.stack.of(channel) & (self.stack.run == number)
             inverse = whiten_unit(np.eye(int(own.sum())), self.stack.gaps[own], [colour])[0][0]
-            inverse[np.abs(inverse) < NEGLIGIBLE] = 0.0
+            inverse[np.abs(inverse) < TUNING.noise.negligible] = 0.0
             blocks.append(sparse.csr_matrix(inverse / (colour.sigma * self.loose[own])))
         return sparse.block_diag(blocks, format="csr")
 
@@ -93,7 +91,9 @@ def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Ar
     """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the
     innovation (n, g).
     """
-    times = np.array([[c.time for c in colours], [FAST_TIME * step_of(gaps)] * len(colours)])
+    times = np.array(
+        [[c.time for c in colours], [TUNING.noise.fast_time * step_of(gaps)] * len(colours)]
+    )
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
     white = 1.0 - share.sum(axis=0)
 
@@ -150,7 +150,10 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
     """Noise of a colour (n, count)."""
     white = 1.0 - colour.slow - colour.fast
     out = np.sqrt(white) * rng.standard_normal((len(gaps), count))
-    for share, time in ((colour.slow, colour.time), (colour.fast, FAST_TIME * step_of(gaps))):
+    for share, time in (
+        (colour.slow, colour.time),
+        (colour.fast, TUNING.noise.fast_time * step_of(gaps)),
+    ):
         if share > 0.0:
             out += np.sqrt(share) * _relaxing(gaps, count, time, rng)
     return np.asarray(colour.sigma * out)
@@ -159,7 +162,10 @@ def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) 
 def covariance(colour: Colour, time: Array, gaps: Array) -> Array:
     """Of noise of a colour (n, n) at times (n,)."""
     apart = np.abs(time[:, None] - time[None, :])
-    slow, fast = np.exp(-apart / colour.time), np.exp(-apart / (FAST_TIME * step_of(gaps)))
+    slow, fast = (
+        np.exp(-apart / colour.time),
+        np.exp(-apart / (TUNING.noise.fast_time * step_of(gaps))),
+    )
     white = (1.0 - colour.slow - colour.fast) * np.eye(len(time))
     return np.asarray(colour.sigma**2 * (white + colour.slow * slow + colour.fast * fast))
 
@@ -169,7 +175,9 @@ def _relaxing(gaps: Array, count: int, time: float, rng: np.random.Generator) ->
     is used.
     """
     step = step_of(gaps)
-    apart = 5 * (1 + round(time / step))  # grid places between runs: enough to forget
+    apart = TUNING.noise.apart * (
+        1 + round(time / step)
+    )  # grid places between runs: enough to forget
     place = np.cumsum(
         np.maximum(np.rint(np.where(np.isfinite(gaps), gaps / step, apart)), 1.0)
     ).astype(int)

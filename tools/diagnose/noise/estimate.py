@@ -22,28 +22,15 @@ from gritd.tools.diagnose.noise.colour import Colour, Noise, step_of, whiten_uni
 from gritd.tools.diagnose.noise.lines import standing
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
-
-SLOW_TIMES = (0.5, 1.0, 2.0, 4.0, 10.0)  # [s] correlation times of the slow part tried
-SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)  # its shares of the variance tried
-FAST = (0.0, 0.4, 0.9)  # shares of the rest that the fast part takes
-SURROGATE_COLOURS = 20  # drawn from the posterior of the colour
-RIDGE = 1e-9
-# values noisier than this share of their channel's, for blur, say nothing of the noise
-STEADY = 1.3
-CAREFUL = 0.6  # quantile of slow power in its posterior that the whitening assumes
-# prior: density of a colour falls as its slow power to this, since instruments drift less than they
-# hiss
-RARE = 0.5
-SPIKE = 6.0  # [σ] from the median of its neighbours: such a value counts as much less certain
-NEIGHBOURS = 5
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
     """(N,) how far a single value stands off its neighbours, where that is beyond SPIKE; else 0."""
     residual = stack.measured - predicted
-    off = np.abs(residual - median_filter(residual, NEIGHBOURS, mode="nearest"))
+    off = np.abs(residual - median_filter(residual, TUNING.noise.spike_neighbours, mode="nearest"))
     sigma = np.array([c.sigma for c in colours])[stack.channel]
-    return np.where(off > SPIKE * sigma, off, 0.0)
+    return np.where(off > TUNING.noise.spike * sigma, off, 0.0)
 
 
 def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
@@ -65,7 +52,7 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         inside = stack.of(channel) & np.isfinite(stack.gaps)
         step = np.diff(residual, prepend=0.0)[inside]
         sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
-        colours.append(Colour(max(sigma, _least(stack, channel)), SLOW_TIMES[0], 0.0))
+        colours.append(Colour(max(sigma, _least(stack, channel)), TUNING.noise.slow_times[0], 0.0))
     draws = tuple((c,) for c in colours)
     nothing = np.zeros((stack.size, 0))
     return Noise(stack, tuple(colours), draws, uncertain(stack, predicted, colours), nothing)
@@ -131,7 +118,9 @@ def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
     own = stack.of(channel)
     if not own.any():
         return own
-    steady: Bools = own & (before.loose <= max(STEADY, float(np.median(before.loose[own]))))
+    steady: Bools = own & (
+        before.loose <= max(TUNING.noise.steady, float(np.median(before.loose[own])))
+    )
     return steady
 
 
@@ -163,19 +152,28 @@ def _fit_channel(
         replace(c, sigma=max(float(np.sqrt(v)), least))
         for c, v in zip(tried, variance, strict=True)
     ]
-    chosen = rng.choice(len(sized), SURROGATE_COLOURS, p=weight / weight.sum())
+    chosen = rng.choice(len(sized), TUNING.noise.surrogate_colours, p=weight / weight.sum())
     return _careful(sized, weight / weight.sum(), step_of(stack.gaps)), *(sized[i] for i in chosen)
 
 
 def colours() -> list[Colour]:
     """All that are tried, of unit size."""
-    slow = [Colour(1.0, t, w, f * (1.0 - w)) for t in SLOW_TIMES for w in SLOW for f in FAST]
-    return slow + [Colour(1.0, SLOW_TIMES[0], 0.0, f) for f in FAST]
+    slow = [
+        Colour(1.0, t, w, f * (1.0 - w))
+        for t in TUNING.noise.slow_times
+        for w in TUNING.noise.slow_shares
+        for f in TUNING.noise.fast_shares
+    ]
+    return slow + [
+        Colour(1.0, TUNING.noise.slow_times[0], 0.0, f) for f in TUNING.noise.fast_shares
+    ]
 
 
 def log_prior(tried: Sequence[Colour], gaps: Array) -> Array:
     """Of each colour (g,), up to a constant; gaps (n,) between the values [s]."""
-    return np.asarray(-RARE * np.log([_slow_power(c, step_of(gaps)) for c in tried]))
+    return np.asarray(
+        -TUNING.noise.slow_power * np.log([_slow_power(c, step_of(gaps)) for c in tried])
+    )
 
 
 def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
@@ -184,7 +182,7 @@ def _careful(colours: Sequence[Colour], weight: Array, step: float) -> Colour:
     """
     power = np.array([c.sigma**2 * _slow_power(c, step) for c in colours])
     order = np.argsort(power)
-    at = int(np.searchsorted(np.cumsum(weight[order]), CAREFUL))
+    at = int(np.searchsorted(np.cumsum(weight[order]), TUNING.noise.careful))
     return colours[int(order[min(at, len(colours) - 1)])]
 
 
@@ -202,7 +200,7 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
         so many values.
     """
     inner, size = gram[:, :-1, :-1], gram.shape[1] - 1
-    inner = inner + RIDGE * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
+    inner = inner + TUNING.noise.ridge * np.trace(inner, axis1=1, axis2=2)[:, None, None] / max(
         size, 1
     ) * np.eye(size)
 
@@ -216,6 +214,6 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 
 
 def _least(stack: Stack, channel: str) -> float:
-    """A noise no channel is below: 1e-5 of its size. Noise-free simulations still need a scale."""
+    """A noise no channel is below. Noise-free simulations still need a scale."""
     values = stack.measured[stack.of(channel)]
-    return 1e-5 * float(np.sqrt(np.mean(values**2))) + 1e-12 if values.size else 1.0
+    return TUNING.noise.floor * float(np.sqrt(np.mean(values**2))) + 1e-12 if values.size else 1.0

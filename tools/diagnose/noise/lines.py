@@ -17,19 +17,9 @@ from scipy.stats import f as f_distribution
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Index, Stack
+from gritd.tools.diagnose.tuning import TUNING
 
 AXES = ("time", "position")
-STRETCH = 40.0  # [s] for which a wave keeps its phase at least
-CYCLES = 2.0  # in a stretch, to be told from a trend
-FINER = 2.0  # frequencies tried in each that the longest stretch resolves
-NYQUIST = 0.35  # of the grid's rate: faster waves are damped too much by the averaging
-MOST = 200  # frequencies of a scan
-FEW = 12  # values a stretch must hold
-CHANCE = 0.01  # of any line of a channel by noise of a smooth spectrum
-NEAR, FAR = 1.5, 7.0  # neighbours of a line, in resolved frequencies
-STRONGEST = 3  # lines of a channel along an axis that may stand out
-LONG = 6  # waves of the bed that are too long to have neighbours, at most
-SHARE = 8  # of a channel's values, those that lines may take
 
 
 def stretches(stack: Stack, channel: str) -> list[Index]:
@@ -42,9 +32,9 @@ def stretches(stack: Stack, channel: str) -> list[Index]:
         index = np.flatnonzero(own & (stack.run == number))
         if index.size:
             time = stack.time[index]
-            count = int(np.ceil(max(float(np.ptp(time)), 1e-9) / STRETCH))
+            count = int(np.ceil(max(float(np.ptp(time)), 1e-9) / TUNING.noise.stretch))
             parts += [index[part == k] for part in [_parts(time, count)] for k in range(count)]
-    return [index for index in parts if index.size >= FEW]
+    return [index for index in parts if index.size >= TUNING.noise.stretch_values]
 
 
 def _parts(time: Array, count: int) -> Index:
@@ -64,10 +54,13 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     along = np.concatenate(parts)
     interval = float(np.median(np.concatenate([np.abs(np.diff(x[index])) for index in parts])))
     span = longest if axis == "time" else float(np.ptp(x[along]))
-    low, high = CYCLES / longest, NYQUIST / max(interval, 1e-3 * longest)
+    low, high = (
+        TUNING.noise.cycles / longest,
+        TUNING.noise.line_nyquist / max(interval, 1e-3 * longest),
+    )
 
-    tried = np.arange(low, high, 1.0 / (FINER * span))
-    return np.asarray(tried[:MOST])
+    tried = np.arange(low, high, 1.0 / (TUNING.noise.line_density * span))
+    return np.asarray(tried[: TUNING.noise.most_frequencies])
 
 
 def waves(x: Array, frequency: Array) -> Array:
@@ -95,7 +88,7 @@ def standing(stack: Stack, residual: Array, explainable: Explainable, cells: Ind
         left = np.zeros(stack.size)
         left[own] = residual[own] - taken @ (taken.T @ residual[own])
 
-        room = own.size // SHARE
+        room = own.size // TUNING.noise.values_per_line
         for axis, parts in _phases(stack, channel):
             for pairs in _lines(
                 stack.covariate(axis), frequencies(stack, channel, axis), parts, left
@@ -117,7 +110,12 @@ def _long(stack: Stack, channel: str) -> Array:
     index, x = np.concatenate(parts), stack.covariate("position")
     longest = max(float(np.ptp(x[part])) for part in parts)
 
-    shapes = waves(x[index], tried[tried < (CYCLES + NEAR + 1.0) / longest][:LONG])
+    shapes = waves(
+        x[index],
+        tried[tried < (TUNING.noise.cycles + TUNING.noise.near_line + 1.0) / longest][
+            : TUNING.noise.long_waves
+        ],
+    )
     out = np.zeros((stack.size, 2 * shapes.shape[1]))
     out[index] = shapes.reshape(index.size, -1)
     return out
@@ -134,15 +132,15 @@ def _phases(stack: Stack, channel: str) -> Iterator[tuple[str, list[Index]]]:
 
 def _lines(x: Array, tried: Array, parts: list[Index], left: Array) -> Iterator[Array]:
     """Columns of one line after the other; `left` (N,) loses them."""
-    if tried.size < 2 * FAR:
+    if tried.size < 2 * TUNING.noise.far_line:
         return
 
     shapes, near = [waves(x[index], tried) for index in parts], neighbours(x, parts, tried)
-    for _ in range(STRONGEST):
+    for _ in range(TUNING.noise.strongest_lines):
         power = sum(_power(shape, left[index]) for shape, index in zip(shapes, parts, strict=True))
         chance = _chance(np.asarray(power), len(parts), near)
         best = int(np.argmin(chance))
-        if chance[best] * tried.size > CHANCE:
+        if chance[best] * tried.size > TUNING.noise.line_chance:
             return
 
         out = np.zeros((x.size, 2 * len(parts)))
@@ -164,7 +162,7 @@ def neighbours(x: Array, parts: list[Index], tried: Array) -> Array:
     """
     longest = max(float(np.ptp(x[index])) for index in parts)
     apart = np.abs(tried[:, None] - tried) * longest
-    return ((apart >= NEAR) & (apart <= FAR)).astype(float)
+    return ((apart >= TUNING.noise.near_line) & (apart <= TUNING.noise.far_line)).astype(float)
 
 
 def _chance(power: Array, parts: int, near: Array) -> Array:
@@ -178,9 +176,9 @@ def _chance(power: Array, parts: int, near: Array) -> Array:
     out = np.zeros(power.size)
     for side in (np.tril(near), np.triu(near)):
         count = side.sum(axis=1)
-        freedom = 2.0 * parts * np.maximum(count / FINER, 1.0)
+        freedom = 2.0 * parts * np.maximum(count / TUNING.noise.line_density, 1.0)
         beside = f_distribution.sf(
             power * count / np.maximum(side @ power, 1e-300), 2.0 * parts, freedom
         )
-        out = np.maximum(out, np.where(count > FINER, beside, 1.0))
+        out = np.maximum(out, np.where(count > TUNING.noise.line_density, beside, 1.0))
     return out

@@ -23,24 +23,14 @@ from scipy.stats import chi2
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, covariance
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
-
-# of a cell; of speed and load relative to their largest
-WIDTHS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
-FEW, MANY = 10, 60  # values a cell must hold; cells a channel may have
-PHASES = (0.5, 0.75, 0.0, 0.25)  # of the edges of cells
-EQUAL = 1e-3  # difference of pass or start at which two runs are no replicates
-PAIRS, FEWEST = 2, 4  # comparisons of replicates at least; fewer than so many count as so many
-SHAPES, LONG = 4, 40  # of what a run does: a mean and three of drift; values that drifts need
-WHOLE = 0.9  # share of a run in one cell, by which it held one condition
-MOSTLY = 0.8  # share of a wave's squares that no drift could be
-RARE = 0.01  # probability by which noise alone may make drifts differ as they do
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def cells(stack: Stack) -> Index:
     """Number of the cell of each value (N,); −1 where the wheel rests or little was held."""
-    for coarser in (1.0, 2.0, 4.0):
+    for coarser in TUNING.noise.coarser_cells:
         label = _labels(stack, coarser)
-        if label.max(initial=-1) < MANY:
+        if label.max(initial=-1) < TUNING.noise.most_cells:
             break
     return label
 
@@ -52,7 +42,7 @@ def _labels(stack: Stack, coarser: float) -> Index:
     conditions, label = np.unique(table[:, 1:], axis=0, return_inverse=True)
     label = label.ravel()
     count = np.bincount(label) / max(len(stack.rig.channels), 1)
-    kept = (count >= FEW) & (conditions[:, 0] > 0)
+    kept = (count >= TUNING.noise.cell_values) & (conditions[:, 0] > 0)
     renamed = np.where(kept, np.cumsum(kept) - 1, -1)
     return np.asarray(renamed[label], dtype=np.intp)
 
@@ -60,7 +50,7 @@ def _labels(stack: Stack, coarser: float) -> Index:
 def _conditions(stack: Stack) -> Array:
     """Slip, speed and load of each value, in widths of a cell (N, m)."""
     columns = [np.where(stack.new, 1.0, 0.0)]
-    for name, width in WIDTHS.items():
+    for name, width in TUNING.noise.cell_widths.items():
         if name in stack.rig.runs[0].covariates:
             values = stack.covariate(name)
             columns.append(
@@ -74,7 +64,7 @@ def _binned(values: Array) -> Index:
     """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on an
     edge.
     """
-    tried = [np.floor(values + phase).astype(int) for phase in PHASES]
+    tried = [np.floor(values + phase).astype(int) for phase in TUNING.noise.cell_phases]
     return max(
         tried,
         key=lambda bins: float(np.sum(np.unique(bins, return_counts=True)[1].astype(float) ** 2)),
@@ -107,7 +97,7 @@ def own_columns(
         sigma = between_runs(
             list(_held(stack, residual, label, number, colour, waves)),
             terms,
-            SHAPES + waves.shape[1],
+            TUNING.noise.drift_shapes + waves.shape[1],
         )
 
         for run in range(len(stack.rig.runs)) if sigma.any() else ():
@@ -159,11 +149,11 @@ def _held(
             else [own & (label == cell) for cell in np.unique(label[own & (label >= 0)])]
         )
 
-        for mask in (m for m in masks if m.sum() >= FEW):
+        for mask in (m for m in masks if m.sum() >= TUNING.noise.cell_values):
             shapes = _shapes(stack.time[mask], waves[mask])[:, : None if only else 1]
             inverse = np.linalg.pinv(shapes)
             noise = covariance(colour, stack.time[mask], stack.gaps[mask])
-            coefficients = np.full((2, SHAPES + waves.shape[1]), np.nan)
+            coefficients = np.full((2, TUNING.noise.drift_shapes + waves.shape[1]), np.nan)
             coefficients[:, : shapes.shape[1]] = (
                 inverse @ residual[mask],
                 np.diag(inverse @ noise @ inverse.T),
@@ -185,7 +175,7 @@ def _one_condition(own: Bools, label: Index) -> bool:
     meanwhile.
     """
     most = int(np.bincount(label[own] + 1)[1:].max(initial=0))
-    return bool(most >= max(LONG, WHOLE * int(own.sum())))
+    return bool(most >= max(TUNING.noise.drift_values, TUNING.noise.whole_run * int(own.sum())))
 
 
 def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCondition | None:
@@ -195,7 +185,7 @@ def _next(one: HeldCondition, held: list[HeldCondition], terms: Array) -> HeldCo
         for two in held
         if two.run > one.run
         and np.abs(two.condition - one.condition).max() <= 1.0
-        and np.abs(terms[two.run] - terms[one.run]).max() <= EQUAL
+        and np.abs(terms[two.run] - terms[one.run]).max() <= TUNING.noise.equal_runs
     ]
 
     return min(
@@ -210,9 +200,9 @@ def _shapes(time: Array, waves: Array) -> Array:
     Of waves what is no drift; nothing where that is little.
     """
     along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), 1e-9) - 1.0
-    drifts = legendre.legvander(along, SHAPES - 1)
+    drifts = legendre.legvander(along, TUNING.noise.drift_shapes - 1)
     left = waves - drifts @ np.linalg.lstsq(drifts, waves, rcond=None)[0]
-    kept = np.sum(left**2, axis=0) > MOSTLY * np.sum(waves**2, axis=0)
+    kept = np.sum(left**2, axis=0) > TUNING.noise.mostly_wave * np.sum(waves**2, axis=0)
     return np.column_stack((drifts, np.where(kept, left, 0.0)))
 
 
@@ -229,8 +219,10 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
     ):
         known = np.isfinite(difference)
         squares, chance = difference[known] ** 2, chance[known]
-        if squares.size >= PAIRS:
-            rare = chi2.sf(float(np.sum(squares / chance)), squares.size) < RARE
+        if squares.size >= TUNING.noise.least_pairs:
+            rare = (
+                chi2.sf(float(np.sum(squares / chance)), squares.size) < TUNING.noise.drift_chance
+            )
             if order == 0 or rare:
                 out[order] = np.sqrt(
                     _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)
@@ -241,7 +233,7 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
 
 def _few(count: int) -> float:
     """Variance of Student's t: a variance known from few differences must be taken larger."""
-    return max(count, FEWEST) / (max(count, FEWEST) - 2.0)
+    return max(count, TUNING.noise.fewest_pairs) / (max(count, TUNING.noise.fewest_pairs) - 2.0)
 
 
 def _terms(stack: Stack) -> Array:

@@ -8,11 +8,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
-
-COLUMNS = 40  # of the saturated mean, at most
-# of the residual: what changes less at its expected size explains nothing, it is a solver's
-# rounding
-SLIGHT = 1e-4
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -33,20 +29,21 @@ def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -
     held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
     held = basis(held, held.shape[1])
     beside = columns - held @ (held.T @ columns)
-    acting = np.linalg.norm(beside, axis=0) > SLIGHT * np.linalg.norm(residual)
+    acting = np.linalg.norm(beside, axis=0) > TUNING.noise.slight_column * np.linalg.norm(residual)
     return np.column_stack((held, basis(beside[:, acting])))
 
 
-def basis(columns: Array, most: int = COLUMNS) -> Array:
+def basis(columns: Array, most: int | None = None) -> Array:
     """Orthonormal columns (n, k) that span most of what columns (n, m) span, k ≤ n/4."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     if not columns.size:
         return np.zeros((columns.shape[0], 0))
 
+    most = TUNING.noise.saturated_columns if most is None else most
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.flatnonzero(values > 1e-7 * max(values[-1], 1e-300))[
-        -max(min(columns.shape[0] // 4, most), 1) :
+    kept = np.flatnonzero(values > TUNING.noise.rank * max(values[-1], 1e-300))[
+        -max(min(columns.shape[0] // TUNING.noise.values_per_column, most), 1) :
     ]
     basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     return basis

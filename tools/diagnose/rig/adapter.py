@@ -7,15 +7,11 @@ from collections.abc import Sequence
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.diagnose.rig.drive import RATE as DRIVE_RATE
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
 from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
-
-# all runs together up to so long [s]: grid [Hz]
-RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
-FIRST = 1.0  # [Hz] grid on which the length of the recordings is found
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def rig_of(
@@ -36,11 +32,14 @@ def rig_of(
             )
         series = [drive_series(r, settings) for r in recordings]
         names = [r.run.name or r.path.stem for r in recordings]
-        return DriveRig(series, names, settings), DRIVE_RATE
+        return DriveRig(series, names, settings), TUNING.rig.drive_rate
 
-    coarse = [[signals(r, settings, FIRST) for r in each] for each in (reference, recordings)]
+    coarse = [
+        [signals(r, settings, TUNING.rig.first_rate) for r in each]
+        for each in (reference, recordings)
+    ]
     length = sum(float(s.time[-1]) for each in coarse for s in each)
-    rate = next(hertz for limit, hertz in RATES if length <= limit)
+    rate = next(hertz for limit, hertz in TUNING.rig.rates if length <= limit)
     in_time = [
         sorted(zip(each, rough, strict=True), key=lambda pair: pair[1].start)
         for each, rough in zip((reference, recordings), coarse, strict=True)

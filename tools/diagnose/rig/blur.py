@@ -6,12 +6,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Stack
-
-# of the bend between neighbours: speeds are slopes over three intervals, corners are cut
-BEND = 0.5
-SHALLOW = 1e-3  # [m] a sinkage below which its changes mean little
-# [s] by which an axle sinks later than in the balance: its damping carries or adds load meanwhile
-LAG = 0.015
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def blur_of(stack: Stack, predicted: Array) -> Array:
@@ -25,10 +20,14 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     edge = ~np.isfinite(stack.gaps) | ~np.isfinite(np.append(stack.gaps[1:], np.inf))
 
     late = np.abs(np.diff(predicted, prepend=predicted[:1])) / gaps
-    depth = np.log(np.maximum(stack.covariate("sinkage"), SHALLOW))
+    depth = np.log(np.maximum(stack.covariate("sinkage"), TUNING.rig.shallow))
     late = late + np.abs(predicted * np.diff(depth, prepend=depth[:1])) / gaps
 
-    return np.asarray(np.hypot(BEND * _nearby(np.where(edge, 0.0, bend)), LAG * _nearby(late)))
+    return np.asarray(
+        np.hypot(
+            TUNING.rig.bend * _nearby(np.where(edge, 0.0, bend)), TUNING.rig.lag * _nearby(late)
+        )
+    )
 
 
 def _nearby(values: Array) -> Array:

@@ -16,8 +16,7 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion, Sensed
 from gritd.estimator.terramechanics.soil import Array, Soil
-
-ORDER = 6  # quadrature nodes a zone: 4e-6 of the torque
+from gritd.tools.diagnose.tuning import TUNING
 
 
 class Campaign:
@@ -65,7 +64,7 @@ class Campaign:
             effects,
             torque_constant=self._settings.drive.torque_constant.value,
             theta_1=None if self._start is None else self._start[part],
-            order=ORDER,
+            order=TUNING.rig.quadrature_order,
         )
 
         if part == slice(None):

@@ -10,9 +10,9 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.tuning import TUNING
 
 TURN = 2.0 * np.pi  # [rad] a recording that goes on for so long is no table
-STEADY = 0.2  # relative range of a speed that does not change
 
 
 def candidates(signals: Sequence[Signals], left_out: Collection[str]) -> dict[str, type[Effect]]:
@@ -40,4 +40,4 @@ def steady_states(signals: Signals) -> bool:
 
 
 def _changes(speed: Array) -> bool:
-    return float(np.ptp(speed)) > STEADY * float(np.abs(speed).max())
+    return float(np.ptp(speed)) > TUNING.rig.steady_range * float(np.abs(speed).max())

@@ -10,15 +10,8 @@ from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
+from gritd.tools.diagnose.tuning import TUNING
 
-TIMING = 5e-3  # [s] by which a channel's stamps may be off
-# second differences by which speeds, slopes over three intervals, cut corners that a channel does
-# not
-BLUR = 0.3
-FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}  # least relative sigma
-SCALE_FLOOR = 1e-3  # relative; no sensor's scale is known better
-LEAST_WEIGHTS = 2e-3  # nor any weights
-OWN = 0.7  # share of a common error of the weights that each set of them may have for itself
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m",
     "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s",
@@ -52,20 +45,20 @@ def _calibrations(
     for channel in channels:
         scale, offset = calibration_sigmas(settings, channel)
         constants += [
-            Constant(f"{channel}_scale", 0.0, max(scale, SCALE_FLOOR)),
+            Constant(f"{channel}_scale", 0.0, max(scale, TUNING.rig.scale_floor)),
             Constant(f"{channel}_offset", 0.0, max(offset, 1e-9), UNITS[channel]),
-            Constant(f"{channel}_delay", 0.0, TIMING, "s"),
-            Constant(f"{channel}_blur", 0.0, BLUR),
+            Constant(f"{channel}_delay", 0.0, TUNING.rig.timing, "s"),
+            Constant(f"{channel}_blur", 0.0, TUNING.rig.blur),
         ]
 
     nominal = settings.load.nominal
-    common = max(nominal.sigma / max(nominal.value, 1e-9), LEAST_WEIGHTS)
+    common = max(nominal.sigma / max(nominal.value, 1e-9), TUNING.rig.least_weights)
     constants.append(Constant("weights", 0.0, common))
     for name, load in zip(sets.names, sets.loads, strict=True):
         constants.append(Constant(name, 0.0, _own_weight(settings, load, common, weights_stated)))
 
     carriage = settings.channels["carriage_encoder"].calibration.scale
-    scale = max(carriage.sigma / abs(carriage.value), SCALE_FLOOR)
+    scale = max(carriage.sigma / abs(carriage.value), TUNING.rig.scale_floor)
     return [*constants, Constant("carriage_scale", 0.0, scale)]
 
 
@@ -74,8 +67,10 @@ def _own_weight(settings: Settings, load: float, common: float, weights_stated: 
     that load.
     """
     if settings.wrench is None or weights_stated:
-        return OWN * common
-    return float(np.hypot(OWN * common, settings.wrench.load.offset.sigma / load))
+        return TUNING.rig.own_weights * common
+    return float(
+        np.hypot(TUNING.rig.own_weights * common, settings.wrench.load.offset.sigma / load)
+    )
 
 
 def calibration_sigmas(settings: Settings, channel: str) -> tuple[float, float]:
@@ -111,9 +106,13 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
         "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
     }
 
-    raised = [name for name, (value, sigma, _) in stated.items() if sigma < FLOORS[name] * value]
+    raised = [
+        name
+        for name, (value, sigma, _) in stated.items()
+        if sigma < TUNING.rig.soil_floors[name] * value
+    ]
     if raised:
-        least = ", ".join(f"{name} {FLOORS[name]:.0%}" for name in raised)
+        least = ", ".join(f"{name} {TUNING.rig.soil_floors[name]:.0%}" for name in raised)
         caveats.append(
             f"The configuration states {', '.join(raised)} as almost exact;"
             f" they float within {least} instead."
@@ -124,7 +123,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
         Constant(
             name,
             value,
-            max(sigma, FLOORS[name] * value, 1e-12),
+            max(sigma, TUNING.rig.soil_floors[name] * value, 1e-12),
             unit,
             True,
             name in ("k", "K"),

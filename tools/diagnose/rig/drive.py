@@ -30,21 +30,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
+from gritd.tools.diagnose.tuning import TUNING
 
-RATE = 10.0  # [Hz] of the comparison, as for a wheel
-# [Hz] at most, on which position and current are averaged first and the model is evaluated
-FINE = 250.0
-ORDER = 4  # of the zero-phase low-passes
-# their cut-offs: of position and torque, of FINE; of the comparison, of RATE
-SHARP, BAND = 0.12, 0.4
-# sampling intervals by which current and position may be apart: a held output, a bus, a mean
-STAMPS = 2.0
-SHORTEST = 2.0  # [s] of a log
-EDGE = 0.2  # [s] at either end, where a filter lacks its neighbours
-# size that the drive's torque has in units of `unit`: that of the wheel the priors were made for
-USUAL = 2.0
-# share of the usual speed; a drive that stays below it rests, and friction holds whatever is asked
-STILL = 0.05
 EFFECTS_OF_A_DRIVE = (
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "gear_ripple",
     "motor_heating", "current_offset", "sensor_latency",
@@ -86,15 +73,18 @@ class DriveRig:
             for s, n in zip(series, names, strict=True)
         ]
 
-        self.unit = _size(m.torque for m in self._motions) / USUAL
+        self.unit = _size(m.torque for m in self._motions) / TUNING.rig.usual_torque
         speed = np.abs(np.concatenate([m.velocity for m in self._motions]))
-        self.usual = float(np.median(speed[speed > 0.05 * speed.max()]))  # [rad/s]
+        self.usual = float(np.median(speed[speed > TUNING.rig.moving * speed.max()]))  # [rad/s]
 
         self.constants = (
             Constant("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
             Constant("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
             Constant(
-                "torque_delay", 0.0, apart := STAMPS * max(m.sampled for m in self._motions), "s"
+                "torque_delay",
+                0.0,
+                apart := TUNING.rig.stamps * max(m.sampled for m in self._motions),
+                "s",
             ),
             Constant("torque_blur", 0.0, apart**2, "s²"),
         )
@@ -107,7 +97,7 @@ class DriveRig:
         """A constant that is not known is nothing, give or take ten times what would take all of
         the torque.
         """
-        return 10.0 * USUAL * self.unit / _size(values)
+        return TUNING.rig.unknown_drive * TUNING.rig.usual_torque * self.unit / _size(values)
 
     @property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
@@ -173,7 +163,7 @@ class DriveRig:
         velocity, torque, angle = (
             motion.compared(v) for v in (motion.velocity, motion.torque, motion.angle)
         )
-        still = STILL * self.usual
+        still = TUNING.rig.still * self.usual
         fastest = maximum_filter1d(np.abs(motion.velocity), 2 * motion.every + 1)[motion.kept]
 
         covariates = {
@@ -213,16 +203,16 @@ class DriveMotion:
     @property
     def every(self) -> int:
         """Fine intervals in one of the comparison."""
-        return max(round(1.0 / (RATE * self.step)), 1)
+        return max(round(1.0 / (TUNING.rig.drive_rate * self.step)), 1)
 
     @property
     def kept(self) -> slice:
         """The comparison's grid in the fine one."""
-        return slice(edge := round(EDGE / self.step), -edge, self.every)
+        return slice(edge := round(TUNING.rig.log_edge / self.step), -edge, self.every)
 
     def compared(self, values: Array) -> Array:
         """Values (m,) on the fine grid, low-passed, on the grid of the comparison (n,)."""
-        return np.asarray(_low_passed(values, BAND / self.every)[self.kept])
+        return np.asarray(_low_passed(values, TUNING.rig.band_cutoff / self.every)[self.kept])
 
 
 def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMotion:
@@ -232,21 +222,23 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMo
     time, angle = series["wheel_encoder"]
     current_time, current = series["motor_shunt"]
     sampled = max(float(np.median(np.diff(t))) for t in (time, current_time))
-    step = max(1.0 / FINE, sampled)
+    step = max(1.0 / TUNING.rig.fine_rate, sampled)
 
     begin, end = max(time[0], current_time[0]), min(time[-1], current_time[-1])
-    if end - begin < SHORTEST:
+    if end - begin < TUNING.rig.shortest_log:
         raise CommandError(
             f"{name}: found {max(end - begin, 0.0):.2f} s of position and current;"
-            f" expected {SHORTEST:g} s",
+            f" expected {TUNING.rig.shortest_log:g} s",
             DAMAGED,
         )
 
     fine = np.arange(begin + step, end - step, step)
-    smooth = _low_passed(_averaged(fine, step, time, angle), SHARP)
+    smooth = _low_passed(_averaged(fine, step, time, angle), TUNING.rig.sharp_cutoff)
     velocity = _rate(smooth, step)
 
-    torque = constant * _low_passed(_averaged(fine, step, current_time, current), SHARP)
+    torque = constant * _low_passed(
+        _averaged(fine, step, current_time, current), TUNING.rig.sharp_cutoff
+    )
     return DriveMotion(
         step, sampled, fine - fine[0], smooth, velocity, _rate(velocity, step), torque
     )
@@ -271,7 +263,9 @@ def _rate(values: Array, step: float) -> Array:
 
 def _low_passed(values: Array, cutoff: float) -> Array:
     """Through a zero-phase Butterworth filter; the cut-off in units of the sampling rate."""
-    return np.asarray(sosfiltfilt(butter(ORDER, 2.0 * cutoff, output="sos"), values))
+    return np.asarray(
+        sosfiltfilt(butter(TUNING.rig.filter_order, 2.0 * cutoff, output="sos"), values)
+    )
 
 
 def _averaged(fine: Array, step: float, time: Array, values: Array) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 from gritd.estimator.model.discrepancy import Usual, conditions_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import FormSource, Run
+from gritd.tools.diagnose.tuning import TUNING
 
-CARRYING = 0.2  # of the usual load: below it the wheel hardly touches the soil
 SOURCES = (  # name, channels that share one discrepancy, whether it turns with the direction
     ("torque", ("torque", "axle_torque"), True),
     ("drawbar_pull", ("drawbar_pull",), True),
@@ -46,7 +46,7 @@ def usual_of(runs: Sequence[Run]) -> Usual | None:
     driving = (speed > 0.0) & (load > 0.0)
     if not driving.any():
         return None
-    driving &= load > CARRYING * np.median(load[driving])
+    driving &= load > TUNING.rig.carrying * np.median(load[driving])
     return Usual(
         float(np.exp(np.mean(np.log(load[driving])))),
         float(np.exp(np.mean(np.log(speed[driving])))),
@@ -67,6 +67,6 @@ def _weight(run: Run, usual: Usual, signed: bool) -> Array:
     """How large δ is at each value (n,): in proportion to the load, 0 where no soil is touched."""
     known = run.covariates
     share = known["load"] / usual.load
-    carrying = (known["speed"] > 0.0) & (share > CARRYING)
+    carrying = (known["speed"] > 0.0) & (share > TUNING.rig.carrying)
     sign = np.where(known["direction"] < 0.0, -1.0, 1.0) if signed else 1.0
     return np.asarray(np.where(carrying, share * sign, 0.0))

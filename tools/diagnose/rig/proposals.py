@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.tuning import TUNING
 
-SECONDS, RATE = 24.0, 10.0
 LEVELS = {  # factors on the middle speed, slips, factors on the middle load
     "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
     "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
@@ -26,7 +26,10 @@ LEVELS = {  # factors on the middle speed, slips, factors on the middle load
 def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     """The motion of one experiment: its levels in turn, each for an equal time."""
     speeds, slips, loads = LEVELS[key]
-    time = np.arange(round(SECONDS * RATE)) / RATE
+    time = (
+        np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
+        / TUNING.rig.proposal_rate
+    )
 
     middle_speed, middle_load = (
         _middle([np.abs(m.wheel_speed) for m in driven]),
@@ -40,9 +43,9 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
 
     return Motion(
         time=time,
-        wheel_angle=np.cumsum(speed) / RATE,
+        wheel_angle=np.cumsum(speed) / TUNING.rig.proposal_rate,
         wheel_speed=speed,
-        carriage_position=np.cumsum(travel) / RATE,
+        carriage_position=np.cumsum(travel) / TUNING.rig.proposal_rate,
         carriage_speed=travel,
         load=middle_load * _stepped(loads, time),
         pass_number=last + 1.0 if key == "second_pass" else last,
@@ -55,18 +58,23 @@ def driving(key: str) -> NDArray[np.bool_]:
     something.
     """
     speeds, _, loads = LEVELS[key]
-    time = np.arange(round(SECONDS * RATE)) / RATE
+    time = (
+        np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
+        / TUNING.rig.proposal_rate
+    )
     driving: NDArray[np.bool_] = (_stepped(speeds, time) != 0.0) & (_stepped(loads, time) > 0.0)
     return driving
 
 
 def _middle(values: Sequence[Array | float]) -> float:
     joined = np.concatenate([np.atleast_1d(v) for v in values])
-    moving = joined[joined > 0.05 * joined.max()] if joined.max() > 0.0 else joined
+    moving = joined[joined > TUNING.rig.moving * joined.max()] if joined.max() > 0.0 else joined
     return float(np.median(moving))
 
 
 def _stepped(levels: Sequence[float], time: Array) -> Array:
-    index = np.minimum((time / SECONDS * len(levels)).astype(int), len(levels) - 1)
+    index = np.minimum(
+        (time / TUNING.rig.proposal_seconds * len(levels)).astype(int), len(levels) - 1
+    )
     values: Array = np.asarray(levels, dtype=np.float64)
     return np.asarray(values[index], dtype=np.float64)

@@ -14,16 +14,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
-
-CREEP = 0.05  # share of the usual rim speed below which the wheel does not drive
-# [s] after the wheel starts, before the comparison counts: at least, at most
-SETTLING, LONGEST = 0.5, 5.0
-# [s] before the wheel stops, from which on it no longer counts: a slope's reach, and a servo's ramp
-STOPPING = 0.5
-# [rad] usual entry angle: by then the rim has passed one contact length and the wheel has sunk
-ANGLE = 0.7
-# [s] the wheel must have stood, and go on standing, for its current to be that at rest
-RESTING, RISING = 0.4, 0.2
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
@@ -31,20 +22,33 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     (n,).
     """
     rim = settings.wheel.radius * np.asarray(motion.wheel_speed)
-    turning = np.abs(rim)[np.abs(rim) > 1e-3]
-    usual = float(np.median(turning)) if turning.size else 1e-3
+    turning = np.abs(rim)[np.abs(rim) > TUNING.rig.turning_speed]
+    usual = float(np.median(turning)) if turning.size else TUNING.rig.turning_speed
 
     load = np.asarray(motion.load)
-    carrying, lifted = load >= settings.load.minimum, load < 0.2 * settings.load.minimum
+    carrying, lifted = (
+        load >= settings.load.minimum,
+        load < TUNING.rig.lifted * settings.load.minimum,
+    )
     step = float(np.median(np.diff(np.asarray(motion.time))))
 
-    passing = float(np.clip(ANGLE / max(usual / settings.wheel.radius, 1e-6), SETTLING, LONGEST))
-    way = np.where(np.abs(rim) > CREEP * usual, np.sign(rim), 0.0)
-    apart = round(passing / step), round(STOPPING / step)
+    passing = float(
+        np.clip(
+            TUNING.rig.contact_angle / max(usual / settings.wheel.radius, 1e-6),
+            TUNING.rig.settling,
+            TUNING.rig.longest_settling,
+        )
+    )
+    way = np.where(np.abs(rim) > TUNING.rig.creep * usual, np.sign(rim), 0.0)
+    apart = round(passing / step), round(TUNING.rig.stopping / step)
 
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
     driving, spinning = (_inside(np.where(state, way, 0.0), *apart) for state in (carrying, lifted))
-    resting = _inside((rest & carrying).astype(float), round(RESTING / step), round(RISING / step))
+    resting = _inside(
+        (rest & carrying).astype(float),
+        round(TUNING.rig.resting / step),
+        round(TUNING.rig.rising / step),
+    )
     return driving, resting, spinning
 
 
@@ -52,8 +56,8 @@ def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     """Where both speeds (n,) [m/s] are 0 but for the encoders' noise: a standing wheel's slip means
     nothing.
     """
-    turning = np.abs(rim_speed)[np.abs(rim_speed) > 1e-3]
-    least = 0.01 * float(np.median(turning)) if turning.size else 1e-4
+    turning = np.abs(rim_speed)[np.abs(rim_speed) > TUNING.rig.turning_speed]
+    least = TUNING.rig.rest_speed * float(np.median(turning)) if turning.size else 1e-4
     rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
     return rest
 

@@ -11,11 +11,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
-
-# values at exactly one load that make a set of weights: in between, weights are being changed
-HELD = 10
-SAME = 0.02  # relative distance at which weights are others
-MANY = 60  # sets at most
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -33,9 +29,9 @@ class WeightSets:
 def weight_sets(loads: Sequence[Array]) -> WeightSets:
     """The sets in use, from the weights (n,) of each run [N]; none where all runs have the same."""
     values, count = np.unique(np.concatenate(loads), return_counts=True)
-    held = values[(count >= HELD) & (values > 0.0)]
-    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > SAME) + 1)
-    if not 1 < len(sets) <= MANY:
+    held = values[(count >= TUNING.rig.held_values) & (values > 0.0)]
+    sets = np.split(held, np.flatnonzero(np.diff(np.log(held)) > TUNING.rig.same_weights) + 1)
+    if not 1 < len(sets) <= TUNING.rig.most_sets:
         none = tuple(np.full(load.size, -1, dtype=np.intp) for load in loads)
         return WeightSets((), none)
     middle = np.array([one.mean() for one in sets])
@@ -44,4 +40,4 @@ def weight_sets(loads: Sequence[Array]) -> WeightSets:
 
 def _nearest(load: Array, middle: Array) -> Index:
     apart = np.abs(load[:, None] / middle - 1.0)
-    return np.where(apart.min(axis=1) <= SAME, apart.argmin(axis=1), -1)
+    return np.where(apart.min(axis=1) <= TUNING.rig.same_weights, apart.argmin(axis=1), -1)

@@ -11,15 +11,7 @@ import numpy as np
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import Signals
-
-# relative distance of the measured load from the stated one at which both mean the same
-CLOSE = 0.15
-RAISED = 0.2  # share of the stated load below which the wheel is lifted
-PASSING = 0.1  # share of a run that may pass between lifted and loaded
-# [σ] of configured weights and sensor, beyond which a run that states nothing had other weights
-DOUBT = 4.0
-LEVEL = 0.03  # relative change of the measured load that is a change of weights
-HOLD = 1.0  # [s] weights stay for at least this long
+from gritd.tools.diagnose.tuning import TUNING
 
 
 class Weights(NamedTuple):
@@ -39,17 +31,28 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     constant = np.full(signals.time.size, float(stated))
 
     measured = signals.analogue.get("load")
-    if measured is None or settings.wrench is None or settings.wrench.load.offset.sigma > 1e5:
+    if (
+        measured is None
+        or settings.wrench is None
+        or settings.wrench.load.offset.sigma > TUNING.rig.unknown_offset
+    ):
         return Weights(constant, True)
 
     load = _bridged(measured)
-    near, lifted = np.abs(load - stated) <= CLOSE * stated + 1.0, load <= RAISED * stated
+    near, lifted = (
+        np.abs(load - stated) <= TUNING.rig.close_load * stated + 1.0,
+        load <= TUNING.rig.raised * stated,
+    )
 
     held = float(np.median(load[~lifted])) if not lifted.all() else 0.0
-    known = nominal is not None or abs(held - stated) <= DOUBT * _sigma(
+    known = nominal is not None or abs(held - stated) <= TUNING.rig.load_doubt * _sigma(
         settings.load.nominal, settings.wrench.load
     )
-    if known and np.mean(near | lifted) >= 1.0 - PASSING and np.mean(near) > np.mean(lifted):
+    if (
+        known
+        and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
+        and np.mean(near) > np.mean(lifted)
+    ):
         return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
 
     note = (
@@ -72,10 +75,10 @@ def levels(time: Array, load: Array) -> Array:
     measured.
     """
     step = float(np.median(np.diff(time)))
-    half = max(round(0.5 * HOLD / step), 1)
+    half = max(round(0.5 * TUNING.rig.hold / step), 1)
     padded = np.pad(load, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    slack = LEVEL * np.abs(load) + 6.0 * _noise(load)
+    slack = TUNING.rig.load_level * np.abs(load) + TUNING.rig.load_noise * _noise(load)
 
     level = np.ptp(windows, axis=1) <= slack
     local = windows.mean(axis=1)

@@ -21,7 +21,7 @@ from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion, situation_of
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.blur import blur_of
-from gritd.tools.diagnose.rig.campaign import ORDER, Campaign, sensed_as
+from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import UNITS, calibration_sigmas, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
@@ -31,19 +31,13 @@ from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import at_rest, states
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import weights_of
+from gritd.tools.diagnose.tuning import TUNING
 
-HELD = 0.05  # of the driving torque: current at rest that differs by more holds something
-EDGE = 2  # intervals at either end of a run where a slope lacks its neighbours
-UNKNOWN = 1e5  # an offset less certain than this says that the channel was not measured
 # constants that need the forward model
 PHYSICS = ("c", "tan_phi", "k", "n", "K", "weights", "carriage_scale")
-ONE_LOAD = 0.1  # relative spread below which the loads are one
-KEPT = 8  # simulations of a run that are kept
 LEFT_OUT = ("empirical_law",)  # stands for what has no name
 
 Bed = Literal["same", "prepared"]
-# Repeatability of a bed that is raked and levelled anew, relative standard deviations
-PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
 
 
 LAW_PREFIX = {
@@ -90,7 +84,7 @@ class WheelRig:
         self._set = np.concatenate(self._sets.label)  # (N,)
         self.baseline = configured(settings.effects)
         stated = all(w.known for w in self._weights)
-        self._prepared = PREPARED if reference and bed == "prepared" else {}
+        self._prepared = TUNING.rig.prepared if reference and bed == "prepared" else {}
         self.constants = (
             *wheel_constants(settings, self.channels, self._sets, stated, self.caveats),
             *(Constant(f"new_{name}", 0.0, sigma) for name, sigma in self._prepared.items()),
@@ -153,7 +147,7 @@ class WheelRig:
         shifts = tuple(value[f"new_{name}"] if new else 0.0 for name in self._prepared)
         physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
         if physics not in self._kept:
-            if len(self._kept) >= KEPT:
+            if len(self._kept) >= TUNING.rig.kept_simulations:
                 self._kept.pop(next(iter(self._kept)))
             weights = 1.0 + value["weights"] + np.array(own)[self._of(new)]
             self._kept[physics] = campaign.readings(
@@ -239,7 +233,12 @@ class WheelRig:
         acting = (*self._baseline(value), *effects)
         motion = proposed(experiment, self._motions, self.settings.wheel.radius)
         sensed = simulate_arrays(
-            self.settings.wheel, soil, motion, acting, torque_constant=self._constant, order=ORDER
+            self.settings.wheel,
+            soil,
+            motion,
+            acting,
+            torque_constant=self._constant,
+            order=TUNING.rig.quadrature_order,
         ).sensed
 
         read = {
@@ -258,7 +257,7 @@ class WheelRig:
     def shortcomings(self) -> list[str]:
         sentences = []
         loads = np.concatenate([run.covariates["load"] for run in self.runs])
-        if np.ptp(loads) < ONE_LOAD * max(float(np.max(loads)), 1e-9):
+        if np.ptp(loads) < TUNING.rig.one_load * max(float(np.max(loads)), 1e-9):
             sentences.append(
                 "One load only: c and tan φ are nearly inseparable, and so are effects that differ"
                 " by load alone."
@@ -276,7 +275,7 @@ class WheelRig:
         driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
         known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
-        known[:EDGE] = known[-EDGE:] = False
+        known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
         used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
         return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
 
@@ -300,7 +299,7 @@ class WheelRig:
         if (
             len(means) < 2
             or not driven.size
-            or float(np.ptp(means)) < HELD * float(np.sqrt(np.mean(driven**2)))
+            or float(np.ptp(means)) < TUNING.rig.holding * float(np.sqrt(np.mean(driven**2)))
         ):
             return runs
 
@@ -320,7 +319,7 @@ class WheelRig:
         )
         soil = Soil(prior["c"], prior["tan_phi"], prior["k"], prior["n"], prior["K"])
         return simulate_arrays(
-            self.settings.wheel, soil, motion, self.baseline, order=ORDER
+            self.settings.wheel, soil, motion, self.baseline, order=TUNING.rig.quadrature_order
         ).sinkage
 
     def _covariates(self, signals: Signals, motion: Motion) -> dict[str, Array]:
@@ -355,7 +354,7 @@ def _channels(
         there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
         if (
             there
-            and calibration_sigmas(settings, channel)[1] < UNKNOWN
+            and calibration_sigmas(settings, channel)[1] < TUNING.rig.unknown_offset
             and (channel != "load" or all(weights_known))
         ):
             channels.append(channel)

@@ -30,17 +30,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import SCALES, Signature
+from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.noise.colour import Colour, whiten_unit
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Index
-
-# of the noise, beside what suits a channel for itself
-SIZES = np.array([0.8, 0.9, 1.0, 1.1, 1.25, 1.5])
-NEAR = 10.0  # [nats] colours so far behind the best for a channel alone are not tried in it
-SWEEPS = 2
-AT_ONCE = 8_000_000  # numbers whitened at once
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -100,7 +95,7 @@ class OpenNoise:
     def _evidence(self, more: Index) -> float:
         """Log evidence with some more columns, averaged over their sizes."""
         index = np.concatenate((self._base, more, [self._y]))
-        scales = SCALES if more.size else SCALES[:1]
+        scales = strength_sizes() if more.size else strength_sizes()[:1]
         prior = np.ones((len(scales), index.size - 1))
         prior[:, self._base.size :] = scales[:, None] ** -2
 
@@ -111,7 +106,7 @@ class OpenNoise:
         size = [1.0 for _ in parts]
 
         peaks: list[tuple[float, float]] = []
-        for _ in range(SWEEPS):
+        for _ in range(TUNING.screen.colour_sweeps):
             peaks = []
             for i, part in enumerate(parts):
                 others = [
@@ -121,7 +116,7 @@ class OpenNoise:
                 ]
                 value = _averaged(part, prior, others)
                 best = np.unravel_index(int(np.argmax(value)), value.shape)
-                at[i], size[i] = int(best[0]), float(SIZES[best[1]])
+                at[i], size[i] = int(best[0]), float(np.array(TUNING.screen.colour_sizes)[best[1]])
                 peaks.append((float(value.max()), float(logsumexp(value))))
         return peaks[-1][0] + sum(average - top for top, average in peaks)
 
@@ -131,14 +126,18 @@ class OpenNoise:
         alone, variance = restricted(
             gram[:, acting[:, None], acting], squares.log_det, squares.count
         )
-        near = np.flatnonzero(alone + self._prior > (alone + self._prior).max() - NEAR)
+        near = np.flatnonzero(
+            alone + self._prior > (alone + self._prior).max() - TUNING.screen.colour_near
+        )
         rest = self._prior[near] - 0.5 * squares.log_det[near]
         return SuitableColours(gram[near], rest, variance[near], squares.count)
 
 
 def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour]) -> Squares:
     columns, grams, dets = columns / loose[:, None], [], []
-    for some in np.array_split(np.arange(len(tried)), -(-len(tried) * columns.size // AT_ONCE)):
+    for some in np.array_split(
+        np.arange(len(tried)), -(-len(tried) * columns.size // TUNING.screen.whitened_at_once)
+    ):
         whitened, log_det = whiten_unit(columns, gaps, [tried[i] for i in some])
         grams.append(whitened.transpose(0, 2, 1) @ whitened)
         dets.append(log_det)
@@ -155,7 +154,7 @@ def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array,
     """Log evidence (k, sizes) for every colour and size of one channel, averaged over the priors
     (s, p).
     """
-    variance = part.variance[:, None] * SIZES**2
+    variance = part.variance[:, None] * np.array(TUNING.screen.colour_sizes) ** 2
     gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
     added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
     return np.asarray(

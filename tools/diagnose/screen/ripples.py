@@ -7,8 +7,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Stack
-
-LOUDEST = 10  # orders whose physics is simulated
+from gritd.tools.diagnose.tuning import TUNING
 
 
 def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) -> list[float]:
@@ -28,4 +27,4 @@ def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) ->
         power += taken / np.maximum(
             np.sum(cosine[own] ** 2, axis=0) + np.sum(sine[own] ** 2, axis=0), 1e-12
         )
-    return [orders[i] for i in np.argsort(-power)[:LOUDEST]]
+    return [orders[i] for i in np.argsort(-power)[: TUNING.screen.loudest]]

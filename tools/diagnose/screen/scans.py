@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import digamma, logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import SCALES, Signature
+from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
@@ -28,16 +28,9 @@ from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.tuning import TUNING
 
-PLACES = 48  # of a step along an axis
-FEW = 8  # values on either side of a step
-# of a step, relative to the whole stretch: a wheel is on both sides of it for a while
-WIDTH = 0.015
-PEAKS = 4  # shapes of a family that are fitted
 TINY = 1e-12
-FINER = 4.0  # frequencies tried in each that the whole campaign resolves
-HARMONICS, LARGE = 4, 3.0  # of a ripple that is known; their standard deviation in expected sizes
-FINE = np.linspace(-1.0, 1.0, 9)  # frequencies about the best, in steps of the scan
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +95,13 @@ def _weighed(
 
     level = 1.0 if near is None else _level(sizes, powers, near)
 
-    parts = np.zeros((len(SCALES), *powers[0].shape))
+    parts = np.zeros((len(strength_sizes()), *powers[0].shape))
     for size, power in zip(sizes, powers, strict=True):
-        for part, scale in zip(parts, SCALES, strict=True):
+        for part, scale in zip(parts, strength_sizes(), strict=True):
             part += 0.5 * power / level / (size + scale**-2) - 0.5 * width * np.log1p(
                 scale**2 * size
             )
-    return np.asarray(logsumexp(parts, axis=0) - np.log(len(SCALES)))
+    return np.asarray(logsumexp(parts, axis=0) - np.log(len(strength_sizes())))
 
 
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
@@ -174,17 +167,23 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     x = stack.covariate(axis)[own]
-    if x.size < 2 * FEW or np.ptp(x) <= 1e-9:
+    if x.size < 2 * TUNING.screen.step_values or np.ptp(x) <= 1e-9:
         return np.zeros(0)
     ordered = np.sort(x)
-    beyond = np.unique(np.linspace(FEW, x.size - FEW, PLACES).astype(int))
+    beyond = np.unique(
+        np.linspace(
+            TUNING.screen.step_values, x.size - TUNING.screen.step_values, TUNING.screen.step_places
+        ).astype(int)
+    )
     return np.unique(0.5 * (ordered[beyond - 1] + ordered[beyond]))
 
 
 def _risen(stack: Stack, rows: slice, axis: str, at: Array) -> Array:
     """(n, p) from 0 to 1 at each place while the wheel moves."""
     x, moving = stack.covariate(axis)[rows], stack.covariate("speed")[rows] > 0.0
-    width = WIDTH * (float(np.ptp(x[moving])) if axis == "position" else lines.STRETCH)
+    width = TUNING.screen.step_width * (
+        float(np.ptp(x[moving])) if axis == "position" else TUNING.noise.stretch
+    )
     return np.asarray(
         np.where(moving[:, None], 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0)
     )
@@ -219,7 +218,7 @@ def _peaks(family: Family, problem: Problem, beside: Projection) -> Iterator[Sig
     before, after = np.concatenate((edge, best[:-1])), np.concatenate((best[1:], edge))
     top = np.flatnonzero((best >= before) & (best > after) & (best + share > 0.0))
 
-    for place in top[np.argsort(-best[top])][:PEAKS]:
+    for place in top[np.argsort(-best[top])][: TUNING.screen.peaks]:
         shared = family.phases[int(np.argmax(every[:, place]))]
         wave = family.shape.kind == "wave"
         at = float(family.at[place])
@@ -231,7 +230,9 @@ def _refined(
     family: Family, problem: Problem, beside: Projection, place: int, shared: bool
 ) -> float:
     """The best frequency between two of the scan."""
-    near = family.at[place] + FINE * (family.at[1] - family.at[0] if family.at.size > 1 else 0.0)
+    near = family.at[place] + np.linspace(-1.0, 1.0, TUNING.screen.frequencies_near_best) * (
+        family.at[1] - family.at[0] if family.at.size > 1 else 0.0
+    )
     none = np.zeros((problem.stack.size, 0))
     finer = waves(problem.stack, problem.noise, none, family.shape.channel, family.axis, near)
     return float(near[int(np.argmax(finer.in_phase(beside, shared)[:, 0]))])
@@ -251,7 +252,12 @@ def in_step(
 
     x = stack.covariate("time")[stack.of(shape.channel)]
     reach = float(family.at[1] - family.at[0]) if family.at.size > 1 else 0.0
-    count = int(min(2.0 * reach * FINER * np.ptp(x), lines.MOST)) + 1
+    count = (
+        int(
+            min(2.0 * reach * TUNING.screen.wave_density * np.ptp(x), TUNING.noise.most_frequencies)
+        )
+        + 1
+    )
     tried = shape.at + reach * np.linspace(-1.0, 1.0, count)
 
     none = np.zeros((stack.size, 0))
@@ -310,7 +316,7 @@ def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
             phase = stack.covariate("wheel_angle") * (getattr(effect, name) if name else 1.0)
             for channel in stack.rig.channels:
                 own = stack.of(channel) & (stack.covariate("speed") > 0.0)
-                for number in range(1, HARMONICS + 1):
+                for number in range(1, TUNING.screen.ripple_harmonics + 1):
                     for wave in (np.cos, np.sin):
-                        large = LARGE * size_of(stack, channel)
+                        large = TUNING.screen.large_ripple * size_of(stack, channel)
                         yield np.where(own, large * wave(number * phase), 0.0)

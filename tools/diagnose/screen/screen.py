@@ -23,12 +23,7 @@ from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-
-LEVEL = 0.01  # false alarms aimed at, half of what is allowed
-LEAST = 2.0  # no surprise below this is an alarm, however quiet the nulls
-KINDS = 10  # of misfit that count as independent, of all that are tried
-SURE = float(np.log(KINDS / LEVEL))  # [nats] a likelihood ratio that is chance as rarely
-TENTH = 0.9  # quantile from which evidence is counted
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -77,8 +72,12 @@ class Screen:
         """At the tail of the nulls, fitted and counted: whichever is farther, since a fitted tail
         may be too light.
         """
-        counted = np.sort(self.nulls)[-max(int(LEVEL * (1 + len(self.nulls))), 1)]
-        return max(float(tail_quantile(self.nulls, LEVEL)), float(counted), LEAST)
+        counted = np.sort(self.nulls)[-max(int(TUNING.screen.level * (1 + len(self.nulls))), 1)]
+        return max(
+            float(tail_quantile(self.nulls, TUNING.screen.level)),
+            float(counted),
+            TUNING.screen.least_surprise,
+        )
 
     def surprise(self, of: Candidate, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows for
@@ -100,7 +99,7 @@ class Screen:
         inequality).
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
-        return max(counted, min(KINDS * float(np.exp(-max(self.open, 0.0))), 1.0))
+        return max(counted, min(TUNING.screen.kinds * float(np.exp(-max(self.open, 0.0))), 1.0))
 
     @property
     def stands_out(self) -> list[Candidate]:
@@ -112,16 +111,18 @@ class Screen:
 
     @property
     def alarmed(self) -> bool:
-        return self.largest[1] > self.threshold and self.open > SURE
+        return self.largest[1] > self.threshold and self.open > TUNING.screen.sure
 
 
 def tail_quantile(values: Array, level: float) -> float:
     """What values (n,) exceed with probability `level`: exponential tail beyond the 90 % quantile
     (Davison, Smith 1990).
     """
-    start = float(np.quantile(values, 0.9))
+    start = float(np.quantile(values, 1.0 - TUNING.screen.tail))
     beyond = values[values > start] - start
-    return start + float(beyond.mean()) * np.log(0.1 / level) if beyond.size else start
+    return (
+        start + float(beyond.mean()) * np.log(TUNING.screen.tail / level) if beyond.size else start
+    )
 
 
 def tail_chance(values: Array, value: float) -> float:
@@ -131,13 +132,13 @@ def tail_chance(values: Array, value: float) -> float:
     least = 1.0 / (1 + values.size)
     counted = float(1 + np.sum(values >= value)) * least
 
-    start = float(np.quantile(values, 0.9))
+    start = float(np.quantile(values, 1.0 - TUNING.screen.tail))
     beyond = values[values > start] - start
 
-    if counted > 10.0 * least or not beyond.size:
+    if counted > TUNING.screen.counted * least or not beyond.size:
         return counted
-    fitted = 0.1 * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12)))
-    return min(counted, max(fitted, 0.1 * least))
+    fitted = TUNING.screen.tail * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12)))
+    return min(counted, max(fitted, TUNING.screen.trusted_tail * least))
 
 
 def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[WhitenedSignature]:
@@ -205,6 +206,6 @@ def _usual(nulls: Array) -> tuple[float, float]:
     """Where the last tenth of nulls begins (0 at least), and their mean reach beyond (1 nat at
     least).
     """
-    start = max(float(np.quantile(nulls, TENTH)), 0.0)
+    start = max(float(np.quantile(nulls, 1.0 - TUNING.screen.tail)), 0.0)
     beyond = nulls[nulls > start] - start
     return start, max(float(beyond.mean()) if beyond.size else 0.0, 1.0)

@@ -20,21 +20,13 @@ from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
-from gritd.tools.diagnose.screen.ripples import LOUDEST, loudest
+from gritd.tools.diagnose.screen.ripples import loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
-from gritd.tools.diagnose.screen.screen import (
-    SURE,
-    Screen,
-    screen_signatures,
-    tail_chance,
-    whitened,
-)
+from gritd.tools.diagnose.screen.screen import Screen, screen_signatures, tail_chance, whitened
+from gritd.tools.diagnose.tuning import TUNING
 
-NULLS = 300  # surrogates
-WEIGHED = 6  # candidates that stand out whose evidence is weighed with the noise's colour open
 # covariates over which no form of the model varies
 BEYOND_FORM = {"time", "position", "heat", "run"}
-AGAIN = 4  # signatures of an effect that a later screen tries
 
 
 @dataclass(frozen=True)
@@ -64,8 +56,8 @@ class Screening:
 def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     """Everything that screens of any model share."""
     noise, unknowns = base.problem.noise, base.fitted.jacobian.shape[1]
-    residuals = whiten(noise, surrogates(noise, NULLS, rng))
-    drawn = Surrogates(residuals, rng.standard_normal((unknowns, NULLS)))
+    residuals = whiten(noise, surrogates(noise, TUNING.screen.nulls, rng))
+    drawn = Surrogates(residuals, rng.standard_normal((unknowns, TUNING.screen.nulls)))
 
     stack = base.problem.stack
     return Screening(
@@ -114,7 +106,7 @@ def _signatures(problem: Problem, model: Model, first: Screen | None) -> Iterato
         if first is None:
             tried = list(shape_grid(stack.rig, effect))
         else:
-            tried = first.fixed.get(name, [])[:AGAIN]
+            tried = first.fixed.get(name, [])[: TUNING.screen.again]
 
         prior = -np.log(max(len(tried), 1))
         for fixed in _worth(problem, model, effect, tried):
@@ -130,7 +122,7 @@ def _worth(
     nil.
     """
     order = order_of(effect)
-    if order is None or len(tried) <= LOUDEST:
+    if order is None or len(tried) <= TUNING.screen.loudest:
         return tried
     orders = sorted({fixed[order] for fixed in tried})
     loud = loudest(problem.stack, problem.noise, model.fitted.residual, orders)
@@ -141,7 +133,7 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
     """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
     the search.
     """
-    standing = screen.stands_out[:WEIGHED]
+    standing = screen.stands_out[: TUNING.screen.weighed]
     searched = [family for family in screening.families if family.shape in standing]
     peaks: dict[Candidate, Signature] = {
         s.shape.family: s for s in reversed(candidates(searched, screening.problem, model.fitted))
@@ -158,6 +150,6 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
     weighed, most = OpenNoise(screening.problem, model.fitted, chosen), -np.inf
     for number in range(len(chosen)):
         most = max(most, weighed.gain(number))
-        if most > SURE:
+        if most > TUNING.screen.sure:
             break
     return most

@@ -19,18 +19,7 @@ from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_beside
 from gritd.tools.diagnose.search.parallel import each
-
-MOST = 9  # effects fitted beside the base model
-SECOND = 5  # effects fitted beside a model with effects
-STARTS = 2  # models of a size from which the next step starts
-STEPS = 3  # effects at most
-AGAIN = 4  # signatures of an effect that are tried beside a model: the likeliest of the screen
-BEHIND = 12.0  # [nats] a model so far behind the best starts nothing
-PROMISING = 1.0  # [nats] a signature must gain by linear algebra to be fitted
-FEW = 0.1  # least share of its own precision that a strength's start keeps
-# Odds of one more effect at work, shared by all candidates: of ten testbeds with one effect left
-# out, one or two have a second that shows.
-ODDS = 0.15
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
@@ -66,7 +55,7 @@ class Search:
 
     def weight(self, model: Model) -> float:
         """Log evidence and log prior of so many effects, above the bare model's [nats]."""
-        more = np.log(ODDS / max(len(self.problem.stack.rig.effects), 1))
+        more = np.log(TUNING.search.odds / max(len(self.problem.stack.rig.effects), 1))
         return float(model.evidence - self.bare.evidence + max(len(model.names) - 1, 0) * more)
 
     def sized(self, size: int) -> list[Model]:
@@ -100,12 +89,12 @@ def search_models(
         return search
 
     step("fitting the likely effects")
-    search = _settled(extended(search, search.bare, MOST, jobs))
-    for size in range(1, STEPS):
-        starts = [m for m in search.sized(size)[:STARTS] if _near(search, m)]
+    search = _settled(extended(search, search.bare, TUNING.search.effects_first, jobs))
+    for size in range(1, TUNING.search.most_effects):
+        starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
         for model in starts:
             step(f"looking beside {' and '.join(model.names)}")
-            search = extended(search, model, SECOND, jobs)
+            search = extended(search, model, TUNING.search.effects_later, jobs)
         search = _retested(search)
         if len(search.best().names) <= size:
             break
@@ -137,7 +126,7 @@ def _settled(search: Search) -> Search:
 
 
 def _near(search: Search, model: Model) -> bool:
-    return search.weight(model) > search.weight(search.best()) - BEHIND
+    return search.weight(model) > search.weight(search.best()) - TUNING.search.behind
 
 
 # ---- one more effect ---------------------------------------------------------------------------
@@ -154,7 +143,7 @@ class Promise:
 
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
     """With fits of the model and one more effect each."""
-    candidates = [p for p in promises(search, model) if p.gain > PROMISING]
+    candidates = [p for p in promises(search, model) if p.gain > TUNING.search.promising]
     fresh = [p for p in candidates if not search.has((*model.names, p.effect.name))]
     made = each(jobs, lambda promise: _with_effect(search, model, promise), fresh[:most])
     return replace(search, models=(*search.models, *made))
@@ -175,7 +164,7 @@ def _tried(search: Search, model: Model, effect: type[Effect]) -> Iterator[Promi
     """The promise of an effect for each of its likeliest signatures."""
     fitted, problem = model.fitted, search.problem
     projection = fitted.projection()
-    for fixed in search.first.fixed[effect.name][:AGAIN]:
+    for fixed in search.first.fixed[effect.name][: TUNING.search.again]:
         made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
         if made is None:
             continue
@@ -186,14 +175,18 @@ def _tried(search: Search, model: Model, effect: type[Effect]) -> Iterator[Promi
 
 def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
     """Where the fit of an effect's parameters begins: strengths at their linear estimate."""
-    amplitude = np.asarray(np.linalg.solve(a + FEW * np.eye(len(b)), b))
-    amplitude = np.where(np.array(made.sign) > 0, np.maximum(amplitude, 0.02), amplitude)
+    amplitude = np.asarray(np.linalg.solve(a + TUNING.search.least_precision * np.eye(len(b)), b))
+    amplitude = np.where(
+        np.array(made.sign) > 0, np.maximum(amplitude, TUNING.search.least_start), amplitude
+    )
     size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
     values = [
         size[p.name] if p.name in size else (made.fixed[p.name] - p.centre) / p.sigma
         for p in effect.parameters()
     ]
-    return np.asarray(np.clip(np.array(values), -20.0, 20.0))
+    return np.asarray(
+        np.clip(np.array(values), -TUNING.search.farthest_start, TUNING.search.farthest_start)
+    )
 
 
 def _with_effect(search: Search, model: Model, promise: Promise) -> Model:

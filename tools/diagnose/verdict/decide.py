@@ -17,21 +17,19 @@ from scipy.special import logsumexp
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
 from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
-
-ALIKE = 2.0  # log odds: effects that are less apart cannot be told apart
-TENTH = 0.1  # share of the misfit that names must take to be an explanation
-POWER = 0.4  # share of the effects that must be detectable at their expected size for "consistent"
-QUIET = 2.0  # temperature of the screen's evidence where nothing alarms
 
 
 def decide(search: Search) -> Decision:
     """The verdict on a search."""
     found = search.first
     if not found.alarmed:
-        verdict: Verdict = "consistent" if power(search, found) >= POWER else "insufficient"
+        verdict: Verdict = (
+            "consistent" if power(search, found) >= TUNING.verdict.power else "insufficient"
+        )
         return Decision(verdict, search.bare, 1.0, None, _quiet(found), 0.0, {})
 
     best = search.best()
@@ -70,7 +68,11 @@ def judged(
     best = _best(every)
     unlisted = sum(w.probability for w in every if not w.names)
     share = taken_share(search, best) if best.names else 0.0
-    named = bool(best.names) and unlisted < 0.5 * (1.0 - calibration.lapse) and share > TENTH
+    named = (
+        bool(best.names)
+        and unlisted < 0.5 * (1.0 - calibration.lapse)
+        and share > TUNING.verdict.explained_share
+    )
     return Decision(
         "explained" if named else "unlisted",
         best if named else search.bare,
@@ -117,9 +119,11 @@ def _quiet(found: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
     listed = found.listed
     weight = {
-        n: float(np.exp(min(e, 20.0) / QUIET)) / max(len(listed), 1) for n, e in listed.items()
+        n: float(np.exp(min(e, TUNING.verdict.quiet_most) / TUNING.verdict.quiet_temperature))
+        / max(len(listed), 1)
+        for n, e in listed.items()
     }
-    total = 20.0 + sum(weight.values())
+    total = TUNING.verdict.quiet_weight + sum(weight.values())
     return {n: w / total for n, w in weight.items()}
 
 
@@ -135,7 +139,9 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
         rivals = [
             w
             for w in sized
-            if rest <= set(w.names) and w.model is not best and w.probability > top * np.exp(-ALIKE)
+            if rest <= set(w.names)
+            and w.model is not best
+            and w.probability > top * np.exp(-TUNING.verdict.alike)
         ]
         out[name] = tuple(dict.fromkeys(n for w in rivals for n in w.names if n not in rest))
     return out

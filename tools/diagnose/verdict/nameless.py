@@ -18,9 +18,7 @@ from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.screen.scans import without_harmonics
 from gritd.tools.diagnose.screen.screen import whitened
 from gritd.tools.diagnose.screen.screening import Screening
-
-SIZES = (1.0, 5.0)  # of a function, in its expected size, where it is fitted
-TOGETHER = 4  # functions that may act together
+from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,7 @@ def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
     chosen, price = _chosen(screening, model)
     if not chosen:
         return None
-    fitted = [_fitted(screening, model, chosen, size) for size in SIZES]
+    fitted = [_fitted(screening, model, chosen, size) for size in TUNING.verdict.function_sizes]
     best = max(fitted, key=lambda m: m.evidence)
     return Nameless(best, tuple(chosen), best.evidence - model.evidence + price)
 
@@ -77,7 +75,7 @@ def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]
     prior = np.array([s.prior for s in functions]) - np.log(len({s.of for s in functions}))
 
     total, chosen = 0.0, list[int]()
-    for _ in range(TOGETHER):
+    for _ in range(TUNING.verdict.together):
         tried = {
             k: _together(a, b, [parts[i] for i in (*chosen, k)]) + float(prior[[*chosen, k]].sum())
             for k in range(len(parts))

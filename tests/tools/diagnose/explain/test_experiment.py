@@ -11,8 +11,8 @@ import pytest
 
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import EXPERIMENTS
-from gritd.tools.diagnose.explain.experiment import MOST
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.unlisted import CableDrag
 from tests.tools.diagnose.campaigns import diagnosed, plan
 
@@ -26,7 +26,7 @@ def _quiet() -> Iterator[None]:
 def proposed(found: Diagnosis) -> str:
     following = found.next_experiment
     assert following is not None and following.action == EXPERIMENTS[following.key]
-    assert 0.0 < following.expected_gain_nats <= MOST
+    assert 0.0 < following.expected_gain_nats <= TUNING.explain.gain_most
     assert 0.5 < following.expected_probability <= 1.0
     return following.key
 

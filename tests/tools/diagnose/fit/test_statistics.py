@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from gritd.tools.diagnose.explain.result import plain
-from gritd.tools.diagnose.fit.evidence import SCALES, log_bayes
+from gritd.tools.diagnose.fit.evidence import log_bayes, strength_sizes
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import Colour, coloured, whiten_unit
 from gritd.tools.diagnose.noise.estimate import restricted
@@ -81,9 +81,11 @@ def test_log_bayes_is_the_integral() -> None:
     def integrand(x: float, scale: float) -> float:
         return float(np.exp(b[0] * x - 0.5 * a[0, 0] * x * x) * norm.pdf(x, 0.0, scale))
 
-    two_sided = np.mean([quad(integrand, -40, 40, args=(s,), points=[0.0, 1.5])[0] for s in SCALES])
+    two_sided = np.mean(
+        [quad(integrand, -40, 40, args=(s,), points=[0.0, 1.5])[0] for s in strength_sizes()]
+    )
     one_sided = np.mean(
-        [2.0 * quad(integrand, 0, 40, args=(s,), points=[0.1, 1.5])[0] for s in SCALES]
+        [2.0 * quad(integrand, 0, 40, args=(s,), points=[0.1, 1.5])[0] for s in strength_sizes()]
     )
     assert log_bayes(a, b, (0,)) == pytest.approx(np.log(two_sided), rel=1e-6)
     assert log_bayes(a, b, (1,)) == pytest.approx(np.log(one_sided), rel=1e-6)

@@ -14,9 +14,9 @@ from gritd.estimator.effects import make
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence
-from gritd.tools.diagnose.screen.screen import SURE
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, begin
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import Plan, record
 from tests.tools.diagnose.campaigns import plan
 
@@ -56,7 +56,7 @@ def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
     """
     found = begun(plan(slow=0.3, slow_time=3.0, noise=2.0, seed=13)).first
     assert found.largest[1] > found.threshold
-    assert found.open < SURE
+    assert found.open < TUNING.screen.sure
     assert not found.alarmed
     assert found.p > 0.01
 
@@ -69,4 +69,4 @@ def test_a_friction_stands_out_of_noise_of_any_colour() -> None:
         assert found.alarmed
         friction = found.best["coulomb_friction"].signature
         gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
-        assert gain > max(0.5 * found.evidence["coulomb_friction"], SURE)
+        assert gain > max(0.5 * found.evidence["coulomb_friction"], TUNING.screen.sure)

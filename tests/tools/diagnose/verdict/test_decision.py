@@ -13,14 +13,15 @@ from scipy.stats import norm
 
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
-from gritd.tools.diagnose.fit.bending import FORMS
-from gritd.tools.diagnose.fit.evidence import SCALES
+from gritd.tools.diagnose.fit.bending import bending_sizes
+from gritd.tools.diagnose.fit.evidence import strength_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.problem import WIDE, Fitted, free_of
+from gritd.tools.diagnose.fit.problem import Fitted, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict import decide
 from gritd.tools.diagnose.verdict.calibration import learnt
 from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth
@@ -63,7 +64,7 @@ def test_another_published_form_keeps_its_name() -> None:
     """
     ours = _model((make("stribeck_friction", {"excess": 0.6}),), "stribeck_friction")
     other = _model((LorentzStribeck(size=1.5),), "stribeck_friction")
-    assert ours.bends == (FORMS.values[0],) < other.bends
+    assert ours.bends == (bending_sizes().values[0],) < other.bends
     assert other.marginal is not None
     assert other.evidence > other.marginal.log_evidence((0,)) + 3.0
 
@@ -130,7 +131,11 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     jacobian = rng.standard_normal((30, 2))
     values = jacobian @ np.array([0.7, 1.1]) + rng.standard_normal(30)
     effect = EFFECTS["viscous_friction"]
-    free, at, penalty = free_of((effect,)), np.array([0.4, 0.8]), np.array([1.0, 1.0 / WIDE])
+    free, at, penalty = (
+        free_of((effect,)),
+        np.array([0.4, 0.8]),
+        np.array([1.0, 1.0 / TUNING.fit.strength_prior]),
+    )
     residual = values - jacobian @ at
     objective = float(residual @ residual + np.sum((penalty * at) ** 2))
     fitted = Fitted(
@@ -158,7 +163,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     likelihood = (
         np.exp(-0.5 * (np.sum(off**2, axis=0) - residual @ residual)) * norm.pdf(constant)[:, None]
     )
-    priors = np.mean([2.0 * norm.pdf(strength, 0.0, s) for s in SCALES], axis=0)
+    priors = np.mean([2.0 * norm.pdf(strength, 0.0, s) for s in strength_sizes()], axis=0)
     true = np.trapezoid(np.trapezoid(likelihood * priors, strength, axis=1), constant)
     evidence = Marginal(fitted, np.zeros((30, 0)), ()).log_evidence(())
     assert evidence == pytest.approx(np.log(true) - 0.5 * residual @ residual, abs=0.02)

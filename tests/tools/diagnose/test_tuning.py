@@ -1,0 +1,81 @@
+"""Every tuned number of the diagnosis stands in one place, with its reason."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import FrozenInstanceError, fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.tools.diagnose.fit.evidence import strength_sizes
+from gritd.tools.diagnose.screen.screen import tail_quantile
+from gritd.tools.diagnose.tuning import TUNING, replaced
+
+ROOMS = [f.name for f in fields(TUNING)]
+DIAGNOSE = Path(__file__).parents[3] / "tools" / "diagnose"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_number_says_its_unit_its_reason_and_what_it_was_learnt_from(room: str) -> None:
+    for number in fields(getattr(TUNING, room)):
+        for what in ("unit", "reason", "learnt"):
+            assert number.metadata.get(what), f"{room}.{number.name}: no {what}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_the_numbers_of_a_room_are_frozen(room: str) -> None:
+    stage = getattr(TUNING, room)
+    first = fields(stage)[0].name
+    with pytest.raises(FrozenInstanceError):
+        setattr(stage, first, getattr(stage, first))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_number_is_read_by_a_room(room: str) -> None:
+    texts = [p.read_text(encoding="utf-8") for p in DIAGNOSE.rglob("*.py")]
+    for number in fields(getattr(TUNING, room)):
+        name = f"{room}.{number.name}"
+        own = f"self.{number.name}"  # of what is computed of the numbers
+        assert any(f"TUNING.{name}" in t or own in t for t in texts), f"{name} is read by nothing"
+
+
+def test_no_room_keeps_a_number_of_its_own() -> None:
+    """Numbers that stay: units, a turn, nothing, and what a name means."""
+    kept = {"NS", "_NONE", "TURN", "TINY", "WINDOW"}
+    found = set()
+    for path in DIAGNOSE.rglob("*.py"):
+        if "tuning" in path.parts:
+            continue
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.Assign) and _number(node.value):
+                names = {n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)}
+                found |= names
+    assert found <= kept
+
+
+def _number(value: ast.expr) -> bool:
+    """A number, several of them, or what is computed of numbers alone."""
+    numbers = [n for n in ast.walk(value) if isinstance(n, ast.Constant)]
+    return bool(numbers) and all(
+        isinstance(n.value, int | float) and not isinstance(n.value, bool) for n in numbers
+    )
+
+
+def test_a_replaced_number_takes_effect_and_goes_back() -> None:
+    nulls = np.linspace(0.0, 1.0, 200)
+    before = tail_quantile(nulls, TUNING.screen.level)
+
+    with replaced("screen", level=0.001), replaced("fit", strength_sizes=(1.0,)):
+        assert tail_quantile(nulls, TUNING.screen.level) > before
+        assert TUNING.screen.sure == pytest.approx(np.log(TUNING.screen.kinds / 0.001))
+        assert strength_sizes().tolist() == [1.0]
+
+    assert tail_quantile(nulls, TUNING.screen.level) == before
+    assert len(strength_sizes()) > 1
+
+
+def test_an_unknown_number_is_refused() -> None:
+    with pytest.raises(TypeError, match="alarm"), replaced("screen", alarm=1.0):
+        pass

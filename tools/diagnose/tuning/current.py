@@ -1,0 +1,43 @@
+"""The tuned numbers that are in force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from gritd.tools.diagnose.tuning.explain import Explain
+from gritd.tools.diagnose.tuning.fit import Fit
+from gritd.tools.diagnose.tuning.noise import Noise
+from gritd.tools.diagnose.tuning.rig import Rig
+from gritd.tools.diagnose.tuning.screen import Screen
+from gritd.tools.diagnose.tuning.search import Search
+from gritd.tools.diagnose.tuning.verdict import Verdict
+
+
+@dataclass
+class Tuning:
+    """The numbers of every room. Only `replaced` puts another room's numbers in."""
+
+    rig: Rig = field(default_factory=Rig)
+    noise: Noise = field(default_factory=Noise)
+    fit: Fit = field(default_factory=Fit)
+    screen: Screen = field(default_factory=Screen)
+    search: Search = field(default_factory=Search)
+    verdict: Verdict = field(default_factory=Verdict)
+    explain: Explain = field(default_factory=Explain)
+
+
+TUNING = Tuning()
+
+
+@contextmanager
+def replaced(room: str, **values: Any) -> Iterator[None]:
+    """Other numbers of a room, for a while. Raises AttributeError, TypeError for unknown names."""
+    before = getattr(TUNING, room)
+    setattr(TUNING, room, replace(before, **values))
+    try:
+        yield
+    finally:
+        setattr(TUNING, room, before)

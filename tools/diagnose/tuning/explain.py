@@ -1,0 +1,112 @@
+"""Tuned numbers of tools/diagnose/explain: where, how sure, what to do next, and the wording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Explain:
+    """What of a diagnosis is told."""
+
+    # --- changes.py ---
+    change_places: int = tuned(32, "places", "tried along a covariate", "run time")
+    change_widths: tuple[float, ...] = tuned(
+        (0.015, 0.05), "-", "of the whole stretch: a wheel is on both sides of a change for a while"
+    )
+    change_waves: int = tuned(
+        12, "cosines", "of a smooth function; they fall with the square of their number, as a kink"
+    )
+    change_values: int = tuned(8, "values", "on either side of a change")
+    swept_levels: int = tuned(8, "levels", "of a covariate at least, for it to count as swept")
+    level_held: float = tuned(0.015, "-", "share of the values that makes a level")
+    change_chance: float = tuned(0.01, "probability", "of any change point by noise alone")
+    change_least: float = tuned(3.0, "nats", "a change must gain")
+    change_rounds: int = tuned(6, "rounds", "of one more change", "run time")
+    run_share: float = tuned(
+        0.5, "share", "of a channel's misfit that offsets of runs take before changes are sought"
+    )
+    run_nearly: float = tuned(0.93, "share", "of that, what a few steps between runs must take")
+    few_run_steps: int = tuned(2, "steps", "between runs that are few")
+    change_worth: float = tuned(
+        0.1, "-", "of the evidence of the first part: a later change that gains less is detail"
+    )
+    change_range: Range = tuned((0.01, 0.99), "quantile", "of a covariate, where changes are tried")
+
+    # --- coverage.py ---
+    reference_open: float = tuned(
+        0.3, "share", "of the discrepancy's variance that the reference may leave open"
+    )
+    coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
+    coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
+    beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
+    beyond_floor: float = tuned(0.02, "-", "of a covariate's mean: its range counts as no less")
+    beyond_share: float = tuned(0.02, "-", "of the values that must be outside to be told")
+
+    # --- doubts.py, result.py ---
+    doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is told")
+    strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is told")
+
+    # --- experiment.py ---
+    instrument: float = tuned(
+        0.2, "-", "of an expected size: what tape, level or clamp meter can tell"
+    )
+    foreseen_error: float = tuned(
+        0.02, "-", "of a channel's size: no rival predicts an experiment better than this"
+    )
+    foreseen_together: int = tuned(10, "values", "that count as one: neighbours share their noise")
+    gain_enough: float = tuned(10.0, "nats", "decide")
+    gain_most: float = tuned(50.0, "nats", "more is told as so much")
+    rivals: int = tuned(4, "explanations", "that an experiment is to tell apart", "run time")
+    gain_worth: float = tuned(1.0, "nats", "from which on two are said to be told apart")
+    foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
+
+    # --- explanation.py ---
+    shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
+    slight_explanation: float = tuned(
+        1e-3, "probability", "below which an explanation does not count for the soil"
+    )
+
+    # --- law.py ---
+    term_pays: float = tuned(3.0, "nats", "a term of a law must gain")
+    law_domain: Range = tuned((0.005, 0.995), "quantile", "of a covariate: domain of a law")
+
+    # --- locate.py ---
+    false_discovery: float = tuned(0.05, "probability", "false-discovery rate of the list")
+    places_listed: int = tuned(8, "places", "listed at most")
+    order_chance: float = tuned(0.01, "probability", "of the strongest order by noise alone")
+    strain_far: float = tuned(3.0, "σ", "from its calibration: a constant is a place")
+    least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
+    beside_gain: float = tuned(3.0, "nats", "a covariate must gain beside those already named")
+    lowest_order: float = tuned(3.0, "1/turn", "lower orders belong to the wheel's angle")
+
+    # --- provenance.py ---
+    same_value: float = tuned(1e-6, "-", "relative difference below which values are the same")
+
+    # --- remainder.py ---
+    remainder_bends: int = tuned(2, "powers", "of a covariate that describe a remainder")
+    remainder_share: float = tuned(
+        0.2, "share", "of a remainder's squares that a covariate must take to be named"
+    )
+    remainder_parts: int = tuned(3, "parts", "of a covariate's range that are told apart")
+    remainder_values: int = tuned(10, "values", "needed")
+    remainder_noise: float = tuned(0.5, "σ", "of the noise: a smaller remainder is within it")
+
+    # --- traces.py ---
+    pictures: int = tuned(4, "scatters", "at most")
+
+    # --- wording.py ---
+    low_end: Range = tuned((0.0, 0.15), "choice", "quantiles between which a mean is taken")
+    middle: Range = tuned((0.4, 0.6), "choice", "quantiles between which a mean is taken")
+    high_end: Range = tuned((0.85, 1.0), "choice", "quantiles between which a mean is taken")
+    middle_stands_out: float = tuned(
+        0.25, "-", "of the difference between the ends: a middle that far outside is told"
+    )
+    means_alike: float = tuned(0.15, "-", "of a mean: two that are closer are called the same")
+    runs_named: int = tuned(6, "runs", "that are all named; of more only the farthest off")
+    runs_far_named: int = tuned(3, "runs", "farthest off that are named of many")
+    runs_show: float = tuned(0.6, "share", "of the squares of the runs' means that changes take")

@@ -1,0 +1,135 @@
+"""Tuned numbers of tools/diagnose/fit: the fit, its freedoms, and evidence about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+FORM_SIZES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)
+FORM_PRIOR = (0.12, 0.12, 0.14, 0.22, 0.28, 0.12)
+DRIVE_SIZES = (0.0, 0.003, 0.01, 0.03, 0.1)
+DRIVE_PRIOR = (0.3, 0.25, 0.25, 0.15, 0.05)
+PUBLISHED = "misses of published models: docs/diagnosis.md"
+FORMS = "differences of published formulas"
+DAMPED = "damping of a mean over an interval"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a model is fitted to the recordings, and how far it may be off."""
+
+    # --- base.py ---
+    tolerance: float = tuned(
+        1.5e-3, "-", "of a channel's size: integration rules and idealised servos are off by it"
+    )
+    rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
+
+    # --- bending.py: how far published forms of an effect differ ---
+    bending_sizes: tuple[float, ...] = tuned((0.05, 0.15, 0.4), "-", "shares of an effect", FORMS)
+    bending_prior: tuple[float, ...] = tuned(
+        (0.35, 0.45, 0.2), "prior", "probability of each of the sizes", FORMS
+    )
+
+    # --- descent.py ---
+    gain: float = tuned(0.005, "nats", "a step that would gain less ends the descent")
+    near: float = tuned(1.0, "nats", "a good step that gains less leaves the slopes as they are")
+    damping_start: float = tuned(1e-3, "-", "of the curvature: first damping")
+    damping_least: float = tuned(1e-7, "-", "of the curvature")
+    damping_most: float = tuned(1e7, "-", "of the curvature: a descent that needs more has ended")
+    damping_harder: float = tuned(8.0, "-", "factor on the damping after a step that failed")
+    damping_softer: float = tuned(0.2, "-", "factor on the damping after a good step")
+    fulfilled: float = tuned(0.1, "-", "of the gain foretold: a step is taken")
+    good: float = tuned(0.75, "share", "of the gain foretold: the damping falls")
+    at_bound: float = tuned(1e-9, "-", "closer to a bound a coordinate is on it", "rounding")
+    held_sets: int = tuned(8, "times", "the set of held coordinates may grow within one step")
+
+    # --- discrepancy.py ---
+    form_sizes: tuple[float, ...] = tuned(
+        FORM_SIZES, "-", "of a channel's size: what a model of a wheel in soil misses", PUBLISHED
+    )
+    form_prior: tuple[float, ...] = tuned(
+        FORM_PRIOR, "prior", "probability of each: half of it lies at 5 to 20 %", PUBLISHED
+    )
+    drive_sizes: tuple[float, ...] = tuned(
+        DRIVE_SIZES, "-", "of a channel's size: what a model of a drive misses"
+    )
+    drive_prior: tuple[float, ...] = tuned(DRIVE_PRIOR, "prior", "probability of each of the sizes")
+    form_features: int = tuned(36, "features", "of a source at most", "run time")
+    form_left_out: float = tuned(3e-3, "-", "variance of the discrepancy that may be left out")
+    form_turn: float = tuned(
+        0.2, "-", "size of what goes with the wheel's angle, in that of the discrepancy"
+    )
+    form_harmonics: tuple[float, ...] = tuned(
+        (1.0, 2.0), "choice", "a turn: of what goes with the wheel's angle"
+    )
+
+    # --- evidence.py ---
+    strength_sizes: tuple[float, ...] = tuned(
+        (0.1, 0.3, 1.0, 3.0), "-", "sizes of a strength tried, in units of the expected one"
+    )
+
+    # --- functions.py ---
+    misfit_size: float = tuned(
+        0.03, "-", "of the channel's size: expected size of a misfit without a name"
+    )
+    waves: int = tuned(4, "cosines", "along time or place")
+    varies: float = tuned(1e-3, "-", "relative spread below which a covariate does not vary")
+    outlying: float = tuned(4.0, "σ", "a standardised covariate is cut beyond it")
+    bends: int = tuned(2, "cosines", "by which a share of an effect may vary along time or place")
+    turn_orders: tuple[float, ...] = tuned(
+        (1.0, 2.0), "choice", "ripples a turn that no smooth term takes; higher: listed effects"
+    )
+
+    # --- heldout.py ---
+    bands: int = tuned(3, "bands", "of slip and of load that are held out")
+    band_spread: float = tuned(0.05, "-", "relative spread below which there are no bands")
+
+    # --- marginal.py, model.py ---
+    slight_size: float = tuned(1e-3, "-", "weight of sizes below which they do not count")
+    size_sweeps: int = tuned(4, "sweeps", "over the freedoms, each to its likeliest size")
+    size_rounds: int = tuned(
+        4, "rounds", "of fit and sizes in turn", "nearly always two are enough"
+    )
+
+    # --- problem.py ---
+    step: float = tuned(2e-3, "-", "of a prior σ or an expected size, for differences")
+    rounds: int = tuned(30, "rounds", "linearisations at most: more is no convergence")
+    far: float = tuned(8.0, "σ", "constants are kept this close to what is known of them")
+    strength_prior: float = tuned(
+        3.0, "-", "a strength's prior standard deviation, in expected sizes"
+    )
+
+    # --- projection.py ---
+    projected_prior: float = tuned(
+        3.0, "-", "prior standard deviation of what is projected out, in expected sizes"
+    )
+
+    # --- signatures.py ---
+    highest_order: float = tuned(200.0, "1/turn", "ripples")
+    order_nyquist: float = tuned(0.45, "-", "of the grid's rate: faster ripples are damped", DAMPED)
+    least_turns: float = tuned(1.5, "ripples", "a run must hold to be told from a trend")
+    strongest_orders: int = tuned(3, "orders", "of a channel that do not count as its noise")
+    most_orders: int = tuned(120, "orders", "tried at most", "run time")
+    lowest_ripple: float = tuned(3.0, "1/turn", "lower is no ripple of the noise")
+    ripple_spacing: float = tuned(0.25, "1/turn", "between ripples tried in the noise")
+    ripple_values: int = tuned(100, "values", "of a channel that ripples in the noise need")
+    derivative_steps: tuple[float, ...] = tuned(
+        (1.0, 0.1, 0.01), "choice", "of an expected size, the next where the effect runs away"
+    )
+    runaway: float = tuned(10.0, "-", "times the largest value measured: more runs away")
+    relative_times: tuple[float, ...] = tuned(
+        (0.1, 0.3, 1.0, 3.0), "-", "time constants tried, of the campaign's or the run's length"
+    )
+    shape_known: float = tuned(0.4, "-", "relative σ of a shape from which three values are tried")
+    shape_factors: tuple[float, ...] = tuned(
+        (0.4, 1.0, 2.0), "choice", "values of a shape tried, of its expected one"
+    )
+    patch_lengths: tuple[float, ...] = tuned(
+        (0.12, 0.25, 0.5), "share", "of the bed that was driven: lengths tried"
+    )
+    patch_centres: int = tuned(13, "places", "along the bed that are tried")
+    turning_share: float = tuned(
+        0.05, "-", "of the largest speed: slower does not count as turning"
+    )
+    usual_turning: float = tuned(0.8, "quantile", "of the turning speed for the highest order")

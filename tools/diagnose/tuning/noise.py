@@ -1,0 +1,106 @@
+"""Tuned numbers of tools/diagnose/noise: size and colour of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)
+CELLS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
+DAMPED = "damping of a mean over an interval"
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What counts as noise in the recordings."""
+
+    # --- colour.py ---
+    fast_time: float = tuned(1.5, "intervals", "correlation time of the fast part")
+    negligible: float = tuned(
+        1e-5, "-", "weight of a value long past in an innovation: it is left out", "run time"
+    )
+    apart: int = tuned(5, "correlation times", "between runs of a surrogate: enough to forget")
+
+    # --- estimate.py ---
+    slow_times: tuple[float, ...] = tuned(
+        (0.5, 1.0, 2.0, 4.0, 10.0), "s", "correlation times of the slow part that are tried"
+    )
+    slow_shares: tuple[float, ...] = tuned(
+        SLOW, "share", "of the variance that the slow part takes, as tried"
+    )
+    fast_shares: tuple[float, ...] = tuned(
+        (0.0, 0.4, 0.9), "share", "of the rest that the fast part takes, as tried"
+    )
+    surrogate_colours: int = tuned(
+        20, "colours", "drawn from the posterior of the colour for the surrogates", "run time"
+    )
+    ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
+    steady: float = tuned(
+        1.3, "-", "values that blur makes noisier than so many of their channel's σ say nothing"
+    )
+    careful: float = tuned(
+        0.6, "quantile", "of slow power in its posterior that the whitening assumes"
+    )
+    slow_power: float = tuned(
+        0.5, "-", "power of slow power by which a colour is rarer: instruments hiss more than drift"
+    )
+    spike: float = tuned(
+        6.0, "σ", "from the median of its neighbours: such a value counts as much less certain"
+    )
+    spike_neighbours: int = tuned(5, "values", "whose median tells a spike")
+    floor: float = tuned(
+        1e-5, "-", "of a channel's size: no noise is below it, simulations need a scale"
+    )
+
+    # --- lines.py ---
+    stretch: float = tuned(40.0, "s", "for which a wave keeps its phase at least")
+    cycles: float = tuned(2.0, "cycles", "in a stretch, to be told from a trend")
+    line_density: float = tuned(
+        2.0, "-", "frequencies tried in each that the longest stretch resolves"
+    )
+    line_nyquist: float = tuned(0.35, "-", "of the grid's rate: faster waves are damped", DAMPED)
+    most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
+    stretch_values: int = tuned(12, "values", "a stretch must hold")
+    line_chance: float = tuned(
+        0.01, "probability", "of any line of a channel by noise of a smooth spectrum"
+    )
+    near_line: float = tuned(1.5, "resolved frequencies", "closer is the line itself")
+    far_line: float = tuned(7.0, "resolved frequencies", "farther is no neighbour of a line")
+    strongest_lines: int = tuned(3, "lines", "of a channel along an axis that may stand out")
+    long_waves: int = tuned(6, "waves", "of the bed that are too long to have neighbours, at most")
+    values_per_line: int = tuned(8, "values", "of a channel for each column that lines may take")
+
+    # --- replicates.py ---
+    cell_widths: Mapping[str, float] = tuned(
+        CELLS, "-", "of a cell of equal conditions; of speed and load relative to their largest"
+    )
+    coarser_cells: tuple[float, ...] = tuned(
+        (1.0, 2.0, 4.0), "choice", "factors on the widths, tried until cells are few enough"
+    )
+    cell_values: int = tuned(10, "values", "a cell must hold")
+    most_cells: int = tuned(60, "cells", "of a channel, at most")
+    cell_phases: tuple[float, ...] = tuned(
+        (0.5, 0.75, 0.0, 0.25), "choice", "of the edges of cells, in their widths"
+    )
+    equal_runs: float = tuned(
+        1e-3, "-", "difference of pass or start from which two runs are no replicates"
+    )
+    least_pairs: int = tuned(2, "comparisons", "of replicates at least")
+    fewest_pairs: int = tuned(4, "comparisons", "fewer count as so many")
+    drift_shapes: int = tuned(4, "shapes", "of what a run does: a mean and three of drift")
+    drift_values: int = tuned(40, "values", "that drifts need")
+    whole_run: float = tuned(0.9, "share", "of a run in one cell, by which it held one condition")
+    mostly_wave: float = tuned(0.8, "share", "of a wave's squares that no drift could be")
+    drift_chance: float = tuned(
+        0.01, "probability", "by which noise alone may make drifts differ as they do"
+    )
+
+    # --- saturated.py ---
+    saturated_columns: int = tuned(40, "columns", "of the saturated mean, at most")
+    values_per_column: int = tuned(4, "values", "at least, for each column of it")
+    slight_column: float = tuned(
+        1e-4, "-", "of the residual: what changes less at its expected size is a solver's rounding"
+    )
+    rank: float = tuned(1e-7, "-", "of the largest eigenvalue: smaller ones are dependent columns")

@@ -1,0 +1,136 @@
+"""Tuned numbers of tools/diagnose/rig: readings, states and constants of a testbed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+DESIGN = "order of magnitude of common instruments"
+PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
+FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}
+RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
+
+
+@dataclass(frozen=True)
+class Rig:
+    """How recordings become comparable values, and what is known of constants beforehand."""
+
+    # --- adapter.py ---
+    rates: tuple[tuple[float, float], ...] = tuned(
+        RATES, "choice", "[s, Hz] grid of runs that are together up to so long", "run time"
+    )
+    first_rate: float = tuned(1.0, "Hz", "grid on which the length of the recordings is found")
+
+    # --- blur.py ---
+    bend: float = tuned(
+        0.5, "-", "share of the bend between neighbours: speeds are slopes over three intervals"
+    )
+    shallow: float = tuned(1e-3, "m", "a sinkage below which its changes mean little")
+    lag: float = tuned(
+        0.015, "s", "an axle sinks later than in the balance: its damping carries load meanwhile"
+    )
+
+    # --- campaign.py ---
+    quadrature_order: int = tuned(
+        6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
+    )
+
+    # --- candidates.py ---
+    steady_range: float = tuned(0.2, "-", "relative range of a speed that does not change")
+
+    # --- constants.py ---
+    timing: float = tuned(5e-3, "s", "a channel's stamps may be off by so much", DESIGN)
+    blur: float = tuned(
+        0.3, "-", "share of second differences: slopes cut corners that a channel does not"
+    )
+    soil_floors: Mapping[str, float] = tuned(
+        FLOORS, "-", "least relative sigma: no soil is known better"
+    )
+    scale_floor: float = tuned(1e-3, "-", "relative: no sensor's scale is known better", DESIGN)
+    least_weights: float = tuned(2e-3, "-", "relative: no weights are known better", DESIGN)
+    own_weights: float = tuned(
+        0.7, "-", "part of a common error of the weights that each set may have for itself"
+    )
+
+    # --- drive.py ---
+    drive_rate: float = tuned(10.0, "Hz", "grid of the comparison, as for a wheel")
+    fine_rate: float = tuned(
+        250.0, "Hz", "at most: position and current are averaged on it, the model evaluated"
+    )
+    filter_order: int = tuned(4, "order", "of the zero-phase low-passes")
+    sharp_cutoff: float = tuned(0.12, "-", "of the fine rate: cut-off of position and torque")
+    band_cutoff: float = tuned(0.4, "-", "of the comparison's rate: cut-off of the comparison")
+    stamps: float = tuned(
+        2.0, "samples", "current and position may be apart: a held output, a bus, a mean"
+    )
+    shortest_log: float = tuned(2.0, "s", "a shorter log is refused")
+    log_edge: float = tuned(0.2, "s", "at either end, where a filter lacks its neighbours")
+    usual_torque: float = tuned(
+        2.0, "unit", "size of a drive's torque: that of the wheel the priors were made for"
+    )
+    still: float = tuned(
+        0.05, "-", "of the usual speed: below it a drive rests, friction holds what is asked"
+    )
+    unknown_drive: float = tuned(
+        10.0, "-", "sigma of a constant not known, in what would take all of the torque"
+    )
+
+    # --- form.py ---
+    carrying: float = tuned(0.2, "-", "of the usual load: below it the wheel hardly touches soil")
+
+    # --- proposals.py ---
+    proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")
+    proposal_rate: float = tuned(10.0, "Hz", "grid of a foreseen experiment")
+
+    # --- states.py, drive.py, proposals.py ---
+    moving: float = tuned(0.05, "-", "of the largest value: below it a speed or load is at rest")
+    creep: float = tuned(0.05, "-", "of the usual rim speed: below it the wheel does not drive")
+    settling: float = tuned(0.5, "s", "after the wheel starts, at least, before values count")
+    longest_settling: float = tuned(5.0, "s", "after the wheel starts, at most")
+    stopping: float = tuned(
+        0.5, "s", "before the wheel stops values no longer count: a slope's reach, a servo's ramp"
+    )
+    contact_angle: float = tuned(
+        0.7, "rad", "usual entry angle: by then the rim has passed one contact and has sunk"
+    )
+    resting: float = tuned(0.4, "s", "the wheel must have stood for its current to be that at rest")
+    rising: float = tuned(0.2, "s", "the wheel must go on standing")
+    turning_speed: float = tuned(1e-3, "m/s", "a slower rim does not turn")
+    rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
+    lifted: float = tuned(0.2, "-", "of the least load: below it the wheel is lifted")
+
+    # --- weight_sets.py ---
+    held_values: int = tuned(
+        10, "values", "at exactly one load make a set of weights; in between they are changed"
+    )
+    same_weights: float = tuned(0.02, "-", "relative distance from which weights are others")
+    most_sets: int = tuned(60, "sets", "at most", "run time")
+
+    # --- weights.py ---
+    close_load: float = tuned(
+        0.15, "-", "relative distance of measured and stated load at which both mean the same"
+    )
+    raised: float = tuned(0.2, "-", "of the stated load: below it the wheel is lifted")
+    passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
+    load_doubt: float = tuned(
+        4.0, "σ", "of weights and sensor: beyond, a run that states nothing had other weights"
+    )
+    load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
+    load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
+    hold: float = tuned(1.0, "s", "weights stay for at least this long")
+
+    # --- wheel.py ---
+    holding: float = tuned(
+        0.05, "-", "of the driving torque: current at rest that differs by more holds something"
+    )
+    slope_edge: int = tuned(2, "intervals", "at a run's ends a slope lacks its neighbours")
+    unknown_offset: float = tuned(
+        1e5, "N or N·m", "an offset less certain says that the channel was not measured"
+    )
+    one_load: float = tuned(0.1, "-", "relative spread below which the loads are one")
+    kept_simulations: int = tuned(8, "simulations", "of a run that are kept", "memory, run time")
+    prepared: Mapping[str, float] = tuned(
+        PREPARED, "-", "relative repeatability of a bed that is raked and levelled anew"
+    )

@@ -1,0 +1,69 @@
+"""Tuned numbers of tools/diagnose/screen: what stands out of the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+TAIL = "Davison and Smith 1990"
+COLOUR_SIZES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5)
+
+
+@dataclass(frozen=True)
+class Screen:
+    """When evidence is an alarm, and what is searched for."""
+
+    # --- screen.py ---
+    level: float = tuned(0.01, "probability", "of a false alarm: half of what is allowed")
+    least_surprise: float = tuned(2.0, "nats", "less is no alarm, however quiet the nulls")
+    kinds: int = tuned(10, "kinds", "of misfit that count as independent, of all that are tried")
+    tail: float = tuned(
+        0.1,
+        "probability",
+        "beyond it the tail of the nulls is exponential; evidence counts from it",
+        TAIL,
+    )
+    counted: float = tuned(10.0, "nulls", "that must reach a value for its chance to be counted")
+    trusted_tail: float = tuned(0.1, "-", "of the least chance that can be counted", TAIL)
+
+    # --- screening.py ---
+    nulls: int = tuned(300, "draws", "of noise alone", "run time")
+    weighed: int = tuned(
+        6, "candidates", "whose evidence is weighed with the noise's colour open", "run time"
+    )
+    again: int = tuned(4, "signatures", "of an effect that a later screen tries", "run time")
+
+    # --- ripples.py ---
+    loudest: int = tuned(10, "orders", "whose physics is simulated", "run time")
+
+    # --- open_colour.py ---
+    colour_sizes: tuple[float, ...] = tuned(
+        COLOUR_SIZES, "-", "of the noise, beside what suits a channel for itself"
+    )
+    colour_near: float = tuned(
+        10.0, "nats", "a colour so far behind the best for a channel alone is not tried in it"
+    )
+    colour_sweeps: int = tuned(2, "sweeps", "over the channels")
+    whitened_at_once: int = tuned(8_000_000, "numbers", "whitened at once", "memory")
+
+    # --- scans.py ---
+    step_places: int = tuned(48, "places", "of a step along an axis", "run time")
+    step_values: int = tuned(8, "values", "on either side of a step")
+    step_width: float = tuned(
+        0.015, "-", "of the whole stretch: a wheel is on both sides of a step for a while"
+    )
+    peaks: int = tuned(4, "shapes", "of a family that are fitted", "run time")
+    wave_density: float = tuned(
+        4.0, "-", "frequencies tried in each that the whole campaign resolves"
+    )
+    ripple_harmonics: int = tuned(4, "harmonics", "of a ripple that is known")
+    large_ripple: float = tuned(3.0, "-", "their standard deviation in expected sizes")
+    frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")
+
+    @property
+    def sure(self) -> float:
+        """A likelihood ratio [nats] that is chance as rarely as an alarm is false."""
+        return float(np.log(self.kinds / self.level))

@@ -1,0 +1,30 @@
+"""Tuned numbers of tools/diagnose/search: which models are fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+TESTBEDS = "of ten testbeds with one effect left out, one or two have a second that shows"
+
+
+@dataclass(frozen=True)
+class Search:
+    """How far the search for effects goes."""
+
+    effects_first: int = tuned(9, "effects", "fitted beside the base model", "run time")
+    effects_later: int = tuned(5, "effects", "fitted beside a model with effects", "run time")
+    starts: int = tuned(2, "models", "of a size from which the next step starts", "run time")
+    most_effects: int = tuned(3, "effects", "of a model, at most", "run time")
+    again: int = tuned(
+        4, "signatures", "of an effect tried beside a model: the screen's likeliest", "run time"
+    )
+    behind: float = tuned(12.0, "nats", "a model so far behind the best starts nothing")
+    promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
+    least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
+    least_start: float = tuned(
+        0.02, "expected sizes", "of a strength that has a sign: at its bound it has no slope"
+    )
+    farthest_start: float = tuned(20.0, "expected sizes", "of any parameter")
+    odds: float = tuned(0.15, "odds", "of one more effect, shared by all candidates", TESTBEDS)

@@ -1,0 +1,30 @@
+"""Tuned numbers of tools/diagnose/verdict: what is said of the models that were fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """When a name is accepted, and when nothing is."""
+
+    # --- decide.py ---
+    alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be told apart")
+    explained_share: float = tuned(
+        0.1, "share", "of the misfit that names must take to be an explanation"
+    )
+    power: float = tuned(
+        0.4, "share", "of the effects that must be detectable at their expected size: consistent"
+    )
+    quiet_temperature: float = tuned(2.0, "-", "of the screen's evidence where nothing alarms")
+    quiet_weight: float = tuned(20.0, "-", "of no effect at all where nothing alarms")
+    quiet_most: float = tuned(20.0, "nats", "of an effect's evidence where nothing alarms")
+
+    # --- nameless.py ---
+    function_sizes: tuple[float, ...] = tuned(
+        (1.0, 5.0), "-", "of a function, in its expected size, where it is fitted"
+    )
+    together: int = tuned(4, "functions", "that may act together", "run time")

@@ -23,7 +23,7 @@ Definition = Mapping[str, object]
 
 # key of an inline definition -> (default or None if it must be given, test, what is expected)
 _Rule = tuple[object, Callable[[Any], bool], str]
-_RULES: dict[str, _Rule] = {
+RULES: dict[str, _Rule] = {
     "id": (None, lambda v: _is_int(v) and 0 <= v < 1 << 29, "a frame id below 2^29"),
     "start": (None, lambda v: _is_int(v) and 0 <= v < 512, "a start bit of 0 to 511"),
     "length": (None, lambda v: _is_int(v) and 1 <= v <= 64, "a length of 1 to 64 bits"),
@@ -38,7 +38,6 @@ _RULES: dict[str, _Rule] = {
     "scale": (1, lambda v: _is_number(v) and v != 0, "a number other than 0"),
     "offset": (0, lambda v: _is_number(v), "a number"),
 }
-INLINE_KEYS = tuple(_RULES)
 
 
 def database(device: Device) -> Database:
@@ -96,12 +95,12 @@ def _inline(device: Device) -> Database:
 def _checked(where: str, definition: Definition) -> dict[str, Any]:
     """The definition, complete, each value of the right kind."""
     for key in definition:
-        if key not in _RULES:
+        if key not in RULES:
             raise DeviceSettingsError(
-                where, f"unknown key {key!r}, expected some of {', '.join(_RULES)}"
+                where, f"unknown key {key!r}, expected some of {', '.join(RULES)}"
             )
     values = {}
-    for key, (default, valid, expected) in _RULES.items():
+    for key, (default, valid, expected) in RULES.items():
         values[key] = definition.get(key, default)
         if not valid(values[key]):
             raise DeviceSettingsError(

@@ -38,4 +38,3 @@ CHANNELS: dict[str, tuple[str, ...]] = {
 
 ENCODERS = ("wheel_encoder", "carriage_encoder")
 REQUIRED = ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt")
-OPTIONAL = ("wrench", "motor_temperature")

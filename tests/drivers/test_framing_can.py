@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.drivers.can_signals import INLINE_KEYS, MAX_INLINE, database
+from gritd.drivers.can_signals import MAX_INLINE, RULES, database
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing import Frame
 from gritd.drivers.framing_can import ERROR, EXTENDED, REMOTE, CanFraming, pack
@@ -231,7 +231,7 @@ def test_too_many_inline_signals_are_refused():
 def test_inline_keys_are_those_of_the_configuration():
     from gritd.estimator.config.devices import SIGNAL
 
-    assert set(INLINE_KEYS) == set(SIGNAL)
+    assert set(RULES) == set(SIGNAL)
 
 
 # ---- what is missing or broken

@@ -13,7 +13,14 @@ ROOT = Path(__file__).parents[1]
 # the lowest first; a room imports itself and those of lower rows
 ROOMS = (
     ("config",),
-    ("estimator",),
+    ("estimator.terramechanics", "estimator.messages", "estimator.threads", "estimator.visible"),
+    ("estimator.stages",),
+    ("estimator.effects",),
+    ("estimator.model", "estimator.config", "estimator.recording"),
+    ("estimator.wheel",),
+    ("estimator.filter",),
+    ("estimator.online",),
+    ("estimator.offline", "estimator.daemon"),
     ("drivers",),
     ("tools.cli",),
     ("tools.testbed", "tools.service", "tools.diagnose", "tools.importers", "tools.paper"),
@@ -33,7 +40,7 @@ FILES = sorted(
 def room_of(module: str) -> str:
     """The room of a module's name without `gritd.`."""
     parts = module.split(".")
-    return ".".join(parts[: 2 if parts[0] == "tools" else 1])
+    return ".".join(parts[: 2 if parts[0] in ("estimator", "tools") else 1])
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -54,7 +61,7 @@ def imported(path: Path) -> Iterator[str]:
 
 def test_every_file_has_a_room() -> None:
     rooms = {room_of(".".join(path.with_suffix("").parts)) for path in FILES}
-    assert rooms - {"tools.__init__"} == set(HEIGHT)
+    assert rooms - {"estimator.__init__", "tools.__init__"} == set(HEIGHT)
 
 
 def test_imports_point_down() -> None:
@@ -69,3 +76,25 @@ def test_imports_point_down() -> None:
         ]
 
     assert wrong == []
+
+
+def test_drivers_know_messages_configuration_and_threads_of_the_estimator() -> None:
+    allowed = {"estimator.config", "estimator.messages", "estimator.threads"}
+    rooms = {
+        room_of(module)
+        for path in FILES
+        if path.parts[0] == "drivers"
+        for module in imported(path)
+        if module.startswith("estimator")
+    }
+    assert rooms <= allowed
+
+
+def test_an_init_file_hands_names_on_and_no_more() -> None:
+    for path in FILES:
+        if path.name != "__init__.py":
+            continue
+        for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
+            text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            names = isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+            assert text or names or isinstance(node, (ast.Import, ast.ImportFrom)), path

@@ -82,8 +82,11 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     projection = model.fitted.projection(drawn)
     screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
 
-    # whether there is a mismatch at all; beside an effect, explanations compete on even terms
-    return screen if model.names else replace(screen, open=_open(screening, model, screen))
+    # whether there is a mismatch at all; beside an effect, explanations compete on even terms, and
+    # with a reference campaign the noise's colour is not open
+    if model.names or not all(problem.stack.rig.new):
+        return screen
+    return replace(screen, open=_open(screening, model, screen))
 
 
 def chance_of(

@@ -7,9 +7,9 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
 
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
 along the bed, as another formula for it would have it. A ripple may also have other harmonics. ρ is
-how far published forms differ; its prior is over 5 to 40 %. It is never nothing: where the soil
-can absorb most of an effect, another form of it changes the soil and hardly the fit, so that the
-recordings would let our own form pass for exact.
+how far published forms differ; its prior is over 0 to 40 %. Our own form may be the best one to
+name an effect by, but the soil is never told as if it were exact: where the soil can absorb most
+of an effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
+
+EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
 
 
 def bending_sizes() -> Sizes:

@@ -29,14 +29,18 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise."""
+    """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise.
+
+    least: the number of the smallest size that counts for the uncertainty of the constants.
+    """
 
     name: str
     columns: Array
     whitened: Array
     sizes: Sizes
+    least: int = 0
 
 
-def freedom(name: str, columns: Array, noise: Noise, sizes: Sizes) -> Freedom:
+def freedom(name: str, columns: Array, noise: Noise, sizes: Sizes, least: int = 0) -> Freedom:
     """The freedom of columns (N, m) in the channels' units."""
-    return Freedom(name, columns, whiten(noise, columns), sizes)
+    return Freedom(name, columns, whiten(noise, columns), sizes, least)

@@ -85,8 +85,10 @@ class Marginal:
         """Mean (count,) and covariance of the first unknowns, averaged over the sizes about the
         likeliest ones.
         """
-        every = {chosen, *(c for n in range(len(self.freedoms)) for c in self._along(chosen, n))}
-        ordered = sorted(every)
+        about = tuple(max(n, f.least) for n, f in zip(chosen, self.freedoms, strict=True))
+        every = {about, *(c for n in range(len(about)) for c in self._along(about, n))}
+        least = [f.least for f in self.freedoms]
+        ordered = sorted(c for c in every if all(n >= low for n, low in zip(c, least, strict=True)))
         values = np.array([self.log_evidence(c) for c in ordered])
         weight = np.exp(values - logsumexp(values))
         told = [

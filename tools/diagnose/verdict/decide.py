@@ -96,13 +96,12 @@ def _best(weighed: Sequence[Weighed]) -> Model:
 
 
 def taken_share(search: Search, model: Model) -> float:
-    """Share of the misfit that a model's effects take: of the squares beyond noise that the exact
-    form leaves, 0 to 1.
+    """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
+    leaves when its effects are switched off and all else stays.
     """
-    free = search.problem.stack.size - len(search.base.fitted.u)
-    before, after = (
-        float(m.fitted.residual @ m.fitted.residual) - free for m in (search.base, model)
-    )
+    fitted = model.fitted
+    off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
+    before, after = (float(f.residual @ f.residual) - fitted.residual.size for f in (off, fitted))
     return float(np.clip(1.0 - max(after, 0.0) / max(before, 1e-9), 0.0, 1.0))
 
 

@@ -42,7 +42,8 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
         if np.any(added):
             every = np.column_stack((functions, _harmonics(stack, fitted, number)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
-            found.append(freedom(effect.name, columns, noise, bending_sizes()))
+            least = 0 if effect.stage in EXACT else 1
+            found.append(freedom(effect.name, columns, noise, bending_sizes(), least))
     return tuple(found)
 
 

@@ -98,7 +98,7 @@ def estimate_beside_form(
     """The same from a reference campaign: all that it shows beside what the form explains is what
     this rig does when nothing is new, waves included.
     """
-    residual, cells = stack.measured - predicted, replicates.cells(stack)
+    residual, cells = stack.measured - predicted, np.full(stack.size, -1, dtype=np.intp)
     found = [
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels

@@ -58,6 +58,12 @@ class Fit:
     )
     drive_prior: tuple[float, ...] = tuned(DRIVE_PRIOR, "prior", "probability of each of the sizes")
     form_features: int = tuned(36, "features", "of a source at most", "run time")
+    form_features_shared: int = tuned(
+        90,
+        "features",
+        "of a source at most, with a reference campaign: it follows every transient that both have",
+        "judgement",
+    )
     form_left_out: float = tuned(3e-3, "-", "variance of the discrepancy that may be left out")
     form_turn: float = tuned(
         0.2, "-", "size of what goes with the wheel's angle, in that of the discrepancy"

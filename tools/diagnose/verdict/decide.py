@@ -101,7 +101,12 @@ def taken_share(search: Search, model: Model) -> float:
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
-    before, after = (float(f.residual @ f.residual) - fitted.residual.size for f in (off, fitted))
+    shared = np.zeros(fitted.residual.size)
+    if not all(search.problem.stack.rig.new):  # what both campaigns do is no misfit
+        count = fitted.carried.shape[1]
+        shared = fitted.jacobian[:, -count:] @ fitted.slack[-count:] if count else shared
+    left = [f.residual - shared for f in (off, fitted)]
+    before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, 1e-9), 0.0, 1.0))
 
 

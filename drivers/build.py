@@ -33,9 +33,9 @@ def build_readers(
 ) -> list[Reader]:
     """One reader for each device that some channel uses, not yet started.
 
-    clock: ns since the epoch, the daemon's own. tap: device name -> where to log its raw chunks, or
-    None. playback: recorded wires in the place of the hardware. Raises DeviceSettingsError, one
-    line, where channels, devices and signals do not fit together.
+    clock: ns since the epoch, the daemon's own. tap: device name -> where to log its raw chunks,
+    or None. playback: recorded wires in the place of the hardware. Raises DeviceSettingsError,
+    one line, where channels, devices and signals do not fit together.
     """
     readers = []
     for device in used_devices(settings):

@@ -1,17 +1,17 @@
 """The line between a device's clock and ours: the lower edge of the delays on the way.
 
 Receive time − device time is a line (offset and drift between two crystals) plus a delay that is
-never negative. The line is therefore the lower edge of these differences. The edge of their lower
-convex hull over the middle of a sliding window gives the drift, and the line is pushed down until
-it touches the lowest points.
+never negative. The line is therefore the lower edge of these differences. The edge of their
+lower convex hull over the middle of a sliding window gives the drift, and the line is pushed
+down until it touches the lowest points.
 
-No point moves the line alone: of each block of time the lowest counts that another comes close to.
-Where the edge of the
-last second lies elsewhere than that of the time before, the time before is forgotten.
+No point moves the line alone: of each block of time the lowest counts that another comes close
+to. Where the edge of the last second lies elsewhere than that of the time before, the time
+before is forgotten.
 
 S. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay
-measurements, IEEE INFOCOM 1999, Eq. (4): the line under all points that is closest to them is that
-edge of the hull.
+measurements, IEEE INFOCOM 1999, Eq. (4): the line under all points that is closest to them is
+that edge of the hull.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ STRAY = 10e6  # [ns] what comes earlier than this was not held up by the way: it
 class Line:
     """Offset of our clock over the device's, as a function of the device time.
 
-    Until it is `settled`, it follows the lowest point at once: the first frames may have waited in
-    a buffer for seconds.
+    Until it is `settled`, it follows the lowest point at once: the first frames may have waited
+    in a buffer for seconds.
     """
 
     def __init__(self, slope: float = 0.0) -> None:
@@ -81,7 +81,9 @@ class Line:
         return point[1] - self.slope * point[0]
 
     def _settle(self, point: Point, received: float) -> None:
-        """Follow a new lowest point at once, until half of the points for a while lie close to it."""
+        """Follow a new lowest point at once, until half of the points for a while lie close to
+        it.
+        """
         height = self._height(point)
         since, seen, near = self._steady
         is_alone = received - since >= STEADY and seen > ENOUGH and 2 * near < seen
@@ -110,8 +112,8 @@ class Line:
         self._level = self._lowest(list(self._blocks)[0 if self._known else -LATEST :])
 
     def _forget(self) -> None:
-        """Drop what lies before the edge moved up or down: the clock made a small step, or the way
-        changed.
+        """Drop what lies before the edge moved up or down: the clock made a small step, or the
+        way changed.
         """
         blocks = list(self._blocks)
         before, recent = blocks[:-RECENT], blocks[-RECENT:]
@@ -137,8 +139,8 @@ class Line:
 
 
 def hull_slope(points: Sequence[Point]) -> float:
-    """Slope of the lower convex hull's edge over the mean abscissa; points sorted by abscissa, two
-    or more.
+    """Slope of the lower convex hull's edge over the mean abscissa; points sorted by abscissa,
+    two or more.
     """
     hull: list[Point] = []
     for point in points:

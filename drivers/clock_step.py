@@ -13,8 +13,10 @@ from typing import NamedTuple
 STEADY = 0.1e9  # [ns] that frames have to agree, and
 ENOUGH = 3  # so many of them: of a slow sensor that takes longer
 MOST = 2 / 3  # of the frames since then have to be among them: some may be wrong
-NEAR = 20e6  # [ns] between the delays of frames that agree: a USB adapter holds them back for 16 ms
-FLAT = 10e6  # [ns] the delays of a backlog that is worked off fall; those over another line do not
+# [ns] between the delays of frames that agree: a USB adapter holds them back for 16 ms
+NEAR = 20e6
+# [ns] the delays of a backlog that is worked off fall; those over another line do not
+FLAT = 10e6
 FAR = 50e6  # [ns] frames later than this are of no use to the loop, whatever held them up
 TOGETHER = 5e6  # [ns] chunks that come so close upon each other count as one
 KEPT = 8  # rivals that are remembered however long ago
@@ -38,7 +40,8 @@ class Doubt:
         self._rivals: list[Rival] = []
         self._impossible: deque[float] = deque(maxlen=MANY)  # delays that nothing else explains
         self._calm = self._on_line = 0  # chunks on the line since the last rival, and the first
-        self._began = self._calmed = 0  # when the first rival came, and the last chunk on the line
+        # when the first rival came, and the last chunk on the line
+        self._began = self._calmed = 0
         self._tried = 0  # rivals since the first
 
     def calmed(self, received: int) -> Doubt:
@@ -51,7 +54,9 @@ class Doubt:
         return Doubt() if self._calm > 1 else self
 
     def add(self, rival: Rival, impossible: list[float]) -> None:
-        """Take up a chunk, with the delays of those of its frames that nothing on the way explains."""
+        """Take up a chunk, with the delays of those of its frames that nothing on the way
+        explains.
+        """
         rivals, self._calm = self._rivals, 0
         self._impossible.extend(impossible)
         if rivals and rival.received - rivals[-1].received < TOGETHER:

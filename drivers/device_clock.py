@@ -1,11 +1,12 @@
-"""A device's wrapping microsecond clock mapped to ours, so that batching on the way is not read as
-speed, and a wrong stamp costs one sample.
+"""A device's wrapping microsecond clock mapped to ours, so that batching on the way is not read
+as speed, and a wrong stamp costs one sample.
 
 Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms,
-schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or one
-whose time goes back, has a wrong time: it gets no stamp, and the line does not see it. Where frames
-agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's clock has
-stepped.
+schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or
+one
+whose time goes back, has a wrong time: it gets no stamp, and the line does not see it. Where
+frames agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's
+clock has stepped.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ MARGIN = 10e6  # [ns] for the drift
 class DeviceClock:
     """Stamps for the frames of one key, in the order sent; their clock wraps at `modulus_us` µs.
 
-    A stamp is never later than the receive time and grows with the device time. What remains is the
-    smallest delay of the last 20 s, a constant that belongs into the channel's latency.
+    A stamp is never later than the receive time and grows with the device time. What remains is
+    the smallest delay of the last 20 s, a constant that belongs into the channel's latency.
     """
 
     def __init__(self, modulus_us: int = 1 << 32) -> None:
@@ -63,7 +64,8 @@ class DeviceClock:
             for time, is_right in zip(times, right, strict=True)
         ]
 
-    # --- which times are right --------------------------------------------------------------------
+    # --- which times are right
+    # --------------------------------------------------------------------
 
     def _unwrap(self, wrapped: int, received: int) -> int:
         """Device time without wraps [ns]: the turn of the clock nearest to where our own clock
@@ -121,8 +123,8 @@ class DeviceClock:
         return possible
 
     def _step(self, agreed: list[Rival], now: int) -> None:
-        """The device's clock has jumped: go on from the frames that say so, but for a wrong one. The
-        present chunk is followed later.
+        """The device's clock has jumped: go on from the frames that say so, but for a wrong one.
+        The present chunk is followed later.
         """
         least = median(rival.delay for rival in agreed) - FLAT
         rivals = [rival for rival in agreed if rival.delay >= least]
@@ -140,11 +142,14 @@ class DeviceClock:
         self._start(time, received)
 
     def _has_restarted(self, shown: int, received: int) -> bool:
-        """Whether the device's clock went back and shows no more than the time since it was heard."""
+        """Whether the device's clock went back and shows no more than the time since it was
+        heard.
+        """
         silent = received - self._newest_received
         return shown < self._newest % self._modulus and shown <= silent + MARGIN
 
-    # --- stamps -----------------------------------------------------------------------------------
+    # --- stamps
+    # -----------------------------------------------------------------------------------
 
     def _follow(self, time: int, received: int) -> None:
         """Let the line see the frame of a chunk that waited least."""
@@ -159,7 +164,8 @@ class DeviceClock:
         return float(received - time - self._origin)
 
     def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
-        """Device time and stamp of the chunk's newest sample where the line does not fit between the
+        """Device time and stamp of the chunk's newest sample where the line does not fit between
+        the
         last stamp and the receive time: it was pushed down since, or has yet to be.
         """
         last = self._last

@@ -1,4 +1,6 @@
-"""The two things that can go wrong with a device: what is configured, and what the hardware does."""
+"""The two things that can go wrong with a device: what is configured, and what the hardware
+does.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +24,8 @@ class DeviceSettingsError(ValueError):
 
 
 def one_line(reason: object) -> str:
-    """The reason as one line of at most 200 characters; an exception without a text gives its type."""
+    """The reason as one line of at most 200 characters; an exception without a text gives its
+    type.
+    """
     text = " ".join(str(reason).split())
     return (text or type(reason).__name__)[:200]

@@ -2,16 +2,17 @@
 
 Body before stuffing, little-endian:
 
-    u16 sequence | u8 kind of the values | u8 length of the key, bit 7 set if a time follows | key |
-    [u32 device_us]
+    u16 sequence | u8 kind of the values | u8 length of the key, bit 7 set if a time follows |
+    key | [u32 device_us]
     | values, all of one kind | u16 CRC-16 (CCITT, initial value 0xFFFF) of all before it
 
-Kinds are the letters of Python's struct: i int32, I uint32, q int64, f float32, d float64. The body
-is at most 253 bytes, so one stuffing code, below 0xFF, covers any run. A damaged zero byte joins
+Kinds are the letters of Python's struct: i int32, I uint32, q int64, f float32, d float64. The
+body is at most 253 bytes, so one stuffing code, below 0xFF, covers any run. A damaged zero byte
+joins
 two frames: a fault costs the frame it hits and at most the next.
 
-COBS: S. Cheshire, M. Baker, Consistent Overhead Byte Stuffing, IEEE/ACM Trans. Networking 7 (1999)
-    159–172.
+COBS: S. Cheshire, M. Baker, Consistent Overhead Byte Stuffing, IEEE/ACM Trans. Networking 7
+    (1999) 159–172.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ def encode(frame: Frame, kind: str | None = None) -> bytes:
     """The frame on the wire, its closing zero included.
 
     kind: one of i, I, q, f, d for all values; by default the narrowest integer, or d where any
-    value is a float. Raises struct.error if a value does not fit the kind, ValueError if the frame
-    is too long.
+    value is a float. Raises struct.error if a value does not fit the kind, ValueError if the
+    frame is too long.
     """
     kind = kind or _narrowest(frame)
     key = frame.key.encode("ascii")
@@ -79,7 +80,9 @@ def _unstuff(stuffed: bytes) -> bytes | None:
 
 
 class CobsFraming:
-    """Incremental decoder of stuffed binary frames; keeps at most MAX_STUFFED bytes between chunks."""
+    """Incremental decoder of stuffed binary frames; keeps at most MAX_STUFFED bytes between
+    chunks.
+    """
 
     def __init__(self) -> None:
         self.counts = Counts()

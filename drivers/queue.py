@@ -20,7 +20,9 @@ class QueueCounts(NamedTuple):
 
 
 class ReadingQueue:
-    """Readers put, the loop drains. When full the oldest reading is dropped: the newest says most."""
+    """Readers put, the loop drains. When full the oldest reading is dropped: the newest says
+    most.
+    """
 
     def __init__(self, capacity: int = 16384) -> None:
         self._lock = Lock()

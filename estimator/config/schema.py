@@ -1,9 +1,9 @@
 """Kinds of configuration values. Each reads a YAML node into a value and says, in words, what it
 expects.
 
-A `Section` is a table of keys; parsing, defaults, error lines and the key reference all come from
-it. Reading returns the value and the node completed with the defaults, so that the effective
-configuration is a by-product.
+A `Section` is a table of keys; parsing, defaults, error lines and the key reference all come
+from it. Reading returns the value and the node completed with the defaults, so that the
+effective configuration is a by-product.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class Kind(Protocol):
 
 
 class Impossible(Exception):
-    """Values that cannot go together: which key (dotted, within the section), and what was expected
-    of it.
+    """Values that cannot go together: which key (dotted, within the section), and what was
+    expected of it.
     """
 
     def __init__(self, key: str, expected: str, found: str = "") -> None:
@@ -402,7 +402,9 @@ def _tag(node: Node) -> str:
 
 
 def _blame(error: Impossible, section: Mapping) -> Exception:
-    """The error line at the key that was named, or at the nearest one above it that is in the file."""
+    """The error line at the key that was named, or at the nearest one above it that is in the
+    file.
+    """
     node: Node = section
     for name in error.key.split("."):
         if isinstance(node, Mapping) and name in node.items:

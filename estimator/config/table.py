@@ -1,8 +1,9 @@
-"""The format of the configuration file: every key with its kind, unit, bounds, default and meaning.
+"""The format of the configuration file: every key with its kind, unit, bounds, default and
+meaning.
 
 Parsing, defaults, error lines and the reference in docs/configuration.md all come from these
-tables. A default is written as it would be in the file. The builders below them check what concerns
-several keys at once.
+tables. A default is written as it would be in the file. The builders below them check what
+concerns several keys at once.
 """
 
 from __future__ import annotations
@@ -135,7 +136,8 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
     return Load(nominal, minimum)
 
 
-# ---- channels ------------------------------------------------------------------------------------
+# ---- channels
+# ------------------------------------------------------------------------------------
 # ------------------
 
 # channel -> raw unit, physical unit, unit of raw differences
@@ -412,12 +414,13 @@ class Effects:
 
 
 # ---- the whole file
-# ------------------------------------------------------------------------------------------------
+# -----------------------------------------------------------------------------------------------
+# -
 
 
 def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:
-    """The whole format; reading it gives (Settings, run). Relative paths count from the folder, if
-    there is one.
+    """The whole format; reading it gives (Settings, run). Relative paths count from the folder,
+    if there is one.
     """
     devices = Named(
         device(folder), lambda name, value: replace(value, name=name), "a mapping of devices"
@@ -456,7 +459,9 @@ def _settings(
 
 
 def _check_channels(settings: Settings) -> None:
-    """Every channel has its device and arrives within the horizon; the torque's channel is there."""
+    """Every channel has its device and arrives within the horizon; the torque's channel is
+    there.
+    """
     if settings.drive.torque_source == "wrench" and settings.wrench is None:
         raise Impossible("drive.torque_source", "motor_shunt, since there is no channel wrench")
     sources = dict(settings.channels) | ({"wrench": settings.wrench} if settings.wrench else {})

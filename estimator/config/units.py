@@ -1,10 +1,11 @@
 """Quantities written as text, such as `72 mm` or `1523.4 kN/m^(n+2)`,, to SI: one small table.
 
-A unit is a product of powers: symbols joined by `*`, `·` or `/` (read from the left), a whole power
-after `^`, `sqrt(s)` for random walks, and `1` to start a reciprocal. Symbols are those of SYMBOLS,
-most with an SI prefix. The exponent n of the pressure-sinkage law may stand in a power of the
-metre: `kN/m^(n+1)`. Angles and counts are dimensions of their own, so that mrad/count is not taken
-for mm/count.
+A unit is a product of powers: symbols joined by `*`, `·` or `/` (read from the left), a whole
+power after `^`, `sqrt(s)` for random walks, and `1` to start a reciprocal. Symbols are those of
+SYMBOLS, most with an SI prefix. The exponent n of the pressure-sinkage law may stand in a power
+of the
+metre: `kN/m^(n+1)`. Angles and counts are dimensions of their own, so that mrad/count is not
+taken for mm/count.
 """
 
 from __future__ import annotations
@@ -93,7 +94,9 @@ def unit(text: str) -> Unit:
 
 
 def parse(text: str, expected: str) -> float:
-    """The SI value of a quantity whose dimension is that of the unit `expected`. Raises UnitError."""
+    """The SI value of a quantity whose dimension is that of the unit `expected`. Raises
+    UnitError.
+    """
     number, suffix = split(text)
     found = unit(suffix)
     if found.dimension != unit(expected).dimension:
@@ -170,8 +173,8 @@ def _symbol(symbol: str) -> Unit:
 
 
 def _symbolic(symbol: str, plus: int) -> Unit:
-    """m^(n+plus). A prefixed metre would make the factor depend on n, so only the metre itself may
-    carry it.
+    """m^(n+plus). A prefixed metre would make the factor depend on n, so only the metre itself
+    may carry it.
     """
     if symbol != "m":
         raise UnitError(f"a power with n belongs to m alone, not to {symbol!r}")

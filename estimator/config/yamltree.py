@@ -1,10 +1,10 @@
-"""Strict YAML: text → a tree of nodes that remember their line, refusing what a configuration never
-needs.
+"""Strict YAML: text → a tree of nodes that remember their line, refusing what a configuration
+never needs.
 
 PyYAML's parser makes the events; the tree is built here because PyYAML overlooks duplicate keys,
 follows aliases (a few lines can unfold to gigabytes), builds objects from tags and forgets the
-lines. Scalars stay text: the schema decides what they are, and `tag` says what YAML would have made
-of them. Loads in a few milliseconds, unlike the schema.
+lines. Scalars stay text: the schema decides what they are, and `tag` says what YAML would have
+made of them. Loads in a few milliseconds, unlike the schema.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ def _reading(node: Scalar) -> str:
 
 
 def read_text(path: Path, expected: str = "a configuration file") -> str:
-    """Text of a regular file of bounded size; a pipe or a device is refused without waiting for it.
+    """Text of a regular file of bounded size; a pipe or a device is refused without waiting for
+    it.
 
     Raises ConfigError, which says what was expected.
     """

@@ -1,5 +1,5 @@
-"""The daemon: readers, loop and writer as threads of one process, started, watched and stopped in
-order.
+"""The daemon: readers, loop and writer as threads of one process, started, watched and stopped
+in order.
 
 Readers are handed in (they come from `drivers`, which the estimator does not know). If a thread
 dies the daemon stops with a named reason and a closed log, so that the service manager starts it
@@ -34,7 +34,8 @@ from gritd.estimator.threads.waiting import wait_until
 
 WATCH = 0.1  # [s] between looks at the threads
 INFO, WARNING, ERROR = 20, 30, 40  # levels of /log
-# [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2 s
+# [s] for everything to end: half of it for the readers, a quarter for the loop; Python takes 0.2
+# s
 # more
 STOP = 1.5
 MODES = {"owner": 0o600, "group": 0o640}  # of a recording, by logging.readable_by
@@ -65,8 +66,8 @@ class ReaderThread(Protocol):
 
 
 class Daemon:
-    """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's last
-    word.
+    """One run. `serve` blocks until `stop` is set or something dies; it returns the writer's
+    last word.
 
     Raises DaemonError, and what WriterThread raises if the first file cannot be created.
     """
@@ -133,7 +134,9 @@ class Daemon:
         self.rotation.begin()
 
     def serve(self, watch: Callable[[Daemon], None] = lambda daemon: None) -> WriterStatus:
-        """Run until stopped. `watch` is called about ten times a second from the caller's thread."""
+        """Run until stopped. `watch` is called about ten times a second from the caller's
+        thread.
+        """
         self.writer.start()
         for reader in self.readers:
             reader.start()
@@ -146,8 +149,8 @@ class Daemon:
         return self._close(left)
 
     def _drained(self, loop: Thread) -> float:
-        """End the readers, then the loop, which takes what they left; what remains of STOP for the
-        writer [s].
+        """End the readers, then the loop, which takes what they left; what remains of STOP for
+        the writer [s].
         """
         for reader in self.readers:
             reader.stop(0.0)
@@ -181,7 +184,9 @@ class Daemon:
             self.fail(f"the loop failed: {type(error).__name__}: {error}")
 
     def _check(self, loop: Thread) -> None:
-        """Stop with a reason if a thread died; note one that hangs, and a step of the wall clock."""
+        """Stop with a reason if a thread died; note one that hangs, and a step of the wall
+        clock.
+        """
         dead = [f"reader {reader.device}" for reader in self.readers if not reader.alive]
         dead += [] if self.writer.alive else ["writer"]
         dead += [] if loop.is_alive() else ["loop"]

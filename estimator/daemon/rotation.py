@@ -13,7 +13,9 @@ MAX_CHUNKS = 400_000  # and of no more flushes than this: a reader takes 500,000
 
 
 class Rotation:
-    """Follows the part that is written. A part begins where `due` says so, or where `begin` does."""
+    """Follows the part that is written. A part begins where `due` says so, or where `begin`
+    does.
+    """
 
     def __init__(self) -> None:
         self.deleted: list[Path] = []  # parts that somebody deleted while they were written

@@ -1,5 +1,5 @@
-"""The measurement of one window, linearised at an estimate: innovation, Jacobians, noise, σ of what
-is predicted.
+"""The measurement of one window, linearised at an estimate: innovation, Jacobians, noise, σ of
+what is predicted.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ class Measurement:
         return _predicted(self.model, estimate, now)
 
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
-        """Innovation, H, G and R of the components that are measured: T always, DP where there is a
-        sensor.
+        """Innovation, H, G and R of the components that are measured: T always, DP where there
+        is a sensor.
         """
         torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity = _sensitivity(now, prediction)
@@ -90,8 +90,8 @@ class Measurement:
         return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
 
     def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
-        """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians, which
-        T and DP share.
+        """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians,
+        which T and DP share.
         """
         sigmas = (now.sinkage.sigma, now.slip.sigma, now.load.sigma)
         by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
@@ -105,8 +105,8 @@ class Measurement:
     def sigmas(
         self, estimate: Estimate, now: WheelState, prediction: Prediction
     ) -> tuple[float, float, float]:
-        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this window's
-        z, i and W.
+        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this
+        window's z, i and W.
         """
         torque, pull = self._nuisance_gradients(_sensitivity(now, prediction), now.columns)
         return (
@@ -153,8 +153,8 @@ def _sensed(
     context: Context,
     estimate: Estimate,
 ) -> WheelState:
-    """The window with one chain of effects; what wheel and testbed effects add is linear about the
-    estimate.
+    """The window with one chain of effects; what wheel and testbed effects add is linear about
+    the estimate.
     """
     now = wheel_state(settings, snapshot, chain, context)
     if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
@@ -241,7 +241,9 @@ def _innovation(now: WheelState, prediction: Prediction) -> tuple[float, float]:
 
 
 def _variants(settings: Settings, chain: Chain) -> list[tuple[WheelModel, Chain]]:
-    """Model and effects with one uncertain effect parameter, or the exponent n, moved by its sigma."""
+    """Model and effects with one uncertain effect parameter, or the exponent n, moved by its
+    sigma.
+    """
     moved = [Chain(settings, effects) for effects in variants(settings)]
     found = [(WheelModel(settings, other), other) for other in moved]
     exponent = settings.soil.exponent.sigma

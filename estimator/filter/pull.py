@@ -30,7 +30,9 @@ UNKNOWN = Pull()
 
 
 class Search(NamedTuple):
-    """A search under way: the soil and the window it is made for, and DP [N] at the first of SLIPS."""
+    """A search under way: the soil and the window it is made for, and DP [N] at the first of
+    SLIPS.
+    """
 
     estimate: Estimate
     now: WheelState

@@ -1,9 +1,10 @@
-"""Snapshots of a whole recording at once: what `sync.Sync` would say at chosen ticks, from arrays.
+"""Snapshots of a whole recording at once: what `sync.Sync` would say at chosen ticks, from
+arrays.
 
-`Sync` takes one reading after another, because on line there is no other way. A recording has them
-all, and each of Sync's rules is a statement about a sorted array: late is what its tick consumed
-after the window had closed, a repeated reading is the second of one stamp, a window is a slice
-between two searches, a jump a difference of neighbours.
+`Sync` takes one reading after another, because on line there is no other way. A recording has
+them all, and each of Sync's rules is a statement about a sorted array: late is what its tick
+consumed after the window had closed, a repeated reading is the second of one stamp, a window is
+a slice between two searches, a jump a difference of neighbours.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ class Stream(NamedTuple):
 
 
 class Played(NamedTuple):
-    """The ticks of a recording and the readings each of them consumed: `playback.played` in arrays."""
+    """The ticks of a recording and the readings each of them consumed: `playback.played` in
+    arrays.
+    """
 
     ticks: Ints  # (k,) [ns]
     streams: dict[str, Stream]
@@ -361,8 +364,8 @@ def _slope_sigma(noise: float, size: Ints, line: Lines) -> Array:
 
 
 def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> int:
-    """Counts that the readings before a jump predict for the time elapsed [ns], in exact integers
-    as Sync has them.
+    """Counts that the readings before a jump predict for the time elapsed [ns], in exact
+    integers as Sync has them.
     """
     count = len(stamp)
     if count < 3 or stamp[-1] - stamp[0] < shortest:

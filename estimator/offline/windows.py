@@ -1,8 +1,11 @@
-"""Readings to means and slopes over windows, from arrays: the one place where that is done offline.
+"""Readings to means and slopes over windows, from arrays: the one place where that is done
+offline.
 
-Two kinds of windows. `Members` are windows that may overlap, each with a beginning and an end of its
-own: what a tick looks back on. Blocks lie side by side between `edges`: a grid for a whole recording.
-On line `wheel/sync.py` makes the same means and slopes as `Members`, one reading after another.
+Two kinds of windows. `Members` are windows that may overlap, each with a beginning and an end of
+its
+own: what a tick looks back on. Blocks lie side by side between `edges`: a grid for a whole
+recording. On line `wheel/sync.py` makes the same means and slopes as `Members`, one reading
+after another.
 """
 
 from __future__ import annotations
@@ -27,7 +30,8 @@ CALM = 4.0  # [σ] within which the two slopes are the same
 NORMAL = 1.4826  # standard deviation of normal scatter over its median absolute deviation
 
 
-# --- windows that may overlap ---------------------------------------------------------------------
+# --- windows that may overlap
+# ---------------------------------------------------------------------
 
 
 class Members(NamedTuple):
@@ -62,7 +66,9 @@ def members(stamp: Ints, after: Ints, until: Ints) -> Members:
 
 
 class Lines(NamedTuple):
-    """A least-squares line through the counts of each window; without meaning below two readings."""
+    """A least-squares line through the counts of each window; without meaning below two
+    readings.
+    """
 
     mean: Array  # (m,) [raw]
     rate: Array  # (m,) [raw/s]
@@ -88,7 +94,8 @@ def lines(members: Members, stamp: Ints, counts: Ints) -> Lines:
     return Lines(origin + mean, rate, np.sqrt(spread) / NS, moved)
 
 
-# --- blocks side by side --------------------------------------------------------------------------
+# --- blocks side by side
+# --------------------------------------------------------------------------
 
 
 class Slopes(NamedTuple):
@@ -102,7 +109,8 @@ class Slopes(NamedTuple):
 def block_mean(time: Array, values: Array, edges: Array) -> Array:
     """Mean of the readings in each block (n,), moved to its middle; NaN in one with too few.
 
-    time [s], values (m,) in order of time; edges (n + 1,) [s]. Single readings far off are left out.
+    time [s], values (m,) in order of time; edges (n + 1,) [s]. Single readings far off are left
+    out.
     """
     n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1])
     block, (time, values) = _in_blocks(edges, time, time, values)
@@ -128,10 +136,12 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
 def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
     """Value and slope of an encoder at the middle of each block (n,).
 
-    time [s], values (m,) in order of time; edges (n + 1,) [s]. By a line fitted over the block and
-    its neighbours, QUICK to either side; where the slope is steady within its own noise, STEADY or
-    LONG to either side, if that line leaves no more than the short one: at creeping speed one count
-    is much of the slip, and counts that beat with the sampling make slow waves of what was steady.
+    time [s], values (m,) in order of time; edges (n + 1,) [s]. By a line fitted over the block
+    and its neighbours, QUICK to either side; where the slope is steady within its own noise,
+    STEADY or
+    LONG to either side, if that line leaves no more than the short one: at creeping speed one
+    count is much of the slip, and counts that beat with the sampling make slow waves of what was
+    steady.
     """
     best, left = _block_lines(time, values, edges, QUICK)
     quick, calm = best.rate, np.ones(best.rate.size, bool)
@@ -148,8 +158,8 @@ def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
 
 
 def _block_lines(time: Array, values: Array, edges: Array, reach: int) -> tuple[Slopes, Array]:
-    """Lines fitted over each block and `reach` more on either side; the r.m.s. of what they leave
-    (n,).
+    """Lines fitted over each block and `reach` more on either side; the r.m.s. of what they
+    leave (n,).
     """
     n, middle = edges.size - 1, 0.5 * (edges[1:] + edges[:-1]) - edges[0]
     block, (t, y) = _in_blocks(edges, time, time - edges[0], values)

@@ -1,9 +1,9 @@
-"""Topics of a recording: their fields, their ros2msg schema text, and their bytes in little-endian
-CDR.
+"""Topics of a recording: their fields, their ros2msg schema text, and their bytes in
+little-endian CDR.
 
-CDR (OMG DDSI-RTPS 10.5, "plain CDR"): four bytes of encapsulation header, then the fields in order,
-each aligned to its own size counted from the byte after that header; nothing is padded at the end.
-A stamp is an integer of nanoseconds here and `int32 sec, uint32 nanosec` on disk.
+CDR (OMG DDSI-RTPS 10.5, "plain CDR"): four bytes of encapsulation header, then the fields in
+order, each aligned to its own size counted from the byte after that header; nothing is padded at
+the end. A stamp is an integer of nanoseconds here and `int32 sec, uint32 nanosec` on disk.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ TIME_SCHEMA = "=" * 80 + f"\nMSG: {TIME}\nint32 sec\nuint32 nanosec\n"
 class Topic:
     """A topic of fixed fields. `schema_name` is the ROS name, package/msg/Name.
 
-    Types: builtin_interfaces/Time (an int [ns] on our side), the ROS integers and floats, bool, and
-        string. A topic
+    Types: builtin_interfaces/Time (an int [ns] on our side), the ROS integers and floats, bool,
+        and string. A topic
     without a string is flat: its messages all have one size, and its arrays can be read in bulk.
     """
 
@@ -76,8 +76,8 @@ class Topic:
 
 
 class Codec:
-    """Bytes of one message type. `format` is the struct format (standard sizes, explicit padding)
-    of a flat one.
+    """Bytes of one message type. `format` is the struct format (standard sizes, explicit
+    padding) of a flat one.
     """
 
     def __init__(self, fields: Sequence[Field]) -> None:
@@ -122,7 +122,9 @@ class Codec:
         return struct.pack("<I", ENCAPSULATION) + bytes(out)
 
     def decode(self, data: bytes) -> tuple[Any, ...]:
-        """The values of one message. Raises ValueError if the bytes are not a message of this type."""
+        """The values of one message. Raises ValueError if the bytes are not a message of this
+        type.
+        """
         if len(data) < 4 or data[:2] != b"\x00\x01":
             raise ValueError("not little-endian CDR")
         try:
@@ -146,8 +148,8 @@ class Codec:
         return values
 
     def record_dtype(self, start: int) -> np.dtype[np.void]:
-        """The primitives of a flat message whose encapsulation header stands `start` bytes into a
-        record.
+        """The primitives of a flat message whose encapsulation header stands `start` bytes into
+        a record.
         """
         return np.dtype(
             {
@@ -178,7 +180,9 @@ class Codec:
 
 
 def parse_schema(text: str) -> tuple[Field, ...] | None:
-    """The fields of a ros2msg text, or None where it has arrays or nested messages other than Time."""
+    """The fields of a ros2msg text, or None where it has arrays or nested messages other than
+    Time.
+    """
     own = re.split(r"^=+\s*$", text, maxsplit=1, flags=re.MULTILINE)[0]
     fields = [_parse_line(line) for line in own.splitlines()]
     kept = tuple(field for field in fields if field is not None)
@@ -203,8 +207,8 @@ def _primitives(name: str, kind: str) -> list[tuple[str, str]]:
 
 
 def _layout(codes: Sequence[str]) -> tuple[str, list[int], int]:
-    """Struct format with explicit padding, the offset of each primitive after the header, and the
-    end.
+    """Struct format with explicit padding, the offset of each primitive after the header, and
+    the end.
     """
     text, offsets, end = "I", [], 0
     for code in codes:

@@ -117,7 +117,9 @@ def select(
 
 
 def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
-    """Which of the messages numbered `own` are little-endian CDR of the right length, shape (n,)."""
+    """Which of the messages numbered `own` are little-endian CDR of the right length, shape
+    (n,).
+    """
     codec = source.codec
     if codec is None:
         return True

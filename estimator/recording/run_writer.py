@@ -27,8 +27,8 @@ class RunWriter:
     """One recording, written synchronously in the order of the calls.
 
     `topics` come beside the raw topics and /log. The path must not exist yet. Messages gather in
-    memory until `flush`, or until a chunk is full. After an error the messages not yet written are
-    kept, and `flush` may be called again.
+    memory until `flush`, or until a chunk is full. After an error the messages not yet written
+    are kept, and `flush` may be called again.
 
     mode: the file's permissions; None leaves them to the umask.
 
@@ -91,7 +91,9 @@ class RunWriter:
         self._file.sync()
 
     def close(self) -> None:
-        """Write what is pending, the index and the summary. The file is closed even if that fails."""
+        """Write what is pending, the index and the summary. The file is closed even if that
+        fails.
+        """
         try:
             self.write_out()
         except RecordingError:
@@ -100,8 +102,8 @@ class RunWriter:
         self._file.close()
 
     def finish(self, sync: Callable[[int], None]) -> None:
-        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor and
-        may keep a copy.
+        """`close`, but the wait for the medium is left to `sync`, which is given the descriptor
+        and may keep a copy.
         """
         try:
             self.write_out()
@@ -119,8 +121,8 @@ class RunWriter:
         self._file.expect(size)
 
     def adopt(self, other: RunWriter) -> None:
-        """Take over what `other` could not write, and its numbering; both must have been made with
-        the same topics and the same compression.
+        """Take over what `other` could not write, and its numbering; both must have been made
+        with the same topics and the same compression.
         """
         self._pending, other._pending = other._pending, self._pending
         self._encoders = other._encoders

@@ -1,8 +1,9 @@
-"""Read a recording: closed or not, cut at any byte, with flipped bits, or written by somebody else.
+"""Read a recording: closed or not, cut at any byte, with flipped bits, or written by somebody
+else.
 
-Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named in
-`damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks only,
-in file order.
+Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named
+in `damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks
+only, in file order.
 """
 
 from __future__ import annotations
@@ -73,7 +74,9 @@ class Recording:
 
     @property
     def saved(self) -> bool:
-        """Nothing that was written is lost, though the file may be unclosed or its index damaged."""
+        """Nothing that was written is lost, though the file may be unclosed or its index
+        damaged.
+        """
         return not self.damage or (
             self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys()
         )
@@ -95,7 +98,9 @@ class Recording:
                 yield self._kept.get(number) or self._chunk(file, block)
 
     def messages(self) -> Iterator[Message]:
-        """(topic, log_time [ns], values) in file order; values in the order of the topic's fields."""
+        """(topic, log_time [ns], values) in file order; values in the order of the topic's
+        fields.
+        """
         for chunk in self.chunks():
             rows: dict[int, Message] = {}
             for channel, own in chunk.groups.items():
@@ -151,9 +156,9 @@ def _table(
 def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
     """Open a recording and check all of it.
 
-    `topics` are those whose fields the caller relies on; all others are taken as the file defines
-    them. Raises RecordingError if there is no such file, it is no MCAP file, or one of `topics`
-    lacks a field in it.
+    `topics` are those whose fields the caller relies on; all others are taken as the file
+    defines them. Raises RecordingError if there is no such file, it is no MCAP file, or one of
+    `topics` lacks a field in it.
     """
     path = Path(path)
     with reported(path, "read"), opened(path) as file:
@@ -255,8 +260,8 @@ class _Check:
             entry[1:] = [int(numbers[-1]), entry[2] + len(numbers)]
 
     def _summary(self, summary: bytes) -> dict[int, int]:
-        """Take the definitions of the summary; return its count of messages by channel, if it has
-        one.
+        """Take the definitions of the summary; return its count of messages by channel, if it
+        has one.
         """
         expected: dict[int, int] = {}
         try:
@@ -287,8 +292,8 @@ class _Check:
             self._recording.damage.insert(0, f"{lost} messages are missing")
 
     def _define(self, opcode: int, body: bytes) -> None:
-        """A schema or a channel. Raises Damaged where it contradicts an earlier one, RecordingError
-        where it lacks a field that the caller relies on.
+        """A schema or a channel. Raises Damaged where it contradicts an earlier one,
+        RecordingError where it lacks a field that the caller relies on.
         """
         if (opcode, body) in self._seen:
             return

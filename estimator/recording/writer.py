@@ -1,11 +1,11 @@
-"""The writer thread: takes messages off the loop's hands and gets them onto the disk every fifth of
-a second.
+"""The writer thread: takes messages off the loop's hands and gets them onto the disk every fifth
+of a second.
 
 What has been written out survives the death of the process; a second thread waits for the medium
 (fdatasync), so that a slow card delays nobody. A full or failing disk never reaches the loop:
 messages queue, then the oldest are dropped and counted, and writing resumes when it can. A file
-never has a gap: after a loss the next part begins (run.1.mcap, …), a recording of its own with the
-same metadata. A part also begins where a PartStart stands in the queue.
+never has a gap: after a loss the next part begins (run.1.mcap, …), a recording of its own with
+the same metadata. A part also begins where a PartStart stands in the queue.
 """
 
 from __future__ import annotations
@@ -139,16 +139,16 @@ class WriterThread:
 
     @property
     def unconfirmed(self) -> float:
-        """How long the medium has not confirmed what it was last asked to keep [s]; 0 where nothing
-        is asked.
+        """How long the medium has not confirmed what it was last asked to keep [s]; 0 where
+        nothing is asked.
         """
         return self._sync.waiting()
 
     def stop(self, timeout: float = 2.0) -> WriterStatus:
         """Write what is queued, close the file with its index, and return the final counters.
 
-        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or an
-        error says that the medium has not confirmed what it was given.
+        A disk that hangs is left alone after `timeout` [s]; the state is then not "closed", or
+        an error says that the medium has not confirmed what it was given.
         """
         self._stopping.set()
         if self._thread.ident is None:  # never started
@@ -177,7 +177,9 @@ class WriterThread:
         self._attempt(self._finish)
 
     def _attempt(self, action: Callable[[], None]) -> None:
-        """Whatever goes wrong is said, and what could not be written is kept for the next attempt."""
+        """Whatever goes wrong is said, and what could not be written is kept for the next
+        attempt.
+        """
         try:
             action()
         except RecordingError as error:
@@ -339,8 +341,8 @@ class _Parts:
         self._sync_name(path)
 
     def next(self, lost: int, config_yaml: str = "") -> None:
-        """Go on in a new file, with what the old one could not take, and with another configuration
-        if one is given.
+        """Go on in a new file, with what the old one could not take, and with another
+        configuration if one is given.
 
         Raises RecordingError, and nothing has changed.
         """
@@ -350,7 +352,8 @@ class _Parts:
         new = self._make(path, config_yaml=config_yaml or self._config, run=run)
         self._config = config_yaml or self._config
         old, self.writer = self.writer, new
-        self.files.append(path)  # at once: whoever tidies the folder must know which file is open
+        # at once: whoever tidies the folder must know which file is open
+        self.files.append(path)
         new.adopt(old)
         with suppress(RecordingError):  # without an index it is readable still
             old.finish(self._sync)

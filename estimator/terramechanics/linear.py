@@ -1,21 +1,22 @@
 """The linear model, Eqs. (11)-(22): triangular stresses, and forces in closed form.
 
-The printed paper has misprints in (6), (18) and (22); the forms here are right (docs/physics.md).
-With
+The printed paper has misprints in (6), (18) and (22); the forms here are right
+(docs/physics.md). With
 
-    σ(θ) = σₘ·hat(θ), the triangle of (11), (12);     τ(θ) = (c + σ tan φ) g(θ),   g = 1 − e^(−f(θ₁
-    − θ))
+    σ(θ) = σₘ·hat(θ), the triangle of (11), (12);     τ(θ) = (c + σ tan φ) g(θ),   g = 1 −
+    e^(−f(θ₁ − θ))
 
 the integrals (15)-(17) are linear in c, σₘ and σₘ tan φ:
 
-    T  = r²b [c·A₁ + σₘ tan φ·A₂]                    (22)    A₁ = ∫ g dθ           A₂ = ∫ hat g dθ W
-    = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]              (21)    B₁ = ∫ hat cos θ dθ   B₂, B₃ = ∫ {1, hat}
-    g sin θ dθ DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]              (20)    C₁, C₂ = ∫ {1, hat} g cos θ
-    dθ   C₃ = ∫ hat sin θ dθ
+    T  = r²b [c·A₁ + σₘ tan φ·A₂]                    (22)    A₁ = ∫ g dθ           A₂ = ∫ hat g
+    dθ W = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]              (21)    B₁ = ∫ hat cos θ dθ   B₂, B₃ = ∫
+    {1, hat} g sin θ dθ DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]              (20)    C₁, C₂ = ∫ {1,
+    hat} g cos θ dθ   C₃ = ∫ hat sin θ dθ
 
 `predict` eliminates σₘ through (21), so a wheel of known load needs neither n nor K. Where f < 0
-(braking) the shear stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤ 1.
-The functions take numbers; `predict_batch` takes arrays, and the others do too when given `ARRAYS`.
+(braking) the shear stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤
+1. The functions take numbers; `predict_batch` takes arrays, and the others do too when given
+`ARRAYS`.
 """
 
 from __future__ import annotations
@@ -68,7 +69,9 @@ class Shift(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """What the closed forms say of a wheel under load, and the gradients in the order of GRADIENT."""
+    """What the closed forms say of a wheel under load, and the gradients in the order of
+    GRADIENT.
+    """
 
     torque: Value  # T [N·m]
     drawbar_pull: Value  # DP [N]
@@ -102,8 +105,8 @@ def predict(
     """T, DP, resistance and σₘ under a load W, with gradients with respect to GRADIENT. Eqs.
     (20)-(22), (19), (5).
 
-    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are those
-    of the stresses it stands for.
+    c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are
+    those of the stresses it stands for.
     """
     ratio, ratio_slip = _peak_ratio(wheel, slip, maths)
     exponent = shear_exponent(wheel, k, theta_1, slip, maths)
@@ -222,8 +225,8 @@ def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scal
 def triangular_shear_stress(
     theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar
 ) -> Array:
-    """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom dead
-    centre.
+    """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom
+    dead centre.
 
     The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g
     with σ triangular.
@@ -236,7 +239,9 @@ def triangular_shear_stress(
 def tau_m(
     wheel: Wheel, c: Value, tan_phi: Value, k: Value, theta_1: Value, slip: Value, sigma_m: Value
 ) -> Value:
-    """Largest shear stress τₘ [Pa] with the linearised exponent, Eqs. (18) and (19); for numbers."""
+    """Largest shear stress τₘ [Pa] with the linearised exponent, Eqs. (18) and (19); for
+    numbers.
+    """
     ratio, _ = _peak_ratio(wheel, slip, NUMBERS)
     f = shear_exponent(wheel, k, theta_1, slip).f
     g = -NUMBERS.expm1(-abs(f) * theta_1 * (1.0 - ratio))
@@ -372,8 +377,8 @@ class _At(NamedTuple):
     def response(
         self, support: Value, torque: Value, pull: Value, resistance: Value
     ) -> tuple[Value, Value, Value]:
-        """Change of T, DP and resistance, in units of rb (T: r²b), from their own terms and through
-        s.
+        """Change of T, DP and resistance, in units of rb (T: r²b), from their own terms and
+        through s.
 
         support: what (21) leaves for s·(B₁ + tan φ B₃) to carry, changed.
         """
@@ -388,8 +393,8 @@ class _At(NamedTuple):
         )
 
     def along(self, c: Value, cohesive: Integrals, dx: Integrals) -> tuple[Value, Value, Value]:
-        """`response` to a change of the integrals: `cohesive` that of θ₁x, which c multiplies, and
-        dx that of x.
+        """`response` to a change of the integrals: `cohesive` that of θ₁x, which c multiplies,
+        and dx that of x.
         """
         s, friction = self.s, self.tan_phi * self.s
         return self.response(

@@ -1,19 +1,20 @@
 """The integrals that the closed forms (20)-(22) are made of, stable in every limit.
 
 Along the contact let v = (θ₁ − θ)/θ₁ run from 0 at entry to 1 at bottom dead centre. The normal
-stress of (11), (12) is σₘ·hat(v), a triangle with its peak at v = 1 − λ, λ = θₘ/θ₁. All integrals
-of the linear model are then of the form
+stress of (11), (12) is σₘ·hat(v), a triangle with its peak at v = 1 − λ, λ = θₘ/θ₁. All
+integrals of the linear model are then of the form
 
-    ∫₀¹ {1, v, hat, v·hat} · kernel(v) dv,   kernel = e^(−ηv) or 1 − e^(−ηv), each with or without
-    e^(−iθ₁v),
+    ∫₀¹ {1, v, hat, v·hat} · kernel(v) dv,   kernel = e^(−ηv) or 1 − e^(−ηv), each with or
+    without e^(−iθ₁v),
 
 with η = |f|θ₁. On each side of the peak they reduce to moments over s ∈ [0, 1],
 
     μₙ(y) = ∫₀¹ sⁿ e^(−ys) ds   and   δₙ = μₙ(y) − μₙ(y + η) = ∫₀¹ sⁿ e^(−ys)(1 − e^(−ηs)) ds.
 
-Integration by parts gives for both a recurrence in n. Forward it is the closed form; for small |y +
-η|, where the closed form loses its digits, it is run backward, which converges to the last digit in
-BACKWARD steps. In both directions δₙ carries η as a factor, so that nothing is lost as f → 0.
+Integration by parts gives for both a recurrence in n. Forward it is the closed form; for small
+|y + η|, where the closed form loses its digits, it is run backward, which converges to the last
+digit in BACKWARD steps. In both directions δₙ carries η as a factor, so that nothing is lost as
+f → 0.
 
 The same arithmetic serves numbers (`Numbers`, for the loop) and arrays (`Arrays`, for batches).
 """
@@ -71,7 +72,9 @@ class Maths(Protocol):
 
 
 def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bool) -> Kernels:
-    """Integrals over the contact of the three kernels; `turning` gives them the factor e^(−iθ₁v)."""
+    """Integrals over the contact of the three kernels; `turning` gives them the factor
+    e^(−iθ₁v).
+    """
     alpha = 1.0 - lam
     lost = -maths.expm1(-eta * alpha)  # 1 − e^(−ηv) at the peak
     if turning:
@@ -104,8 +107,8 @@ def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bo
 
 
 def fold(lam: Value, m0: Value, m1: Value, m2: Value, r0: Value, r1: Value, r2: Value) -> Folded:
-    """Join the moments of the front side (v = (1 − λ)s, hat = s) and of the rear side (v = 1 − λ +
-    λs, hat = 1 − s).
+    """Join the moments of the front side (v = (1 − λ)s, hat = s) and of the rear side (v = 1 − λ
+    + λs, hat = 1 − s).
     """
     alpha = 1.0 - lam
     fall = r0 - r1
@@ -119,7 +122,9 @@ def fold(lam: Value, m0: Value, m1: Value, m2: Value, r0: Value, r1: Value, r2: 
 
 
 def forward(mu: Triple, y: Value, eta: Value, step: Value) -> Triple:
-    """δ₀, δ₁, δ₂ by the recurrence (y + η)δₙ = n δₙ₋₁ + η μₙ − e^(−y)(1 − e^(−η)): the closed form."""
+    """δ₀, δ₁, δ₂ by the recurrence (y + η)δₙ = n δₙ₋₁ + η μₙ − e^(−y)(1 − e^(−η)): the closed
+    form.
+    """
     total = y + eta
     d0 = (eta * mu[0] - step) / total
     d1 = (d0 + eta * mu[1] - step) / total

@@ -20,7 +20,9 @@ Scalar = float | Array
 
 @dataclass(frozen=True)
 class Wheel:
-    """A rigid wheel. The angle of maximum stress is θₘ = (c₁ + c₂ i) θ₁, Eq. (5); θ₁/2 by default."""
+    """A rigid wheel. The angle of maximum stress is θₘ = (c₁ + c₂ i) θ₁, Eq. (5); θ₁/2 by
+    default.
+    """
 
     radius: float  # r [m]
     width: float  # b [m]
@@ -46,8 +48,8 @@ class PressureSinkage:
 
 @dataclass(frozen=True)
 class Soil:
-    """Soil under one wheel. Fields are floats, or arrays of one shape (n,) where the soil varies by
-    sample.
+    """Soil under one wheel. Fields are floats, or arrays of one shape (n,) where the soil varies
+    by sample.
     """
 
     cohesion: Scalar  # c [Pa]

@@ -1,4 +1,6 @@
-"""What a reader should doubt: strained constants, parameters at a bound, fits that did not converge."""
+"""What a reader should doubt: strained constants, parameters at a bound, fits that did not
+converge.
+"""
 
 from __future__ import annotations
 

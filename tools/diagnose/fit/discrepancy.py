@@ -49,9 +49,9 @@ def _columns(stack: Stack, source: FormSource) -> Array:
     conditions = np.column_stack(
         [_joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
     )
-    tuned = TUNING.fit
-    most = tuned.form_features if all(stack.rig.new) else tuned.form_features_shared
-    features = features_of(conditions[acting], most, tuned.form_left_out)
+    shared = not all(stack.rig.new)
+    most = TUNING.fit.form_features_shared if shared else TUNING.fit.form_features
+    features = features_of(conditions[acting], most, TUNING.fit.form_left_out)
     smooth = np.zeros((stack.size, len(features.points)))
     smooth[acting] = features.at(conditions[acting])
 

@@ -1,7 +1,7 @@
 """The evidence of a fit, averaged over the sizes of its freedoms.
 
-Around its optimum a fit is linear in all its unknowns, so for any sizes of the freedoms the evidence
-is a matter of the products of the columns, which are formed once:
+Around its optimum a fit is linear in all its unknowns, so for any sizes of the freedoms the
+evidence is a matter of the products of the columns, which are formed once:
 
     ln Z(s) = −½ (rᵀr + |strain|² − bᵀA⁻¹b + ln det A − ln det P),   A = CᵀC + P
 

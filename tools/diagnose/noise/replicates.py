@@ -1,13 +1,13 @@
-"""Conditions that were held, and held again: what varies inside a condition is noise, whatever the
-model.
+"""Conditions that were held, and held again: what varies inside a condition is noise, whatever
+the model.
 
 A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated
-model, so that a misfit of any shape over the conditions does not count as noise. Runs that held the
-same condition on equal terms (same pass,
-same start) are replicates: what their means, their drifts and the phases of their waves differ by,
-beyond the noise inside a run, is pure error between runs. A bed that is not level, say, lets the
-sinkage of each trial drift its own way, and an encoder without a zero mark begins each run at
-another tooth of the gear. A drift that replicates share (a
+model, so that a misfit of any shape over the conditions does not count as noise. Runs that held
+the same condition on equal terms (same pass,
+same start) are replicates: what their means, their drifts and the phases of their waves differ
+by, beyond the noise inside a run, is pure error between runs. A bed that is not level, say, lets
+the sinkage of each trial drift its own way, and an encoder without a zero mark begins each run
+at another tooth of the gear. A drift that replicates share (a
 soil that dries, a motor that warms) is none: it stays in full, to be explained.
 """
 
@@ -61,8 +61,8 @@ def _conditions(stack: Stack) -> Array:
 
 
 def _binned(values: Array) -> Index:
-    """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on an
-    edge.
+    """Whole numbers, in the phase that makes the fullest bins: what was held shall not fall on
+    an edge.
     """
     tried = [np.floor(values + phase).astype(int) for phase in TUNING.noise.cell_phases]
     return max(
@@ -84,11 +84,11 @@ class HeldCondition(NamedTuple):
 def own_columns(
     stack: Stack, residual: Array, colours: tuple[Colour, ...], standing: Array
 ) -> Array:
-    """What each run may do for itself (N, m), one standard deviation each, as large as replicates
-    show it.
+    """What each run may do for itself (N, m), one standard deviation each, as large as
+    replicates show it.
 
-    An offset; and, of a run that held one condition, drifts and the phase of waves that stand out
-    of the noise.
+    An offset; and, of a run that held one condition, drifts and the phase of waves that stand
+    out of the noise.
     residual, standing: (N,) and (N, k), what was not predicted, and the waves in it (lines.py).
     """
     label, terms, columns = cells(stack), _terms(stack), []
@@ -123,8 +123,8 @@ def between_runs(held: list[HeldCondition], terms: Array, count: int) -> Array:
 
 
 def _waves(stack: Stack, number: int, standing: Array) -> Array:
-    """Waves of a channel that have a phase of their own in every run, one column for all runs (N,
-    k).
+    """Waves of a channel that have a phase of their own in every run, one column for all runs
+    (N, k).
     """
     runs = range(len(stack.rig.runs))
     own = [(stack.channel == number) & (stack.run == run) for run in runs]
@@ -210,8 +210,8 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
     """Standard deviations (count,), from differences and what variance noise alone gives them,
     (count,) each.
 
-    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in few
-    cases only.
+    Of means what exceeds the noise; of drifts and waves too, where noise alone makes so much in
+    few cases only.
     """
     out = np.zeros(count)
     for order, (difference, chance) in enumerate(
@@ -237,7 +237,9 @@ def _few(count: int) -> float:
 
 
 def _terms(stack: Stack) -> Array:
-    """Pass, start and campaign of each run (runs, 3): on other terms a repetition is no replicate."""
+    """Pass, start and campaign of each run (runs, 3): on other terms a repetition is no
+    replicate.
+    """
     rows: list[tuple[float, float, float]] = []
     for run in stack.rig.runs:
         passes = run.covariates.get("pass", np.zeros(1))

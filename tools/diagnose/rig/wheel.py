@@ -157,7 +157,7 @@ class WheelRig:
 
     def _of(self, new: bool) -> Index:
         """The set of weights of each value of one campaign (n,)."""
-        labels = [l for l, n in zip(self._sets.label, self.new, strict=True) if n == new]
+        labels = [label for label, n in zip(self._sets.label, self.new, strict=True) if n == new]
         return np.concatenate(labels)
 
     def _soil(self, value: Mapping[str, float], new: bool) -> Soil:

@@ -1,12 +1,12 @@
 """`python -m gritd.tools.proof.ours.calibrate --out OUT PATH…`: learn how far evidence is to be
 trusted.
 
-Each PATH is a file of trials (`python -m gritd.tools.proof.ours.trials --out FILE`) or the folder of
-an opened batch of blind trials (`gritd prove --output FOLDER`). The temperature and the odds are
+Each PATH is a file of trials (`python -m gritd.tools.proof.ours.trials --out FILE`) or the folder
+of an opened batch of blind trials (`gritd prove --output FOLDER`). The temperature and the odds are
 those that give the truth of every case the largest probability, on average: the logarithmic score,
 which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps
-what few cases do not tell. The truth of a case is any set of effects that holds a true one, weighted
-by how many of its effects are true; of a stranger, an explanation without names.
+what few cases do not tell. The truth of a case is any set of effects that holds a true one,
+weighted by how many of its effects are true; of a stranger, an explanation without names.
 """
 
 from __future__ import annotations

@@ -177,7 +177,8 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
     return {
         "scale": Key(
             _uncertain(scale),
-            "physical = raw · scale + offset; its sigma is that of the slope about the physical zero",
+            "physical = raw · scale + offset; its sigma is that of the slope about the "
+            "physical zero",
             default_scale,
         ),
         "offset": Key(

@@ -101,7 +101,8 @@ def parse(text: str, expected: str) -> float:
     found = unit(suffix)
     if found.dimension != unit(expected).dimension:
         raise UnitError(
-            f"{suffix or 'no unit'} is not a unit of the same kind as {expected or 'a plain number'}"
+            f"{suffix or 'no unit'} is not a unit of the same kind as "
+            f"{expected or 'a plain number'}"
         )
     return _scaled(number, found.factor)
 

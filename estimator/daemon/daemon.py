@@ -197,7 +197,8 @@ class Daemon:
         if abs(offset - self._wall_offset) > WALL_STEP:
             self.say(
                 WARNING,
-                f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the old one",
+                f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the "
+                "old one",
             )
             self._wall_offset = offset
 

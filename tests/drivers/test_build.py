@@ -1,4 +1,6 @@
-"""From configuration to readers: any sensor on either bus, and one clear line where it cannot work."""
+"""From configuration to readers: any sensor on either bus, and one clear line where it cannot
+work.
+"""
 
 from __future__ import annotations
 

@@ -116,7 +116,8 @@ def test_a_fault_costs_the_frames_it_touches_and_at_most_one_more(encode, framin
         accounted = (
             sum(len(encode(frame)) for frame in got) + decoder.counts.garbage + decoder.pending
         )
-        assert len(hurt) <= accounted <= len(hurt) + 2  # a line is good without its line end, too
+        # a line is good without its line end, too
+        assert len(hurt) <= accounted <= len(hurt) + 2
 
 
 @pytest.mark.slow

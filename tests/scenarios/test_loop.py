@@ -28,12 +28,15 @@ STARVED = "CPU starvation"
 DIES = "a thread dies"
 
 
-# --- wall clock -----------------------------------------------------------------------------------
+# --- wall clock
+# -----------------------------------------------------------------------------------
 # -------------------
 
 
 class SimulatedTime:
-    """Stands for the module `time`: monotonic time moves when somebody sleeps, the wall can be set."""
+    """Stands for the module `time`: monotonic time moves when somebody sleeps, the wall can be
+    set.
+    """
 
     def __init__(self, steps):
         self.monotonic, self.wall = 10**12, 1_700_000_000 * 10**9
@@ -148,7 +151,8 @@ def test_a_step_in_the_running_daemon_is_annotated(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- queue ----------------------------------------------------------------------------------------
+# --- queue
+# ----------------------------------------------------------------------------------------
 # -------------------
 
 
@@ -165,7 +169,9 @@ class Stalled:
 
 
 def test_queue_overflow(seed, figure):
-    """Three producers, a consumer that stalls, a small queue: the account is exact at every moment."""
+    """Three producers, a consumer that stalls, a small queue: the account is exact at every
+    moment.
+    """
     rng = random.Random(seed)
     queue, stop = ReadingQueue(capacity=64), Event()
     consumer = Stalled(queue, rng)
@@ -240,7 +246,8 @@ def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- starvation -----------------------------------------------------------------------------------
+# --- starvation
+# -----------------------------------------------------------------------------------
 # -------------------
 
 
@@ -299,7 +306,8 @@ def test_stopped_for_a_while(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- threads --------------------------------------------------------------------------------------
+# --- threads
+# --------------------------------------------------------------------------------------
 # -------------------
 
 DYING = """

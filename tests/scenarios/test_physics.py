@@ -72,13 +72,16 @@ def test_negative_slip(seed, figure):
     for slip in (-0.1, -0.2, -0.3, -rng.uniform(0.1, 0.35)):
         _, ticks = run(RIG, TRUTH, [DRIVING, (3.0, 70.0, slip)], seed)
         assert sum(t["status"] == Status.BRAKING for t in ticks) > 20
-        accepted += sum(t["torque_accepted"] for t in ticks[32:])  # from the first whole window on
+        # from the first whole window on
+        accepted += sum(t["torque_accepted"] for t in ticks[32:])
     figure(NEGATIVE, PLANT, "updates accepted while braking", accepted, "", 0)
 
 
 @pytest.mark.parametrize("slip", [-0.5, -0.8, -1.0])
 def test_dragged(seed, slip, figure):
-    """Beyond the closed forms, to a locked wheel: the encoder's steps of a braked run made smaller."""
+    """Beyond the closed forms, to a locked wheel: the encoder's steps of a braked run made
+    smaller.
+    """
     pipeline = Pipeline(RIG, "plain")
     state, ticks, slower = pipeline.start(), [], {}
     for number, (t, batch) in enumerate(

@@ -1,4 +1,6 @@
-"""Readings that are wrong: what reaches the filter, through the drivers' decoders and the pipeline."""
+"""Readings that are wrong: what reaches the filter, through the drivers' decoders and the
+pipeline.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,8 @@ def shifted(readings):
 
 
 def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
-    """Every tick over readings in order of arrival, as a structured array, or as the bytes that are
-    logged.
+    """Every tick over readings in order of arrival, as a structured array, or as the bytes that
+    are logged.
     """
     pipeline = Pipeline(settings, "plain")
     state, records, due = pipeline.start(), [], 0
@@ -61,14 +63,15 @@ def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
 
 
 # --- encoder rollover
-# ------------------------------------------------------------------------------------------------
+# -----------------------------------------------------------------------------------------------
+# -
 
 
 @pytest.mark.parametrize("bits", [16, 32])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_encoder_rollover(seed, bits, direction, figure):
-    """The same motion far from the edge and across it, as bytes through the real framing: the same
-    speed to the bit.
+    """The same motion far from the edge and across it, as bytes through the real framing: the
+    same speed to the bit.
     """
     rng = random.Random(seed)
     steps = [rng.randrange(30) for _ in range(250)]
@@ -179,8 +182,8 @@ AXES = 6
 
 def test_not_a_number_infinity_and_out_of_range(seed, figure):
     """Every analogue field in turn with every impossible value and just beyond its limits, among
-    good readings: as bytes on the wire, where the driver must stop what is no number, and past the
-    drivers, where the pipeline must.
+    good readings: as bytes on the wire, where the driver must stop what is no number, and past
+    the drivers, where the pipeline must.
     """
     rng = random.Random(seed)
     cases = [*impossible()] * 3
@@ -253,7 +256,8 @@ def impossible():
     yield "wrench", (0.1, math.nan, 0.1, 0.1, 0.1, 0.1)
 
 
-# --- order ----------------------------------------------------------------------------------------
+# --- order
+# ----------------------------------------------------------------------------------------
 # -------------------
 
 

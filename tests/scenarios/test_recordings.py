@@ -33,7 +33,9 @@ def test_sparse_ten_gigabytes(tmp_path, figure):
 
 
 def check(path, figure):
-    """Time on a busy machine says nothing: it is stated, and held to its limit by a factor of ten."""
+    """Time on a busy machine says nothing: it is stated, and held to its limit by a factor of
+    ten.
+    """
     seconds, memory, said = probe(path)
     assert "\n" not in said.strip()
     figure(HUGE, OWN, "memory", memory, "MB", 256)
@@ -53,8 +55,8 @@ def original(tmp_path_factory):
 
 
 def test_flipped_bits(original, tmp_path, seed, figure):
-    """40 copies with up to ten flipped bits: nothing is returned that was not written, and the exit
-    code says so.
+    """40 copies with up to ten flipped bits: nothing is returned that was not written, and the
+    exit code says so.
     """
     rng = random.Random(seed)
     data, written = original.read_bytes(), set(map(repr, read(original).messages()))

@@ -114,7 +114,8 @@ def _many(arguments: argparse.Namespace) -> int:
         print(f"{campaign.folder.name}: {said}", flush=True)
         failed |= not campaign.done
     print(
-        f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: {campaigns.RESULT} in each"
+        f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: "
+        f"{campaigns.RESULT} in each"
     )
     return FAILED if failed else DONE
 
@@ -203,7 +204,10 @@ def of_files(
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd diagnose",
-        description="Find where model and recordings differ, name the physics left out, model it, show the fit.",
+        description=(
+            "Find where model and recordings differ, name the physics left out, model it, "
+            "show the fit."
+        ),
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
     parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
@@ -294,7 +298,8 @@ def text(found: Diagnosis) -> str:
             lines.append(f"  {strained}")
     for channel, unit in found.fit.unit.items():
         lines.append(
-            f"  held-out {channel}: {found.fit.before[channel]:.3g} before, {found.fit.after[channel]:.3g} after, "
+            f"  held-out {channel}: {found.fit.before[channel]:.3g} before, "
+            f"{found.fit.after[channel]:.3g} after, "
             f"noise {found.fit.noise_floor[channel]:.2g} {unit}"
         )
     if found.fit.innovation_before and found.fit.innovation_after:

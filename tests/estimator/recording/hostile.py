@@ -74,8 +74,8 @@ print(f"{time.process_time():.2f} s, {peak / 1024:.0f} MB: {said}")
 
 
 def probe(path: Path) -> tuple[float, float, str]:
-    """Seconds of processor time, peak MB and what was said, in a process of its own whose address
-    space is bounded.
+    """Seconds of processor time, peak MB and what was said, in a process of its own whose
+    address space is bounded.
     """
     environment = {
         **os.environ,

@@ -140,12 +140,13 @@ def test_a_writer_that_is_stopped_before_it_is_started_writes_what_it_has(tmp_pa
 
 
 # --- a disk that fails
-# ------------------------------------------------------------------------------------------------
+# -----------------------------------------------------------------------------------------------
+# -
 
 
 class FailingDisk:
-    """Simulates a disk by patching the file's write: `number` is the errno it raises, or None while
-    it works. A failing write first stores half of the bytes, as a full disk does.
+    """Simulates a disk by patching the file's write: `number` is the errno it raises, or None
+    while it works. A failing write first stores half of the bytes, as a full disk does.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,8 +252,8 @@ def test_a_failed_sync_is_said(writer: WriterThread, monkeypatch: pytest.MonkeyP
 def test_what_is_asked_for_while_the_medium_is_busy_is_synced_before_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last batch and the index come while an earlier sync is under way: the end waits for them
-    too.
+    """The last batch and the index come while an earlier sync is under way: the end waits for
+    them too.
     """
     synced: list[int] = []
     begun, go = threading.Event(), threading.Event()
@@ -361,7 +362,8 @@ def test_a_folder_that_cannot_be_written_is_said_at_the_start(tmp_path: Path) ->
         WriterThread(tmp_path / "run.mcap", [], "", RunInfo())
 
 
-# --- kill -9 --------------------------------------------------------------------------------------
+# --- kill -9
+# --------------------------------------------------------------------------------------
 # --------------------
 
 LOGGING = """
@@ -402,7 +404,8 @@ def test_kill_9_leaves_everything_up_to_the_last_flush(tmp_path: Path, seed: int
     recording = read(path)
     rows = recording.arrays("/raw/wheel_encoder")
     print(
-        f"killed: {(killed - rows['stamp'][-1]) / 1e9:.3f} s of data lost, {len(rows)} messages kept"
+        f"killed: {(killed - rows['stamp'][-1]) / 1e9:.3f} s of data lost, {len(rows)} "
+        "messages kept"
     )
     assert rows["count"].tolist() == list(range(len(rows))) and len(rows) > 0
     assert (

@@ -123,7 +123,8 @@ def test_finite_and_continuous_down_to_no_contact(theta_1: float, slip: float) -
     near = predict(WHEEL, 1000.0, 0.577, 0.025, theta_1 * (1 + 1e-9) + 1e-12, slip, 70.0)
     for value, neighbour in zip(prediction[:3], near[:3], strict=True):
         assert math.isfinite(value)
-        # a locked wheel shears the soil fully however short the contact, so there the step is real
+        # a locked wheel shears the soil fully however short the contact, so there the step is
+        # real
         assert slip == -1.0 or value == pytest.approx(neighbour, rel=1e-6, abs=1e-6)
     assert all(math.isfinite(entry) for gradient in prediction[4:] for entry in gradient)
     assert prediction.sigma_m > 0

@@ -52,7 +52,8 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
     edges = np.quantile(along, np.linspace(0.0, 1.0, TUNING.explain.remainder_parts + 1))
     low, high = along <= edges[1], along >= edges[-2]
     ends = [
-        f"{float(np.mean(left[own][part])):+.2g} {unit} at {value_of(stack, name, float(along[part].mean()))}"
+        f"{float(np.mean(left[own][part])):+.2g} {unit} at "
+        f"{value_of(stack, name, float(along[part].mean()))}"
         for part in (low, high)
     ]
     return ", ".join(ends)

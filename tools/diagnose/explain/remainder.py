@@ -43,7 +43,8 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
     unit = stack.rig.units[channel]
     mean = float(np.mean(left[own])) if own.any() else 0.0
 
-    shares = {name: _share(stack.covariate(name)[own], left[own]) for name in ALONG}
+    known = [name for name in ALONG if name in stack.rig.runs[0].covariates]
+    shares = {name: _share(stack.covariate(name)[own], left[own]) for name in known}
     name = max(shares, key=lambda n: shares[n])
     if shares[name] < TUNING.explain.remainder_share:
         return f"{mean:+.2g} {unit} on average, along no condition"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import pty
+import select
 import struct
 import termios
 import time
@@ -40,8 +41,16 @@ def terminal() -> Iterator[Callable[[], str]]:
     far, near = pty.openpty()
     fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 40, 0, 0))
     with os.fdopen(near, "w", encoding="utf-8") as stream, redirect_stderr(stream):
-        yield lambda: os.read(far, 4096).decode()
+        yield lambda: _all_of(far)
     os.close(far)
+
+
+def _all_of(far: int) -> str:
+    """All that came: a pseudo-terminal hands it over in pieces."""
+    pieces = b""
+    while select.select([far], [], [], 0.5)[0]:
+        pieces += os.read(far, 4096)
+    return pieces.decode()
 
 
 def counted(clock: Clock, seconds: float) -> None:

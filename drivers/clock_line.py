@@ -29,8 +29,8 @@ BLOCKS = 100  # a window of 20 s
 RECENT = 4  # blocks that outweigh those before where they lie higher: 0.8 s
 CLOSE = 0.5e6  # [ns] between the lowest point and the second: else the lowest is alone
 SURE = 2  # of these are kept then
-KNOWN = 15  # blocks before them that show how much the way itself varies: 3 s, else
-HELD = 20e6  # [ns] longer than a USB adapter holds a frame back
+KNOWN = 15  # blocks before them that show how much the way itself varies: 3 s
+HELD = 20e6  # [ns] a USB adapter holds a frame back for less
 SLOPE_AFTER = 25  # blocks: a window of less than 5 s does not tell drift from delay; until then
 LATEST = 10  # blocks are looked at, in which the drift is small: 2 s
 MAX_DRIFT = 300e-6  # two crystals of ±100 ppm, and a poor resonator
@@ -118,8 +118,7 @@ class Line:
         blocks = list(self._blocks)
         before, recent = blocks[:-RECENT], blocks[-RECENT:]
         levels = [self._height(self._lower(block)) for block in before]
-        least = MOVED if len(levels) >= KNOWN else HELD
-        if levels and self._second(recent) - max(levels) > least:
+        if len(levels) >= KNOWN and self._second(recent) - max(levels) > MOVED:
             self._blocks = deque(
                 recent[-SURE:], BLOCKS
             )  # the first of them may lie across the step

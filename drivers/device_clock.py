@@ -36,6 +36,7 @@ class DeviceClock:
         self.restarts = 0  # times it began at zero: the device was switched on
         self._modulus = modulus_us * 1000
         self._line = Line()
+        self._seen: list[int] = []  # the two latest device times, late or not
         self._start(0, 0)
         self.restart()
 
@@ -58,6 +59,7 @@ class DeviceClock:
         self.rejected += len(times) - len(kept)
         if kept:
             self._follow(max(kept), received)
+            self._seen = sorted([*self._seen, *kept])[-2:]
         end = self._squeezed(kept, received)
         return [
             self._stamp(time, received, end) if is_right else None
@@ -84,34 +86,42 @@ class DeviceClock:
         self._first = time
         self._newest = self._second = time  # the two latest that came without much delay
         self._newest_received = received
+        self._seen = [time, time]
         self._line = Line(self._line.slope)
         self._doubt = Doubt()
 
     def _judged(self, times: list[int], received: int) -> list[bool]:
         """Whether the time of each frame of a chunk can be right."""
         if not self._line.settled:
-            if max(times) < self._newest - LATE:
-                self._begin_again(max(times), received)
+            if self._went_back(times, LATE):
+                self._begin_again(times[-1], received)
             return [True] * len(times)
-        delays = [
-            self._offset(time, received) - self._line.at(time - self._first) for time in times
-        ]
+        delays = [self._delay(time, received) for time in times]
         possible = self._possible(times, delays)
         if -STRAY <= min(delays) <= LATE:
             self._doubt = self._doubt.calmed(received)
             return possible
+        return self._doubted(times, received, delays, possible)
+
+    def _doubted(
+        self, times: list[int], received: int, delays: list[float], possible: list[bool]
+    ) -> list[bool]:
+        """The same of a chunk that is not on the line: others may agree with it on another one."""
         impossible = [delay for delay, ok in zip(delays, possible, strict=True) if not ok]
-        self._doubt.add(Rival(max(times), received, min(delays)), impossible)
+        rival = Rival(max(times), received, min(delays))
+        self._doubt.add(rival, impossible, self._went_back(times))
         if agreed := self._doubt.agreed():
             self._step(agreed, received)
             return self._judged(times, received)
-        if self._doubt.is_hopeless():
-            self._begin_again(times[-1], received)
-            return [True] * len(times)
-        return [
+
+        right = [
             ok and not (delay > LATE and self._doubt.suspects(delay))
             for ok, delay in zip(possible, delays, strict=True)
         ]
+        if self._doubt.is_hopeless(any(right)):
+            self._begin_again(times[-1], received)
+            return [True] * len(times)
+        return right
 
     def _possible(self, times: list[int], delays: list[float]) -> list[bool]:
         """False for a frame from before the line, and for a late one whose time goes back."""
@@ -121,6 +131,15 @@ class DeviceClock:
             if -STRAY <= delay <= LATE:
                 newest, second = max(newest, time), max(second, min(newest, time))
         return possible
+
+    def _went_back(self, times: list[int], by: float = 0.0) -> bool:
+        """Whether a frame is older than two of those before it, be they late or not, by so much."""
+        seen = self._seen
+        for time in times:
+            if time < seen[0] - by:
+                return True
+            seen = sorted([*seen, time])[-2:]
+        return False
 
     def _step(self, agreed: list[Rival], now: int) -> None:
         """The device's clock has jumped: go on from the frames that say so, but for a wrong one.
@@ -152,16 +171,20 @@ class DeviceClock:
     # -----------------------------------------------------------------------------------
 
     def _follow(self, time: int, received: int) -> None:
-        """Let the line see the frame of a chunk that waited least."""
-        at, offset = float(time - self._first), self._offset(time, received)
-        self._line.add((at, offset))
-        if offset - self._line.at(at) <= LATE:
-            self._second = max(self._second, min(self._newest, time))
-            if time > self._newest:
-                self._newest, self._newest_received = time, received
+        """Let the line see the frame of a chunk that waited least, unless it was held up."""
+        if self._line.settled and self._delay(time, received) > LATE:
+            return
+        self._line.add((float(time - self._first), self._offset(time, received)))
+        self._second = max(self._second, min(self._newest, time))
+        if time > self._newest:
+            self._newest, self._newest_received = time, received
 
     def _offset(self, time: int, received: int) -> float:
         return float(received - time - self._origin)
+
+    def _delay(self, time: int, received: int) -> float:
+        """How long a frame was on its way, over the line [ns]."""
+        return self._offset(time, received) - self._line.at(float(time - self._first))
 
     def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
         """Device time and stamp of the chunk's newest sample where the line does not fit between

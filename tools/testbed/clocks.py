@@ -25,7 +25,7 @@ NS = 1_000_000_000
 EPOCH = 1_700_000_000 * NS
 KEYS = {"serial": "pot", "can": "SinkagePot.Volts"}
 RACE = 65.536e-3  # [s] one turn of a 16-bit timer of microseconds
-SHORTEST_BACK = 25e-3  # [s]
+SHORTEST_BACK = 25e-3  # [s] and more than two sample periods: else the clock does not go back
 NARROWEST = 1 << 24  # [µs] at which the clock of a CAN node wraps
 PAUSE = 40e-3  # [s] without a frame: the host stood still
 BELIEVED = 5  # frames that have to show a delay before it can be known
@@ -76,7 +76,7 @@ def history(settings: Settings, rng: random.Random) -> History:
     device = rng.choices(list(settings.devices.values()), (0.85, 0.15))[0]
     seconds, rate = rng.uniform(3.0, 6.0), rng.choice((50.0, 100.0, 250.0, 500.0))
     taken = [(k + rng.uniform(0.0, 0.1)) / rate for k in range(int(seconds * rate))]
-    steps = _steps(rng, seconds)
+    steps = _steps(rng, seconds, max(SHORTEST_BACK, 2.2 / rate))
     wrong = _wrong(rng, taken)
     shown = list(_clock(rng, taken, steps, wrong))
     least = rng.uniform(0.1e-3, 3e-3)
@@ -164,19 +164,19 @@ def _first_after(history: History) -> Iterator[float]:
 # --- the device's clock ---------------------------------------------------------------------------
 
 
-def _steps(rng: random.Random, seconds: float) -> list[tuple[float, float]]:
+def _steps(rng: random.Random, seconds: float, back: float) -> list[tuple[float, float]]:
     """None, one or two; the device restarts where the size is infinite. A step back of less than
-    SHORTEST_BACK cannot be told from a longer way.
+    `back` [s] cannot be told from a longer way.
     """
     times = [rng.uniform(0.3, 1.2)] if rng.random() < 0.8 else []
     times += [times[0] + rng.uniform(1.3, 1.8)] if times and rng.random() < 0.4 else []
-    return [(at, _step(rng)) for at in times if at < seconds]
+    return [(at, _step(rng, back)) for at in times if at < seconds]
 
 
-def _step(rng: random.Random) -> float:
+def _step(rng: random.Random, back: float) -> float:
     kind = rng.random()
     if kind < 0.45:
-        return -SHORTEST_BACK * float((10.0 / SHORTEST_BACK) ** rng.random())
+        return -back * float((10.0 / back) ** rng.random())
     return inf if kind > 0.9 else float(10 ** rng.uniform(-3.0, 1.0))
 
 

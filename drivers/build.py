@@ -80,10 +80,8 @@ def build_link(device: Device, framing: Framing, clock: Clock) -> Link:
     """The hardware end of a device."""
     if isinstance(framing, CanFraming):
         if device.interface not in can.VALID_INTERFACES:
-            reason = (
-                f"no CAN interface {device.interface!r}, expected one of "
-                f"{', '.join(sorted(can.VALID_INTERFACES))}"
-            )
+            known = ", ".join(sorted(can.VALID_INTERFACES))
+            reason = f"no CAN interface {device.interface!r}, expected one of {known}"
             raise DeviceSettingsError(f"device {device.name}", reason)
         return CanLink(device, framing.filters(), clock)
     return SerialLink(device.name, device.port, device.baud, clock)
@@ -118,10 +116,8 @@ def _check_keys(sensors: list[Sensor]) -> None:
     """On a serial port a value comes in one frame: frames are numbered one by one, not by cycle."""
     for sensor in sensors:
         if len(sensor.keys) > 1:
-            reason = (
-                f"signal is {'+'.join(sensor.keys)!r}, expected one key: a serial frame "
-                "carries all values"
-            )
+            keys = "+".join(sensor.keys)
+            reason = f"signal is {keys!r}, expected one key: a serial frame carries all values"
             raise DeviceSettingsError(sensor.channel, reason)
 
 

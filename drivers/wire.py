@@ -68,13 +68,13 @@ class CanWire:
         """Values of the message counter and of the device time, where the message has them."""
         number = self._sequence[message.name]
         self._sequence[message.name] += 1
-        found: dict[str, FieldValue] = {}
+        counters: dict[str, FieldValue] = {}
         for signal in message.signals:
             if signal.name.lower() in COUNTERS:
-                found[signal.name] = number % (1 << signal.length)
+                counters[signal.name] = number % (1 << signal.length)
             elif signal.name.lower() == DEVICE_TIME:
-                found[signal.name] = _wrapped_time(signal, device_us)
-        return found
+                counters[signal.name] = _wrapped_time(signal, device_us)
+        return counters
 
 
 def _wrapped_time(signal: Signal, device_us: int) -> FieldValue:

@@ -168,8 +168,8 @@ class Interval:
             raise node.place.error(describe(node), self.expected)
         low, high = (self.quantity.read(item)[0] for item in node.items)
         if low >= high:
-            found = ", ".join(shown(item.text) for item in node.items if isinstance(item, Scalar))
-            raise node.place.error(f"[{found}]", "the low end below the high end")
+            ends = ", ".join(shown(item.text) for item in node.items if isinstance(item, Scalar))
+            raise node.place.error(f"[{ends}]", "the low end below the high end")
         return (low, high), node
 
 

@@ -177,8 +177,7 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
     return {
         "scale": Key(
             _uncertain(scale),
-            "physical = raw · scale + offset; its sigma is that of the slope about the "
-            "physical zero",
+            "physical = raw · scale + offset; its sigma is that of the slope about physical zero",
             default_scale,
         ),
         "offset": Key(
@@ -410,8 +409,8 @@ class Effects:
         """The library's own value: off for a strength, usual for a shape."""
         if name not in EFFECTS:
             return NEEDED
-        found = next(p for p in EFFECTS[name].parameters() if p.name == parameter)
-        return f"{found.centre!r} {found.unit}".strip()
+        own = next(p for p in EFFECTS[name].parameters() if p.name == parameter)
+        return f"{own.centre!r} {own.unit}".strip()
 
 
 # ---- the whole file

@@ -98,13 +98,13 @@ def parse(text: str, expected: str) -> float:
     UnitError.
     """
     number, suffix = split(text)
-    found = unit(suffix)
-    if found.dimension != unit(expected).dimension:
+    given = unit(suffix)
+    if given.dimension != unit(expected).dimension:
         raise UnitError(
-            f"{suffix or 'no unit'} is not a unit of the same kind as "
-            f"{expected or 'a plain number'}"
+            f"{suffix or 'no unit'} is not a unit of the same kind as"
+            f" {expected or 'a plain number'}"
         )
-    return _scaled(number, found.factor)
+    return _scaled(number, given.factor)
 
 
 def parse_any(text: str) -> float:

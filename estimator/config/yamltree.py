@@ -44,8 +44,8 @@ class Place:
 
     def error(self, found: str, expected: str) -> ConfigError:
         return ConfigError(
-            f"{self.file}:{self.line}: {self.path or 'document'}: found {found}; expected "
-            f"{expected}"
+            f"{self.file}:{self.line}: {self.path or 'document'}: found {found};"
+            f" expected {expected}"
         )
 
     def key(self, name: str, line: int | None = None) -> Place:

@@ -145,10 +145,10 @@ class Daemon:
             loop.start()
             while not self._stop.wait(WATCH):
                 self._look(loop, watch)
-            left = self._drained(loop)
+            left = self._drain(loop)
         return self._close(left)
 
-    def _drained(self, loop: Thread) -> float:
+    def _drain(self, loop: Thread) -> float:
         """End the readers, then the loop, which takes what they left; what remains of STOP for
         the writer [s].
         """
@@ -197,15 +197,18 @@ class Daemon:
         if abs(offset - self._wall_offset) > WALL_STEP:
             self.say(
                 WARNING,
-                f"wall clock stepped by {offset - self._wall_offset:+.3f} s; stamps keep the "
-                "old one",
+                f"wall clock stepped by {offset - self._wall_offset:+.3f} s;"
+                " stamps keep the old one",
             )
             self._wall_offset = offset
 
     def _compare(self) -> None:
         """Say where model and measurement begin or cease to disagree."""
-        if self.loop.latest is not None and (said := self.model.look(self.loop.latest[0])):
-            self.say(WARNING if self.model.present else INFO, said)
+        if self.loop.latest is None:
+            return
+        line = self.model.look(self.loop.latest[0])
+        if line:
+            self.say(WARNING if self.model.present else INFO, line)
 
     def _close(self, patience: float) -> WriterStatus:
         if self._failure:

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
-from gritd.estimator.online.carry import carried
+from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import encode
 from gritd.estimator.online.pipeline import Pipeline, State
 
@@ -120,7 +120,7 @@ class Loop:
         if self._asked:
             change = self._asked.popleft()
             if change.pipeline is not None and change.configuration != self._configuration:
-                state = carried(change.pipeline, state, self._pipeline.settings)
+                state = carry_over(change.pipeline, state, self._pipeline.settings)
                 self._pipeline, self._configuration = change.pipeline, change.configuration
             self._checkpoint(state, stamp, dropped, new_part=True)
         elif dropped > self._log_dropped and stamp - self._checkpointed >= MEND:

@@ -32,7 +32,5 @@ def real_time() -> str:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         return ""
     except (OSError, AttributeError) as error:
-        return (
-            f"no real-time scheduling ({getattr(error, 'strerror', None) or error}): ticks "
-            "may be late under load"
-        )
+        reason = getattr(error, "strerror", None) or error
+        return f"no real-time scheduling ({reason}): ticks may be late under load"

@@ -19,7 +19,7 @@ SHARED = ("base", "library")  # modules of this package that are no effect
 
 
 def _find() -> dict[str, type[Effect]]:
-    found = {}
+    effects = {}
     folders = sys.modules[__package__].__path__
     for module in sorted(m.name for m in pkgutil.iter_modules(folders) if m.name not in SHARED):
         members = vars(importlib.import_module(f"{__package__}.{module}")).values()
@@ -32,8 +32,8 @@ def _find() -> dict[str, type[Effect]]:
             raise TypeError(
                 f"estimator/effects/{module}.py: expected one subclass of Effect, found {len(own)}"
             )
-        found[module] = own[0]
-    return found
+        effects[module] = own[0]
+    return effects
 
 
 def make(name: str, values: Mapping[str, float]) -> Effect:

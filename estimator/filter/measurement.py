@@ -245,11 +245,11 @@ def _variants(settings: Settings, chain: Chain) -> list[tuple[WheelModel, Chain]
     sigma.
     """
     moved = [Chain(settings, effects) for effects in variants(settings)]
-    found = [(WheelModel(settings, other), other) for other in moved]
+    models = [(WheelModel(settings, other), other) for other in moved]
     exponent = settings.soil.exponent.sigma
     if exponent > 0.0 and any(e.name == "stress_linearisation" for e in chain.effects):
-        found.append((WheelModel(settings, chain, exponent), chain))
-    return found
+        models.append((WheelModel(settings, chain, exponent), chain))
+    return models
 
 
 def selected(update: Update, components: tuple[int, ...]) -> Update:

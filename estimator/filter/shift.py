@@ -86,10 +86,10 @@ class IntegralShift:
         exponent n.
         """
         plain, by_ln_k, by_n, ln_k = self._table(theta_1, slip)
-        found = plain + (log(k) - self._ln_k) * by_ln_k
+        shift = plain + (log(k) - self._ln_k) * by_ln_k
         if exponent_error:
-            found = found + exponent_error * by_n
-        value, by_theta_1, by_slip = map(Integrals._make, found.tolist())
+            shift = shift + exponent_error * by_n
+        value, by_theta_1, by_slip = map(Integrals._make, shift.tolist())
         return Shift(value, by_theta_1, by_slip, ln_k)
 
     def _tabulated(self, theta_1: float, slip: float) -> Point:
@@ -101,9 +101,9 @@ class IntegralShift:
             -1, DEGREE[1] + 1
         )  # (2 for θ₁ · quantities, powers of i)
         by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
-        found = np.array((by_value[0], by_value[1], by_slip[0]))
-        by_ln_k = found[:, BY_LN_K]
-        return Point(found[:, PLAIN], by_ln_k, found[:, BY_N], Integrals(*by_ln_k[0].tolist()))
+        tables = np.array((by_value[0], by_value[1], by_slip[0]))
+        by_ln_k = tables[:, BY_LN_K]
+        return Point(tables[:, PLAIN], by_ln_k, tables[:, BY_N], Integrals(*by_ln_k[0].tolist()))
 
 
 def true_integrals(

@@ -87,10 +87,10 @@ def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int
     kept = np.zeros((len(Forces._fields), load.size))
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
-        found = _iterate(
+        balance = _iterate(
             wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order
         )
-        theta_1[touching], kept[:, touching], overloaded[touching] = found
+        theta_1[touching], kept[:, touching], overloaded[touching] = balance
     return Balance(theta_1, Forces(*kept), overloaded)
 
 

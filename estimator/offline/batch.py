@@ -28,7 +28,7 @@ from gritd.estimator.messages.tick import (
     names_of,
     row,
 )
-from gritd.estimator.offline.snapshots import played, snapshots
+from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.offline.windows import Ints
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
@@ -82,7 +82,7 @@ def estimates(settings: Settings, recording: Recording, engine: str = "plain") -
     readings, counter jumps) are left out. Raises RecordingError.
     """
     pipeline = Pipeline(settings, engine)
-    replayed = played(recording, pipeline.settings.rates.tick)
+    replayed = recorded_streams(recording, pipeline.settings.rates.tick)
     chosen = window_ends(replayed.ticks, round(NS / pipeline.settings.rates.update))
     tracker = pipeline.tracker
     state, rows = tracker.start(), []

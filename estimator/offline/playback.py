@@ -38,7 +38,7 @@ class RecordedTick(NamedTuple):
     checkpoint: Checkpoint | None = None
 
 
-def played(recording: Recording, rate: float) -> Iterator[RecordedTick]:
+def recorded_ticks(recording: Recording, rate: float) -> Iterator[RecordedTick]:
     """The ticks of a recording; `rate` [Hz] is used where it has none of its own."""
     return (
         _logged(recording)

@@ -12,7 +12,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.messages.readings import ENCODERS, NS
-from gritd.estimator.offline.snapshots import Played, Series, View, played_at
+from gritd.estimator.offline.snapshots import RecordedStreams, Series, View, streams_at
 from gritd.estimator.offline.windows import Bools
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
@@ -34,7 +34,7 @@ def recorded_motion(recording: Recording, settings: Settings, rate: float) -> Mo
         if not recording.counts[f"/raw/{name}"]:
             raise RecordingError(f"{recording.path}: /raw/{name}: no readings; expected an encoder")
 
-    time, columns, known = _windows(settings, played_at(recording, rate))
+    time, columns, known = _windows(settings, streams_at(recording, rate))
     if np.count_nonzero(known) < 2:
         window = f"{1.0 / settings.rates.update:g} s"
         raise RecordingError(
@@ -59,24 +59,24 @@ def recorded_motion(recording: Recording, settings: Settings, rate: float) -> Mo
     )
 
 
-def _windows(settings: Settings, played: Played) -> tuple[Array, Array, Bools]:
+def _windows(settings: Settings, recorded: RecordedStreams) -> tuple[Array, Array, Bools]:
     """Centre of every tick's window (n,) [s], the five columns of the motion (5, n), and where all
     of them are known (n,).
     """
-    parts = list(_parts(settings, played))
+    parts = list(_parts(settings, recorded))
     if not parts:
         return np.zeros(0), np.zeros((5, 0)), np.zeros(0, bool)
     time, columns, known = zip(*parts, strict=True)
     return np.concatenate(time), np.concatenate(columns, axis=1), np.concatenate(known)
 
 
-def _parts(settings: Settings, played: Played) -> Iterator[tuple[Array, Array, Bools]]:
-    began = max(int(played.streams[name].stamp.min()) for name in ENCODERS)
-    for start in range(0, len(played.ticks), AT_ONCE):
-        view = View(settings, played, np.arange(start, min(start + AT_ONCE, len(played.ticks))))
+def _parts(settings: Settings, recorded: RecordedStreams) -> Iterator[tuple[Array, Array, Bools]]:
+    began = max(int(recorded.streams[name].stamp.min()) for name in ENCODERS)
+    for start in range(0, len(recorded.ticks), AT_ONCE):
+        view = View(settings, recorded, np.arange(start, min(start + AT_ONCE, len(recorded.ticks))))
         wheel = view.slope("wheel_encoder", 1.0)
         carriage = view.slope("carriage_encoder", settings.pulley_radius)
-        load = _load(settings, played, view)
+        load = _load(settings, recorded, view)
 
         centre = (view.ends - view.length // 2 - began) / NS
         columns = (wheel.position, wheel.value, carriage.position, carriage.value, load.value)
@@ -84,9 +84,9 @@ def _parts(settings: Settings, played: Played) -> Iterator[tuple[Array, Array, B
         yield centre, np.array(columns), known
 
 
-def _load(settings: Settings, played: Played, view: View) -> Series:
+def _load(settings: Settings, recorded: RecordedStreams, view: View) -> Series:
     """W of every window: measured where there is a sensor, else the nominal one."""
-    if settings.wrench is not None and "wrench" in played.streams:
+    if settings.wrench is not None and "wrench" in recorded.streams:
         return view.wrench()[0]
     nominal = np.full(view.ends.shape, settings.load.nominal.value)
     return Series(nominal, 0.0 * nominal, nominal == nominal, view.ends)

@@ -3,7 +3,7 @@ configuration begins.
 
 A checkpoint is met in one of two ways. Coming from the ticks before it, the state must be the
 logged one to the bit: the change of configuration is recomputed like everything else. Coming from
-nowhere (the first part kept, or messages lost before it) the logged state is where the course
+nowhere (the first part kept, or messages lost before it) the logged state is where the rerun
 begins.
 """
 
@@ -15,7 +15,7 @@ from gritd.estimator.config.configuration import ConfigError, Configuration, loa
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.tick import TickRow
 from gritd.estimator.offline.playback import Checkpoint, RecordedTick
-from gritd.estimator.online.carry import carried
+from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import decode, encode
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -55,7 +55,7 @@ class Rerun:
             return
         settings = self._settings_of(configuration)
         before, self.pipeline = self.pipeline.settings, Pipeline(settings, self._engine)
-        self._state = carried(self.pipeline, self._state, before)
+        self._state = carry_over(self.pipeline, self._state, before)
         self._text = configuration.text
 
     def resume(self, checkpoint: Checkpoint) -> bool:

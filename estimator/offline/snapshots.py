@@ -38,8 +38,8 @@ class Stream(NamedTuple):
     values: NDArray[Any]  # (n,) raw, or (n, 6) of the wrench
 
 
-class Played(NamedTuple):
-    """The ticks of a recording and the readings each of them consumed: `playback.played` in
+class RecordedStreams(NamedTuple):
+    """The ticks of a recording and the readings each of them consumed, in
     arrays.
     """
 
@@ -47,20 +47,20 @@ class Played(NamedTuple):
     streams: dict[str, Stream]
 
 
-def played(recording: Recording, rate: float) -> Played:
+def recorded_streams(recording: Recording, rate: float) -> RecordedStreams:
     """Ticks as logged, else built at `rate` [Hz] from the first to the last receive time.
 
     Raises RecordingError where a raw topic is not what the contract says.
     """
     if not recording.counts[TICK]:
-        return played_at(recording, rate)
+        return streams_at(recording, rate)
 
     raw, logged = _raw(recording), recording.arrays(TICK)
     consumed = {name: np.searchsorted(logged["order"], rows["order"]) for name, rows in raw.items()}
     return _streams(logged["stamp"], raw, consumed)
 
 
-def played_at(recording: Recording, rate: float) -> Played:
+def streams_at(recording: Recording, rate: float) -> RecordedStreams:
     """Ticks at `rate` [Hz] from the first to the last receive time, whatever was logged."""
     raw = {
         name: rows[np.argsort(rows["log_time"], kind="stable")]
@@ -79,9 +79,9 @@ def _raw(recording: Recording) -> dict[str, NDArray[np.void]]:
 
 def _streams(
     ticks: Ints, raw: Mapping[str, NDArray[np.void]], consumed: Mapping[str, Ints]
-) -> Played:
+) -> RecordedStreams:
     streams = {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
-    return Played(ticks, streams)
+    return RecordedStreams(ticks, streams)
 
 
 def _built(raw: Mapping[str, NDArray[np.void]], period: int) -> Ints:
@@ -104,20 +104,18 @@ def _stream(channel: str, rows: NDArray[np.void], tick: Ints, ticks: int) -> Str
     )
 
 
-def snapshots(settings: Settings, played: Played, chosen: Ints) -> list[Snapshot]:
+def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> list[Snapshot]:
     """What Sync says at the ticks numbered `chosen`, shape (m,), ascending; equal to rounding."""
-    view = View(settings, played, chosen)
-    wheel, carriage = (
-        view.slope("wheel_encoder", 1.0),
-        view.slope("carriage_encoder", settings.pulley_radius),
-    )
+    view = View(settings, recorded, chosen)
+    wheel = view.slope("wheel_encoder", 1.0)
+    carriage = view.slope("carriage_encoder", settings.pulley_radius)
     means = {name: view.mean(name) for name in settings.channels if name not in ENCODERS}
     axes = view.wrench()
+    required = [wheel.known, carriage.known, *(means[name].known for name in ANALOGUE)]
+
     columns = (
         view.ends - view.length // 2,
-        np.logical_and.reduce(
-            [wheel.known, carriage.known, *(means[name].known for name in ANALOGUE)]
-        ),
+        np.logical_and.reduce(required),
         wheel.position,
         measured(wheel),
         carriage.position,
@@ -128,6 +126,7 @@ def snapshots(settings: Settings, played: Played, chosen: Ints) -> list[Snapshot
         view.stale(),
         view.stuck(wheel, carriage, means, axes),
     )
+
     rows = zip(
         *(column if isinstance(column, list) else column.tolist() for column in columns),
         strict=True,
@@ -177,14 +176,13 @@ class Accepted(NamedTuple):
 class View:
     """A recording seen through the windows that end at chosen ticks."""
 
-    def __init__(self, settings: Settings, played: Played, chosen: Ints) -> None:
+    def __init__(self, settings: Settings, recorded: RecordedStreams, chosen: Ints) -> None:
         self._settings = settings
-        self._streams = played.streams
+        self._streams = recorded.streams
         self._chosen = chosen
-        self._ticks = played.ticks[chosen]
-        self._closed = played.ticks - round(
-            settings.rates.horizon * NS
-        )  # ends of the windows of all ticks [ns]
+        self._ticks = recorded.ticks[chosen]
+        # ends of the windows of all ticks [ns]
+        self._closed = recorded.ticks - round(settings.rates.horizon * NS)
         self.length = round(NS / settings.rates.update)
         self.ends = self._closed[chosen]
         nan, zero = np.full(len(chosen), np.nan), np.zeros(len(chosen))

@@ -49,7 +49,7 @@ def _differing(path: str, old: object, new: object, names: Iterable[str]) -> Ite
     yield from (path + name for name in names if getattr(old, name) != getattr(new, name))
 
 
-def carried(pipeline: Pipeline, state: State, before: Settings) -> State:
+def carry_over(pipeline: Pipeline, state: State, before: Settings) -> State:
     """The state of `before` for the pipeline that takes over.
 
     The windows begin empty: what stands in them was read with another calibration. The estimate is

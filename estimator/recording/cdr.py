@@ -84,8 +84,8 @@ class Codec:
         for name, kind, _ in fields:
             if kind not in CODES and kind not in (TIME, STRING):
                 raise ValueError(
-                    f"field {name!r}: type {kind!r} is not one of {TIME}, {STRING}, "
-                    f"{', '.join(CODES)}"
+                    f"field {name!r}: type {kind!r} is not one of {TIME}, {STRING},"
+                    f" {', '.join(CODES)}"
                 )
         self.names = tuple(name for name, _, _ in fields)
         self.kinds = tuple(kind for _, kind, _ in fields)

@@ -36,8 +36,8 @@ def _checksum(name: str, entries: Mapping[str, str]) -> str:
 @cache
 def versions() -> Mapping[str, str]:
     """What computed this run: a replay that differs can say what changed."""
-    found = {"python": platform.python_version(), "machine": platform.machine()}
+    installed = {"python": platform.python_version(), "machine": platform.machine()}
     for package in ("gritd", "numpy", "filterpy", "scipy"):
         with suppress(PackageNotFoundError):
-            found[package] = version(package)
-    return found
+            installed[package] = version(package)
+    return installed

@@ -44,11 +44,11 @@ class Syncer:
         return not self.alive
 
     def request(self, fileno: int) -> None:
-        found = os.fstat(fileno)
+        status = os.fstat(fileno)
         with self._lock:
-            if (found.st_dev, found.st_ino) not in self._files:
+            if (status.st_dev, status.st_ino) not in self._files:
                 try:  # the writer may close its own while we wait
-                    self._files[found.st_dev, found.st_ino] = os.dup(fileno)
+                    self._files[status.st_dev, status.st_ino] = os.dup(fileno)
                 except OSError as error:
                     self._error = error
         self._wake.set()

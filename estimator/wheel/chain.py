@@ -258,12 +258,12 @@ def variants(settings: Settings) -> list[tuple[Effect, ...]]:
     """The configured effects with one uncertain parameter moved by its sigma, for each such
     parameter in turn.
     """
-    found = []
+    moved = []
     for effect in settings.effects:
         for name, value in effect.parameters.items():
             if value.sigma > 0.0:
-                found.append(configured(_moved(settings.effects, effect, name)))
-    return found
+                moved.append(configured(_moved(settings.effects, effect, name)))
+    return moved
 
 
 def _moved(

@@ -1,6 +1,4 @@
-"""From configuration to readers: any sensor on either bus, and one clear line where it cannot
-work.
-"""
+"""From configuration to readers: any sensor on either bus, one clear line where it cannot work."""
 
 from __future__ import annotations
 
@@ -113,19 +111,48 @@ def test_a_device_that_restarts_does_not_turn_the_wheel():
 @pytest.mark.parametrize(
     "settings, expected",
     [
-        (wiring([serial_device()], [channel("wheel_encoder", "nope")]), "no device 'nope', there are: encoders"),
-        (wiring([can_device()], [channel("wheel_encoder", "bus", "Nope.Count")]), "device bus: no message Nope"),
-        (wiring([can_device()], [channel("wheel_encoder", "bus", "WheelEncoder.Count", bits=16)]), "bits is 16, but"),
-        (wiring([can_device()], [channel("wheel_encoder", "bus", "SinkagePot.Volts")]), "not one unscaled integer"),
-        (wiring([can_device()], [channel("wheel_encoder", "bus", "WrenchForce")]), "not one unscaled integer"),
-        (wiring([can_device()], [channel("sinkage_pot", "bus", "WrenchForce")]), "expected one signal"),
-        (wiring([can_device()], [], wrench("bus", "WrenchTorque+WrenchForce")), "its signals are tx ty tz fx fy fz"),
+        (
+            wiring([serial_device()], [channel("wheel_encoder", "nope")]),
+            "no device 'nope', there are: encoders",
+        ),
+        (
+            wiring([can_device()], [channel("wheel_encoder", "bus", "Nope.Count")]),
+            "device bus: no message Nope",
+        ),
+        (
+            wiring(
+                [can_device()], [channel("wheel_encoder", "bus", "WheelEncoder.Count", bits=16)]
+            ),
+            "bits is 16, but",
+        ),
+        (
+            wiring([can_device()], [channel("wheel_encoder", "bus", "SinkagePot.Volts")]),
+            "not one unscaled integer",
+        ),
+        (
+            wiring([can_device()], [channel("wheel_encoder", "bus", "WrenchForce")]),
+            "not one unscaled integer",
+        ),
+        (
+            wiring([can_device()], [channel("sinkage_pot", "bus", "WrenchForce")]),
+            "expected one signal",
+        ),
+        (
+            wiring([can_device()], [], wrench("bus", "WrenchTorque+WrenchForce")),
+            "its signals are tx ty tz fx fy fz",
+        ),
         (wiring([can_device()], [], wrench("bus", "WrenchForce")), "expected fx fy fz tx ty tz"),
         (wiring([serial_device()], [], wrench("encoders", "f+t")), "expected one key"),
-        (wiring([can_device("nope")], [channel("sinkage_pot", "bus", "SinkagePot.Volts")]), "no CAN interface 'nope'"),
-        (wiring([can_device(dbc="/nope.dbc")], [channel("sinkage_pot", "bus", "A.B")]), "cannot read /nope.dbc: No"),
+        (
+            wiring([can_device("nope")], [channel("sinkage_pot", "bus", "SinkagePot.Volts")]),
+            "no CAN interface 'nope'",
+        ),
+        (
+            wiring([can_device(dbc="/nope.dbc")], [channel("sinkage_pot", "bus", "A.B")]),
+            "cannot read /nope.dbc: No",
+        ),
     ],
-)  # fmt: skip
+)
 def test_wiring_that_cannot_work_is_one_clear_line(settings, expected):
     with pytest.raises(DeviceSettingsError) as error:
         build(settings)

@@ -206,8 +206,9 @@ def ascii_line(body: bytes) -> bytes:
 @pytest.mark.parametrize(
     "body",
     [
-        b"k,70000,,1", b"k,-1,,1", b"k,1,4294967296,1", b"k,1,,1_0", b"k,1,, 1", b"k,1,,", b"k,1,,0x10", b"k,1,,--1",
-        b",1,,1", b"k k,1,,1", b"k,1", b"k,,,1", b"k,1,," + b"9" * 40, b"k\xff,1,,1", b"k,1,,Infinity",
+        b"k,70000,,1", b"k,-1,,1", b"k,1,4294967296,1", b"k,1,,1_0", b"k,1,, 1", b"k,1,,",
+        b"k,1,,0x10", b"k,1,,--1", b",1,,1", b"k k,1,,1", b"k,1", b"k,,,1", b"k,1,," + b"9" * 40,
+        b"k\xff,1,,1", b"k,1,,Infinity",
     ],
 )  # fmt: skip
 def test_ascii_content_that_is_no_frame_is_bad_in_spite_of_its_checksum(body):

@@ -129,8 +129,8 @@ def test_unplugged_and_back_many_times_without_losing_a_descriptor(tmp_path):
     assert rig.reader.stats().reopened == 10
     assert "tty" in rig.reader.stats().last_error
     print(
-        f"noticed within {max(noticed) * 1e3:.1f} ms, back within {max(back) * 1e3:.0f} ms of "
-        "plugging in"
+        f"noticed within {max(noticed) * 1e3:.1f} ms,"
+        f" back within {max(back) * 1e3:.0f} ms of plugging in"
     )
     rig.close()
 

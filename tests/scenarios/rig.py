@@ -219,10 +219,8 @@ class DaemonProcess:
         if watchdog:
             environment["WATCHDOG_USEC"] = str(int(watchdog * 1e6))
         becoming = "" if user is None else BECOMING.format(user=user, config=str(config))
-        code = (
-            f"{becoming}\n{prelude}\nimport sys, gritd.tools.commands.run, "
-            "gritd.tools.service.serve, gritd.tools.main\nprint('loaded', flush=True)\n"
-        )
+        code = f"{becoming}\n{prelude}\nimport sys, gritd.tools.commands.run, gritd.tools.main\n"
+        code += "import gritd.tools.service.serve\nprint('loaded', flush=True)\n"
         code += "sys.exit(gritd.tools.main.main(sys.argv[1:]))"
         command = ["--config", str(config), "--socket", self.socket, "--status", "0"]
         self.process = subprocess.Popen(

@@ -152,10 +152,8 @@ def test_log_folder_read_only_at_the_start(folder_of_nobody, seed, figure):
     root can read.
     """
     nobody, logs = pwd.getpwnam("nobody").pw_uid, folder_of_nobody / "logs"
-    loaded = (
-        "import encodings.utf_8_sig, locale, os, shutil, sys, gritd.tools.main, "
-        "gritd.tools.commands.run"
-    )
+    loaded = "import encodings.utf_8_sig, locale, os, shutil, sys"
+    loaded += "; import gritd.tools.main, gritd.tools.commands.run"
     becoming = f"os.setgroups([]); os.setgid({nobody}); os.setuid({nobody})"
     code = f"{loaded}; {becoming}; sys.exit(gritd.tools.main.main(sys.argv[1:]))"
     with Wires(folder_of_nobody, logging={"directory": str(logs)}) as wires:

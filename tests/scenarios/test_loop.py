@@ -34,9 +34,7 @@ DIES = "a thread dies"
 
 
 class SimulatedTime:
-    """Stands for the module `time`: monotonic time moves when somebody sleeps, the wall can be
-    set.
-    """
+    """Stands for the module `time`: monotonic time moves in a sleep, the wall can be set."""
 
     def __init__(self, steps):
         self.monotonic, self.wall = 10**12, 1_700_000_000 * 10**9
@@ -169,9 +167,7 @@ class Stalled:
 
 
 def test_queue_overflow(seed, figure):
-    """Three producers, a consumer that stalls, a small queue: the account is exact at every
-    moment.
-    """
+    """Three producers, a consumer that stalls, a small queue: the account is always exact."""
     rng = random.Random(seed)
     queue, stop = ReadingQueue(capacity=64), Event()
     consumer = Stalled(queue, rng)
@@ -326,9 +322,12 @@ def dying(method):
 VICTIMS = {
     "reader": "import gritd.drivers.reader as m; m.Reader._take = dying(m.Reader._take)",
     "loop": "import gritd.estimator.online.pipeline as m; m.Pipeline.step = dying(m.Pipeline.step)",
-    "writer": "import gritd.estimator.recording.writer as m; m.WriterThread._attempt = dying(m.WriterThread._attempt)",
-    "writer-sync": "import gritd.estimator.recording.syncer as m; m.Syncer._sync = dying(m.Syncer._sync)",
-    "publisher": "import gritd.estimator.daemon.publish as m; m.Publisher._accept = dying(m.Publisher._accept)",
+    "writer": "import gritd.estimator.recording.writer as m\n"
+    "m.WriterThread._attempt = dying(m.WriterThread._attempt)",
+    "writer-sync": "import gritd.estimator.recording.syncer as m\n"
+    "m.Syncer._sync = dying(m.Syncer._sync)",
+    "publisher": "import gritd.estimator.daemon.publish as m\n"
+    "m.Publisher._accept = dying(m.Publisher._accept)",
 }
 
 

@@ -79,9 +79,7 @@ def test_negative_slip(seed, figure):
 
 @pytest.mark.parametrize("slip", [-0.5, -0.8, -1.0])
 def test_dragged(seed, slip, figure):
-    """Beyond the closed forms, to a locked wheel: the encoder's steps of a braked run made
-    smaller.
-    """
+    """Beyond the closed forms, to a locked wheel: a braked run's encoder in smaller steps."""
     pipeline = Pipeline(RIG, "plain")
     state, ticks, slower = pipeline.start(), [], {}
     for number, (t, batch) in enumerate(

@@ -1,6 +1,4 @@
-"""Readings that are wrong: what reaches the filter, through the drivers' decoders and the
-pipeline.
-"""
+"""Readings that are wrong: what reaches the filter, through decoders and pipeline."""
 
 from __future__ import annotations
 

@@ -33,9 +33,7 @@ def test_sparse_ten_gigabytes(tmp_path, figure):
 
 
 def check(path, figure):
-    """Time on a busy machine says nothing: it is stated, and held to its limit by a factor of
-    ten.
-    """
+    """Time on a busy machine says nothing: it is stated, and held to ten times its limit."""
     seconds, memory, said = probe(path)
     assert "\n" not in said.strip()
     figure(HUGE, OWN, "memory", memory, "MB", 256)

@@ -25,9 +25,8 @@ from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
-from gritd.estimator.offline.playback import played
-from gritd.estimator.offline.snapshots import played as played_arrays
-from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.playback import recorded_ticks
+from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
@@ -114,7 +113,7 @@ def tick(subject: Subject) -> Figures:
     """Cost of one tick of the live loop, with the heap frozen as the daemon has it."""
     settings = subject.configuration.settings
     pipeline = Pipeline(settings)
-    ticks = list(played(read(subject.path), settings.rates.tick))[: subject.sizes.ticks]
+    ticks = list(recorded_ticks(read(subject.path), settings.rates.tick))[: subject.sizes.ticks]
     state, spent = pipeline.start(), []
 
     gc.collect()
@@ -187,7 +186,7 @@ def update(subject: Subject) -> Figures:
     """One measurement of torque and drawbar pull applied by each engine."""
     settings = subject.configuration.settings
     tracker = Tracker(settings)
-    whole = played_arrays(read(subject.path), settings.rates.tick)
+    whole = recorded_streams(read(subject.path), settings.rates.tick)
     state = tracker.start()
     for snapshot in snapshots(
         settings, whole, np.arange(25, 101, 25)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.estimator.config.configuration import loads
 from gritd.estimator.messages.tick import TICK_NAMES
-from gritd.estimator.offline.playback import played
+from gritd.estimator.offline.playback import recorded_ticks
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording
@@ -93,7 +93,7 @@ def without_correction(recording: Recording, truth: Mapping[str, float]) -> list
     state, tick = pipeline.start(), None
 
     with Progress("once more without the correction", recording.counts["/tick"]) as progress:
-        for recorded in played(recording, settings.rates.tick):
+        for recorded in recorded_ticks(recording, settings.rates.tick):
             state, tick = pipeline.step(state, recorded.readings, recorded.stamp)
             progress.advance()
 

@@ -11,7 +11,7 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS
 from gritd.estimator.offline.batch import window_ends
-from gritd.estimator.offline.snapshots import played, snapshots
+from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.recording.salvage import Recording
 
 # required channel -> what a snapshot has of it
@@ -25,7 +25,7 @@ VALUES = {
 
 def never_ready(settings: Settings, recording: Recording) -> str:
     """One line. Raises RecordingError."""
-    replayed = played(recording, settings.rates.tick)
+    replayed = recorded_streams(recording, settings.rates.tick)
     ends = window_ends(replayed.ticks, round(NS / settings.rates.update))
     seen = snapshots(settings, replayed, ends)
     missing = [

@@ -15,7 +15,7 @@ from gritd.estimator.config.settings import ENGINES, Settings, settings_of_run
 from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import TICK_FIELDS, TICK_NAMES, TickRow
 from gritd.estimator.offline.batch import estimates
-from gritd.estimator.offline.playback import RecordedTick, played, without_absent
+from gritd.estimator.offline.playback import RecordedTick, recorded_ticks, without_absent
 from gritd.estimator.offline.rerun import Rerun
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -105,21 +105,21 @@ def _verify(recordings: list[Recording], configuration: Configuration) -> int:
             f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE
         )
 
-    course = _course(recordings, configuration, None, as_it_ran=True)
+    rerun = _rerun(recordings, configuration, None, as_it_ran=True)
     if first.run.part:
-        course.lose()
+        rerun.lose()
 
     differing = Differences()
 
     for recording, tick in _ticks(recordings, configuration, "verifying"):
         if recording.run.lost_before and recording is not differing.recording:
-            course.lose()
+            rerun.lose()
         differing.recording = recording
         if tick.checkpoint is not None:
-            differing.resumed(tick.stamp, course.resume(tick.checkpoint))
+            differing.resumed(tick.stamp, rerun.resume(tick.checkpoint))
 
-        record = course.step(tick)
-        if tick.logged is not None and course.known:
+        record = rerun.step(tick)
+        if tick.logged is not None and rerun.known:
             differing.compare(tick.logged, record)
         elif tick.logged is not None:
             differing.unknown += 1
@@ -211,12 +211,12 @@ def _every_tick(
     writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
 
     records = []
-    course = _course(recordings, configuration, arguments.engine, as_it_ran=False)
+    rerun = _rerun(recordings, configuration, arguments.engine, as_it_ran=False)
 
     for _, tick in _ticks(recordings, configuration, "replaying"):
         if tick.checkpoint is not None and not arguments.config:
-            course.reconfigure(tick.checkpoint)
-        record = course.step(tick)
+            rerun.reconfigure(tick.checkpoint)
+        record = rerun.step(tick)
         records.append(record)
         if writer is not None:
             for reading in tick.readings:
@@ -240,7 +240,7 @@ def _target(arguments: Namespace, path: Path) -> Path:
     return output / path.name if output.is_dir() else output
 
 
-def _course(
+def _rerun(
     recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool
 ) -> Rerun:
     """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was
@@ -274,7 +274,7 @@ def _ticks(
     total = sum(recording.counts["/tick"] for recording in recordings)
     with Progress(f"{what} {recordings[0].path.name}", total) as progress:
         for recording in recordings:
-            for tick in played(recording, configuration.settings.rates.tick):
+            for tick in recorded_ticks(recording, configuration.settings.rates.tick):
                 progress.advance()
                 yield recording, tick
 

@@ -15,8 +15,8 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.offline.batch import ESTIMATES, estimates, window_ends
-from gritd.estimator.offline.playback import played as replayed
-from gritd.estimator.offline.snapshots import Played, Stream, snapshots
+from gritd.estimator.offline.playback import recorded_ticks
+from gritd.estimator.offline.snapshots import RecordedStreams, Stream, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
@@ -121,7 +121,7 @@ def uneven_ticks(rng, seconds=1.2):
 
 
 def shared_out(found, ticks):
-    """The readings each tick consumes, as a list of lists, and as `snapshots.Played`."""
+    """The readings each tick consumes, as a list of lists, and as `snapshots.RecordedStreams`."""
     consumed = np.searchsorted(ticks, [r.received for r in found])
     batches = [[] for _ in ticks]
     for tick, reading in zip(consumed, found, strict=True):
@@ -133,7 +133,7 @@ def shared_out(found, ticks):
         if own:
             columns = [(r.stamp, r.received, k, r.value) for k, r in own]
             streams[channel] = Stream(*(np.array(column) for column in zip(*columns, strict=True)))
-    return batches, Played(np.array(ticks), streams)
+    return batches, RecordedStreams(np.array(ticks), streams)
 
 
 def flat(snapshot):
@@ -160,7 +160,7 @@ def test_snapshots_from_arrays_are_those_of_sync(seed):
 
 
 def test_a_recording_without_readings_has_no_windows():
-    assert snapshots(RIG, Played(np.empty(0, np.int64), {}), np.empty(0, np.int64)) == []
+    assert snapshots(RIG, RecordedStreams(np.empty(0, np.int64), {}), np.empty(0, np.int64)) == []
 
 
 def recorded(path, rig, with_ticks, rate=250):
@@ -187,7 +187,7 @@ def by_ticks(rig, recording):
     """Every tick of a recording as a structured array, by the pipeline."""
     pipeline = Pipeline(rig, "plain")
     state, rows = pipeline.start(), []
-    for tick in replayed(recording, rig.rates.tick):
+    for tick in recorded_ticks(recording, rig.rates.tick):
         state, record = pipeline.step(state, tick.readings, tick.stamp)
         rows.append(record)
     return np.array(

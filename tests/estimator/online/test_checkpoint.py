@@ -15,7 +15,7 @@ from gritd.estimator.config.configuration import load, loads
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online import checkpoint
-from gritd.estimator.online.carry import carried, needs_restart
+from gritd.estimator.online.carry import carry_over, needs_restart
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.parts import part_path
 from gritd.estimator.recording.run_writer import RunWriter
@@ -123,10 +123,10 @@ def test_a_reload_keeps_the_estimate_unless_the_soil_section_changed(consumed):
     before = Pipeline(SETTINGS)
     state, _ = run(before, before.start(), consumed)
     drive = Pipeline(changed(drive=replace(SETTINGS.drive, torque_constant=Uncertain(2.1, 0.01))))
-    kept = carried(drive, state, before.settings).track.estimate
+    kept = carry_over(drive, state, before.settings).track.estimate
     assert kept.x == state.track.estimate.x and kept.P == drive.start().track.estimate.P
     soil = Pipeline(changed(soil=replace(SETTINGS.soil, cohesion=Uncertain(500.0, 100.0))))
-    assert carried(soil, state, before.settings).track.estimate == soil.start().track.estimate
+    assert carry_over(soil, state, before.settings).track.estimate == soil.start().track.estimate
 
 
 def test_counters_time_and_baselines_go_on_through_a_reload(consumed):
@@ -136,7 +136,7 @@ def test_counters_time_and_baselines_go_on_through_a_reload(consumed):
     )
     counters = state.sync.counters
     assert counters.late + counters.duplicates > 0
-    after = carried(Pipeline(SETTINGS), state, pipeline.settings)
+    after = carry_over(Pipeline(SETTINGS), state, pipeline.settings)
     assert after.sync.counters == counters and after.first == state.first
     for name in ("updates", "began", "origin", "recall"):
         assert getattr(after.track, name) == getattr(state.track, name), name
@@ -159,7 +159,7 @@ def test_the_place_where_the_run_began_is_read_anew_with_the_carriage_calibratio
             channels={**SETTINGS.channels, "carriage_encoder": replace(channel, calibration=larger)}
         )
     )
-    after = carried(other, state, pipeline.settings)
+    after = carry_over(other, state, pipeline.settings)
     assert state.track.origin > 0.05 and after.track.origin == pytest.approx(
         1.01 * state.track.origin
     )
@@ -190,7 +190,7 @@ def test_a_recording_through_a_reload_and_a_loss_is_verified_bit_for_bit(
     path = tmp_path / "run.mcap"
     first, second = Pipeline(SETTINGS), Pipeline(other.settings)
     state = write(path, 0, 0, TESTBED.text, first, first.start(), consumed[:300], None)
-    state = carried(second, state, first.settings)
+    state = carry_over(second, state, first.settings)
     state = write(path, 1, 0, other.text, second, state, consumed[300:600], 0)
     state, _ = run(second, state, consumed[600:700])  # these are lost
     write(path, 2, 2000, other.text, second, state, consumed[700:], 50)

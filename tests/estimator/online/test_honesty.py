@@ -73,8 +73,8 @@ def test_a_rig_as_uncertain_as_stated_gives_estimates_as_uncertain_as_stated(see
     """Original plant, every calibration and the soil drawn from its own sigma, three loads."""
     squares, resets = zip(*(one_run(seed) for seed in range(seeds)), strict=True)
     print(
-        f"NEES {np.mean(squares):.2f} of 2, {np.mean(np.array(squares) < 5.99):.0%} in the 95 "
-        "% ellipse"
+        f"NEES {np.mean(squares):.2f} of 2,"
+        f" {np.mean(np.array(squares) < 5.99):.0%} in the 95 % ellipse"
     )
     assert sum(square < 5.99 for square in squares) >= inside
     assert sum(resets) == 0

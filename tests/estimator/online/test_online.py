@@ -1,6 +1,4 @@
-"""An effect that is at work and configured does not move c and tan φ: the filter accounts for
-it.
-"""
+"""An effect at work that is configured does not move c and tan φ: the filter accounts for it."""
 
 from __future__ import annotations
 
@@ -97,9 +95,7 @@ def test_motion_covers_what_separates():
 
 
 def test_a_counter_that_does_not_start_at_nought_is_no_place_on_the_bed():
-    """A run that begins where the one before ended: what acts along the path begins with the
-    run.
-    """
+    """A run that begins where one ended before: what acts along the path begins with the run."""
     effect = typical(EFFECTS["running_in"])
     readings = simulate_run(SETTINGS, SOIL, MOTION, (effect,), 1).readings
     settings = replace(SETTINGS, effects=(*SETTINGS.effects, configure(effect)))

@@ -67,7 +67,8 @@ try:
     said = f"{sum(1 for _ in recording.messages())} messages, {recording.damage[:1]}"
 except RecordingError as error:
     said = f"RecordingError: {error}"
-with open("/proc/self/status") as status:  # ru_maxrss would count what the parent held when it forked
+# ru_maxrss would count what the parent held when it forked
+with open("/proc/self/status") as status:
     peak = int(re.search(r"VmHWM:\s+(\d+) kB", status.read())[1])
 print(f"{time.process_time():.2f} s, {peak / 1024:.0f} MB: {said}")
 """

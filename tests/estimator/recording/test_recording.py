@@ -105,8 +105,8 @@ def test_a_schema_that_is_not_of_plain_fields_is_not_guessed_at(text: str) -> No
 
 def test_a_foreign_schema_with_constants_defaults_and_comments_is_read() -> None:
     text = (
-        "uint8 OK=1\n\nbuiltin_interfaces/msg/Time stamp # when\nfloat32 x 1.5\nbyte "
-        "flags\nstring<=10 who\n"
+        "uint8 OK=1\n\nbuiltin_interfaces/msg/Time stamp # when\n"
+        "float32 x 1.5\nbyte flags\nstring<=10 who\n"
     )
     assert parse_schema(text) == (
         ("stamp", TIME, "when"),

@@ -302,7 +302,10 @@ from gritd.estimator.recording.writer import WriterThread
 folder = Path(sys.argv[1])
 if os.system(f"mount -t tmpfs -o size=256k tmpfs {folder}"):
     sys.exit(77)
-thread = WriterThread(folder / "run.mcap", [], "a: 1", RunInfo("r"), flush_interval=0.02, retry=0.2, compression="none")
+thread = WriterThread(
+    folder / "run.mcap", [], "a: 1", RunInfo("r"),
+    flush_interval=0.02, retry=0.2, compression="none",
+)
 thread.start()
 ballast, i, states = folder / "ballast", 0, set()
 def put(n):
@@ -404,8 +407,8 @@ def test_kill_9_leaves_everything_up_to_the_last_flush(tmp_path: Path, seed: int
     recording = read(path)
     rows = recording.arrays("/raw/wheel_encoder")
     print(
-        f"killed: {(killed - rows['stamp'][-1]) / 1e9:.3f} s of data lost, {len(rows)} "
-        "messages kept"
+        f"killed: {(killed - rows['stamp'][-1]) / 1e9:.3f} s of data lost,"
+        f" {len(rows)} messages kept"
     )
     assert rows["count"].tolist() == list(range(len(rows))) and len(rows) > 0
     assert (

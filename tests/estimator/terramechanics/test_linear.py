@@ -227,7 +227,8 @@ def test_batch_equals_numbers() -> None:
     n = 500
     columns = [
         rng.uniform(0, 8e3, n), rng.uniform(0.1, 1.2, n), 10 ** rng.uniform(-2.5, -1, n),
-        10 ** rng.uniform(-4, 0.1, n), rng.choice([0.0, 1e-9, 1.0, -0.4, 0.2, 0.7], n), rng.uniform(5, 300, n),
+        10 ** rng.uniform(-4, 0.1, n), rng.choice([0.0, 1e-9, 1.0, -0.4, 0.2, 0.7], n),
+        rng.uniform(5, 300, n),
     ]  # fmt: skip
     batch = predict_batch(SHIFTING, *columns)
     for index in range(n):

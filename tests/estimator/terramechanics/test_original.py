@@ -77,9 +77,7 @@ def test_forces_agree_with_adaptive_quadrature(named, slip: float) -> None:
 
 
 def test_quadrature_error_over_the_documented_range() -> None:
-    """The figures of docs/physics.md: error relative to W (rW for T), 16 nodes a zone against
-    200.
-    """
+    """The figures of docs/physics.md: error relative to W (rW for T), 16 nodes a zone, not 200."""
     rng = np.random.default_rng(5)
     n = 4000
     wheel = Wheel(0.15, 0.15)

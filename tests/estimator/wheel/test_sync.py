@@ -1,6 +1,4 @@
-"""One snapshot a tick: sorted, complete, calibrated, and the same however the readings
-travelled.
-"""
+"""One snapshot a tick: sorted, complete, calibrated, the same however the readings travelled."""
 
 from __future__ import annotations
 

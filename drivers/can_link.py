@@ -53,6 +53,7 @@ class CanLink:
             **DEFAULTS.get(device.interface, {}),
             **device.options,
         }
+
         try:
             bus = can.Bus(
                 device.channel,
@@ -64,12 +65,14 @@ class CanLink:
         except Exception as error:  # every backend has exceptions of its own
             where = f"{device.interface} {device.channel}"
             raise DeviceError(device.name, f"cannot open {where}: {_reason(error)}") from None
+
         _enlarge_receive_buffer(bus)
         self._bus = bus
 
     def read(self) -> Chunk | None:
         if self._bus is None:
             raise DeviceError(self._device.name, f"{self._device.channel} is not open")
+
         try:
             message = self._bus.recv(POLL)
             if message is None:

@@ -66,10 +66,12 @@ def _from_file(device: Device) -> Database:
         raise DeviceSettingsError(
             f"device {device.name}", f"cannot read {device.dbc}: {reason}"
         ) from None
+
     if len(text) > MAX_DBC_BYTES:
         raise DeviceSettingsError(
             f"device {device.name}", f"{device.dbc} is larger than {MAX_DBC_BYTES} bytes"
         )
+
     try:
         return cantools.database.load_string(text, database_format="dbc")  # type: ignore[return-value]
     except Exception as error:  # the parser's own errors share no class but this one
@@ -99,6 +101,7 @@ def _checked(where: str, definition: Definition) -> dict[str, Any]:
             raise DeviceSettingsError(
                 where, f"unknown key {key!r}, expected some of {', '.join(RULES)}"
             )
+
     values = {}
     for key, (default, valid, expected) in RULES.items():
         values[key] = definition.get(key, default)
@@ -106,10 +109,12 @@ def _checked(where: str, definition: Definition) -> dict[str, Any]:
             raise DeviceSettingsError(
                 where, f"{key} is {definition.get(key)!r}, expected {expected}"
             )
+
     if values["is_float"] and values["length"] not in (32, 64):
         raise DeviceSettingsError(
             where, f"length is {values['length']}, expected 32 or 64 bits for a float"
         )
+
     return values
 
 
@@ -119,11 +124,13 @@ def _message(device: Device, name: str, signals: dict[str, dict[str, Any]]) -> M
         raise DeviceSettingsError(
             f"device {device.name}, message {name}", "its signals differ in id or extended"
         )
+
     built = [_signal(signal, values) for signal, values in signals.items()]
     length = max(map(_bytes_reached, built))
     if length > MAX_MESSAGE:
         reason = f"its signals reach to byte {length}, expected at most {MAX_MESSAGE}"
         raise DeviceSettingsError(f"device {device.name}, message {name}", reason)
+
     try:
         return Message(
             first["id"], name, length, built, is_extended_frame=first["extended"], strict=True

@@ -86,9 +86,11 @@ def _parse(line: bytes) -> Frame | None:
     body, _, checksum = line.rpartition(b"*")
     if checksum != b"%04X" % crc_hqx(body, 0xFFFF) or not body.isascii():
         return None
+
     key, *fields = body.decode("ascii").split(",")
     if not KEY.fullmatch(key) or not 3 <= len(fields) <= 2 + MAX_VALUES:
         return None
+
     try:
         return Frame(
             key,

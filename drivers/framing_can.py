@@ -119,14 +119,17 @@ class CanFraming:
         if can_id & ERROR:
             self.counts.errors += 1
             return []
+
         wanted = self._wanted.get(can_id)
         if wanted is None:
             return []
+
         try:
             values = wanted.message.decode(data, decode_choices=False)
         except (cantools.Error, ValueError, ArithmeticError):
             self.counts.bad += 1
             return []
+
         self.counts.good += 1
         return self._frames(wanted, values)  # type: ignore[arg-type]
 
@@ -135,6 +138,7 @@ class CanFraming:
         if wanted.counter is not None:
             sequence = int(values[wanted.counter.name])
             self.counts.lost += wanted.gap.lost_before(sequence)
+
         if wanted.device_time is not None:
             device_us = int(values[wanted.device_time.name])
         return [
@@ -165,6 +169,7 @@ class CanFraming:
             self._unknown(
                 f"message {name}", f"there are {', '.join(m.name for m in self._database.messages)}"
             )
+
         counter = next((s for s in message.signals if s.name.lower() in COUNTERS), None)
         device_time = next((s for s in message.signals if s.name.lower() == DEVICE_TIME), None)
         for signal in filter(None, (counter, device_time)):
@@ -174,10 +179,12 @@ class CanFraming:
                 raise DeviceSettingsError(
                     f"device {self._device}", f"{what}; expected an integer in every message"
                 )
+
         gap = SequenceGap(1 << counter.length if counter else 1)
         wanted = _Wanted(message, {}, counter, device_time, gap)
         self._wanted[message.frame_id | (EXTENDED if message.is_extended_frame else 0)] = wanted
         self._by_message[name] = wanted
+
         return wanted
 
     def _unknown(self, what: str, known: str) -> NoReturn:

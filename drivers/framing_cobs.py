@@ -140,6 +140,7 @@ def _parse(stuffed: bytes) -> Frame | None:
         or crc_hqx(body[:-2], 0xFFFF) != int.from_bytes(body[-2:], "little")
     ):
         return None
+
     sequence, kind, key_length = _HEAD.unpack_from(body)
     key_end = _HEAD.size + (key_length & ~_TIMED)
     values_at = key_end + (4 if key_length & _TIMED else 0)
@@ -147,6 +148,7 @@ def _parse(stuffed: bytes) -> Frame | None:
     count, rest = divmod(len(body) - 2 - values_at, _SIZES.get(kind, 1))
     if kind not in _SIZES or rest or not 1 <= count <= MAX_VALUES or not KEY.fullmatch(key):
         return None
+
     device_us = int.from_bytes(body[key_end:values_at], "little") if key_length & _TIMED else None
     return Frame(
         key, sequence, device_us, struct.unpack_from(f"<{count}{chr(kind)}", body, values_at)

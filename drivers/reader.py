@@ -58,6 +58,7 @@ class Reader:
         self._link = link
         self._queue = queue
         self._tap = tap
+
         self._stop = Event()
         self._thread: Thread | None = None
         self._state = "ENDED"
@@ -93,6 +94,7 @@ class Reader:
         counts = self.decoder.framing.counts
         sensors = self.decoder.sensors
         steps, step = self.decoder.step
+
         return ReaderStats(
             device=self.device,
             state=self._state,
@@ -119,9 +121,8 @@ class Reader:
         try:
             self._read_until_stopped()
             self._state = "ENDED"
-        except (
-            Exception
-        ) as error:  # a fault of ours: never silent, the daemon sees DEAD and its reason
+        # a fault of ours: never silent, the daemon sees DEAD and its reason
+        except Exception as error:
             self._last_error = f"{self.device}: {type(error).__name__}: {one_line(error)}"
             self._state = "DEAD"
         finally:
@@ -135,6 +136,7 @@ class Reader:
                 self._session()
             except DeviceError as error:
                 self._last_error = str(error)
+
             self._link.close()
             self._state = "WAITING"
             if self._bytes > before:

@@ -57,6 +57,7 @@ class CanWire:
         fields = {s.name: given.get(s.name, 0) for s in message.signals} | self._counters(
             message, device_us or 0
         )
+
         return can.Message(
             arbitration_id=message.frame_id,
             is_extended_id=message.is_extended_frame,

@@ -301,6 +301,7 @@ class Section:
 
     def read(self, node: Node) -> tuple[Any, Node]:
         items = entries(node, self.expected, self.keys)
+
         values: dict[str, Any] = {}
         filled: dict[str, Node] = {}
         for name, key in self.keys.items():
@@ -309,6 +310,7 @@ class Section:
                 values[name] = None
             else:
                 values[name], filled[name] = key.kind.read(given)
+
         complete = Mapping(node.place, filled)
         try:
             return self.build(**values), complete
@@ -412,3 +414,8 @@ def _blame(error: Impossible, section: Mapping) -> Exception:
         else:
             return node.place.key(name).error(error.found or "nothing", error.expected)
     return node.place.error(error.found or describe(node), error.expected)
+
+
+def uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
+    """A quantity with its standard deviation, in the unit and bounds of `Quantity`."""
+    return UncertainQuantity(Quantity(unit, **bounds))

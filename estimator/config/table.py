@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from math import inf
 from pathlib import Path
 from typing import Any
 
+from gritd.estimator.config.channels import channels
 from gritd.estimator.config.devices import NAME, device
 from gritd.estimator.config.names import EXPECTED, PATTERN
 from gritd.estimator.config.schema import (
@@ -33,11 +32,10 @@ from gritd.estimator.config.schema import (
     Text,
     UncertainQuantity,
     entries,
+    uncertain,
 )
 from gritd.estimator.config.settings import (
     ENGINES,
-    Calibration,
-    Channel,
     ConfiguredEffect,
     Drive,
     FilterSettings,
@@ -47,21 +45,15 @@ from gritd.estimator.config.settings import (
     Settings,
     SoilPrior,
     Uncertain,
-    Wrench,
 )
 from gritd.estimator.config.yamltree import Mapping as Tree
-from gritd.estimator.config.yamltree import Node, Scalar, describe
+from gritd.estimator.config.yamltree import Node
 from gritd.estimator.effects import EFFECTS
-from gritd.estimator.messages.readings import CHANNELS, ENCODERS, REQUIRED
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""
-
-
-def _uncertain(unit: str, **bounds: Any) -> UncertainQuantity:
-    return UncertainQuantity(Quantity(unit, **bounds))
 
 
 # ---- wheel, soil, drive, load
@@ -75,12 +67,12 @@ WHEEL = {
 }
 
 SOIL = {
-    "cohesion": Key(_uncertain("Pa", low=0, high=1e6), "cohesion c, before the run"),
+    "cohesion": Key(uncertain("Pa", low=0, high=1e6), "cohesion c, before the run"),
     "tan_phi": Key(
-        _uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"
+        uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"
     ),
-    "shear_modulus": Key(_uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
-    "exponent": Key(_uncertain("", above=0, high=5), "sinkage exponent n"),
+    "shear_modulus": Key(uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
+    "exponent": Key(uncertain("", above=0, high=5), "sinkage exponent n"),
     "k_c": Key(Quantity("Pa/m^(n-1)"), "with `k_phi`, Bekker: σ = (k_c/b + k_φ) zⁿ", ABSENT),
     "k_phi": Key(Quantity("Pa/m^n"), "with `k_c`", ABSENT),
     "k1": Key(
@@ -96,7 +88,7 @@ SOIL = {
 
 DRIVE = {
     "torque_constant": Key(
-        _uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"
+        uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"
     ),
     "torque_source": Key(
         Choice(("motor_shunt", "wrench")), "the channel that gives the torque", "motor_shunt"
@@ -105,7 +97,7 @@ DRIVE = {
 
 LOAD = {
     "nominal": Key(
-        _uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"
+        uncertain("N", above=0), "vertical load W on the wheel where no wrench measures it"
     ),
     "minimum": Key(Quantity("N", low=0), "under this load the wheel is in the air", "5 N"),
 }
@@ -122,10 +114,12 @@ def _soil(exponent: Uncertain, **values: Any) -> SoilPrior:
         raise Impossible(
             "k1" if begun and moduli["reece"][0] is not None else "k2" if begun else "k_c", expected
         )
+
     form = begun[0]
     for name, value in zip(FORMS[form], moduli[form], strict=True):
         if value is None:
             raise Impossible(name, expected)
+
     law = PressureSinkage("bekker" if form == "bekker" else "reece", exponent.value, *moduli[form])
     return SoilPrior(exponent=exponent, pressure_sinkage=law, **values)
 
@@ -135,164 +129,6 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
         raise Impossible("minimum", "less than load.nominal")
     return Load(nominal, minimum)
 
-
-# ---- channels
-# ------------------------------------------------------------------------------------
-# ------------------
-
-# channel -> raw unit, physical unit, unit of raw differences
-UNITS = {
-    "wheel_encoder": ("count", "rad", "count"),
-    "carriage_encoder": ("count", "rad", "count"),
-    "sinkage_pot": ("V", "m", "V"),
-    "motor_shunt": ("V", "A", "V"),
-    "motor_temperature": ("degC", "K", "K"),
-}
-
-
-# No reading is exact. Less than this is a slip of the pen: the filter divides by its square.
-LEAST_NOISE = 1e-9  # in every raw unit
-
-
-@dataclass(frozen=True)
-class Unlimited:
-    """A limit that this kind of channel cannot have. The word stands in the effective text of
-    earlier recordings.
-    """
-
-    value: Any
-    reason: str
-
-    @property
-    def expected(self) -> str:
-        return f"{UNLIMITED}: {self.reason}"
-
-    def read(self, node: Node) -> tuple[Any, Node]:
-        if not isinstance(node, Scalar) or node.text != UNLIMITED:
-            raise node.place.error(describe(node), self.expected)
-        return self.value, node
-
-
-def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
-    return {
-        "scale": Key(
-            _uncertain(scale),
-            "physical = raw · scale + offset; its sigma is that of the slope about physical zero",
-            default_scale,
-        ),
-        "offset": Key(
-            _uncertain(offset),
-            "see `scale`; its sigma is that of the zero: the physical value read at rest",
-            f"0 {offset}",
-        ),
-        "date": Key(
-            Text("a date such as 2026-11-20", r"|\d{4}-\d\d-\d\d"), "day of the calibration", "''"
-        ),
-        "serial": Key(Text(), "serial number of the sensor", "''"),
-    }
-
-
-def _timing() -> dict[str, Key]:
-    return {
-        "latency": Key(
-            Quantity("s", low=0, high=1), "a sample is older than its stamp by this much", "0 ms"
-        ),
-        "stale_after": Key(
-            Quantity("s", above=0, high=10), "silence after which the channel is stale", "40 ms"
-        ),
-    }
-
-
-def _source() -> dict[str, Key]:
-    return {
-        "device": Key(NAME, "name of the device it comes from"),
-        "signal": Key(NAME, "key in the serial frame, or Message.Signal of the CAN database"),
-    }
-
-
-def _channel(name: str) -> Section:
-    """Keys of one channel, in its units."""
-    raw, physical, step = UNITS[name]
-    slope = f"{physical}/{raw}"
-    keys = _source() | (
-        _calibration("", "K", "1.0") if raw == "degC" else _calibration(slope, physical, NEEDED)
-    )
-    keys["noise"] = Key(Quantity(step, above=LEAST_NOISE), "standard deviation of one reading")
-    if name in ENCODERS:
-        max_rate = Quantity(f"{step}/s", above=0, unlimited=True)
-        keys["range"] = Key(
-            Unlimited((-inf, inf), "no count is impossible, max_rate tells a jump"),
-            "none",
-            UNLIMITED,
-        )
-        keys["bits"] = Key(Integer(8, 64), "width of the counter on the wire", "32")
-        keys["max_rate"] = Key(
-            max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED
-        )
-    else:
-        keys["range"] = Key(Interval(Quantity(raw)), "valid readings; one outside is quarantined")
-        keys["max_rate"] = Key(
-            Unlimited(inf, "only an encoder's counts can jump"), "none", UNLIMITED
-        )
-    return Section(keys | _timing(), partial(_build_channel, name))
-
-
-def _build_channel(name: str, **values: Any) -> Channel:
-    low, high = values.pop("range")
-    calibration = _build_calibration(
-        **{key: values.pop(key) for key in ("scale", "offset", "date", "serial")}
-    )
-    return Channel(name=name, calibration=calibration, low=low, high=high, **values)
-
-
-def _build_calibration(scale: Uncertain, **values: Any) -> Calibration:
-    if scale.value == 0.0:
-        raise Impossible("scale", "a scale other than 0", "0")
-    return Calibration(scale, **values)
-
-
-WRENCH = {
-    "device": Key(NAME, "name of the device it comes from"),
-    "signal": Key(NAME, "key in the serial frame, or the messages of the CAN database"),
-    "drawbar_pull": Key(
-        Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fx", "{}"
-    ),
-    "load": Key(
-        Section(_calibration("", "N", "1.0"), _build_calibration), "calibration of fz", "{}"
-    ),
-    "torque": Key(
-        Section(_calibration("", "N*m", "1.0"), _build_calibration), "calibration of ty", "{}"
-    ),
-    "force_noise": Key(Quantity("N", above=LEAST_NOISE), "standard deviation of one force reading"),
-    "torque_noise": Key(
-        Quantity("N*m", above=LEAST_NOISE), "standard deviation of one torque reading"
-    ),
-    "max_force": Key(Quantity("N", above=0), "a larger force is quarantined", "10 kN"),
-    "max_torque": Key(Quantity("N*m", above=0), "a larger torque is quarantined", "1 kN*m"),
-}
-
-
-def _channels() -> Section:
-    """The channels by name; the optional ones may be absent."""
-    keys = {
-        name: Key(
-            Section(WRENCH | _timing(), Wrench) if name == "wrench" else _channel(name),
-            CHANNEL_DOCS[name],
-            NEEDED if name in REQUIRED else ABSENT,
-        )
-        for name in CHANNELS
-    }
-    return Section(keys, dict)
-
-
-CHANNEL_DOCS = {
-    "wheel_encoder": "counts of the wheel axle; physical: angle of the wheel",
-    "carriage_encoder": "counts of the carriage pulley; physical: angle of the pulley",
-    "sinkage_pot": "volts of the potentiometer; physical: sinkage z",
-    "motor_shunt": "volts of the current shunt's amplifier; physical: motor current",
-    "wrench": "force/torque sensor: fx drawbar pull, fz vertical load, ty torque about the axle",
-    "motor_temperature": "degrees Celsius of the winding",
-}
 
 # ---- rates, filter, logging, effects, run
 # --------------------------------------------------------------------------
@@ -398,6 +234,7 @@ class Effects:
             raise item.place.error("an unknown effect", "the name of an effect")
         if not entries(item, "a mapping of parameters"):
             raise item.place.error("no parameter", f"at least one of {', '.join(known)}")
+
         keys = {
             p: Key(UncertainQuantity(kind), "parameter", self._default(name, p))
             for p, kind in known.items()
@@ -435,7 +272,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "drive": Key(Section(DRIVE, Drive), "motor and gear, seen from the wheel axle"),
         "load": Key(Section(LOAD, _load), "the vertical load"),
         "devices": Key(devices, "serial ports and CAN buses, by names of your choice"),
-        "channels": Key(_channels(), "the sensors"),
+        "channels": Key(channels(), "the sensors"),
         "rates": Key(Section(RATES, _rates), "how often", "{}"),
         "filter": Key(Section(FILTER, FilterSettings), "the extended Kalman filter", "{}"),
         "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),

@@ -143,15 +143,18 @@ def _term(text: str) -> Unit:
     """One symbol with its power."""
     if text == ROOT_SECOND:
         return Unit(Fraction(1), {"s": (Fraction(1, 2), 0)})
+
     match = TERM.fullmatch(text)
     if not match:
         raise UnitError(f"unknown unit {text!r}")
+
     base = _symbol(match["symbol"])
     power = match["power"]
     if power is None:
         return base
     if "n" in power:
         return _symbolic(match["symbol"], int(match["plus"] or 0))
+
     whole = int(power)
     return Unit(
         base.factor**whole,

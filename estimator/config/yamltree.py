@@ -122,8 +122,10 @@ def read_text(path: Path, expected: str = "a configuration file") -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ConfigError(f"{path}: found {str(reason).lower()}; expected {expected}") from None
+
     if len(data) > MAX_BYTES:
         raise ConfigError(f"{path}: found more than {MAX_BYTES // 1024} KiB; expected {expected}")
+
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -242,6 +244,7 @@ class _Composer:
             raise here.error(f"more than {MAX_NODES} values", "a configuration")
         if depth > MAX_DEPTH:
             raise here.error(f"nesting deeper than {MAX_DEPTH}", "a configuration")
+
         anchor, tag = getattr(event, "anchor", None), getattr(event, "tag", None)
         if anchor is not None:
             mark = "*" if isinstance(event, yaml.AliasEvent) else "&"

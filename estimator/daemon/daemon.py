@@ -85,9 +85,11 @@ class Daemon:
         self.run = run
         self.readers = readers
         self.clock = clock
+
         self.writer = _writer(path, configuration, run)
         pipeline = Pipeline(settings_of_run(configuration.settings, run))
         self.loop = Loop(pipeline, source, LogSink(self.writer), clock, configuration.text)
+
         self._pulses = [
             Pulse("loop", lambda: self.loop.ticks, LOOP_PATIENCE),
             Pulse("writer", lambda: self.writer.beats, WRITER_PATIENCE),
@@ -96,6 +98,7 @@ class Daemon:
                 for reader in readers
             ),
         ]
+
         self.model = Watch()  # whether model and measurement agree
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
         self.rotation = Rotation()
@@ -178,9 +181,8 @@ class Daemon:
     def _run_loop(self) -> None:
         try:
             self.loop.run(self._loop_stop)
-        except (
-            Exception
-        ) as error:  # named, and the daemon stops: a dead loop must not look like a quiet one
+        # named, and the daemon stops: a dead loop must not look like a quiet one
+        except Exception as error:
             self.fail(f"the loop failed: {type(error).__name__}: {error}")
 
     def _check(self, loop: Thread) -> None:
@@ -193,6 +195,7 @@ class Daemon:
         if dead:
             self.fail(f"thread died: {', '.join(dead)}")
         self.health = silent(self._pulses)
+
         offset = self.clock.wall_offset()
         if abs(offset - self._wall_offset) > WALL_STEP:
             self.say(

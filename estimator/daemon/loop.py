@@ -82,6 +82,7 @@ class Loop:
     def run(self, stop: Event) -> None:
         """Tick at every deadline; one more tick after the stop takes what the readers left."""
         state = self._pipeline.start()
+
         deadline = self._clock.now() + self._period
         last = False
         while not last:
@@ -107,6 +108,7 @@ class Loop:
             log_dropped=dropped,
             wall_offset=self._clock.wall_offset(),
         )
+
         self._sink.put(readings, tick, loop)
         self._lateness.append(loop.lateness)
         self.latest = (tick, loop)

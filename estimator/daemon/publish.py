@@ -112,6 +112,7 @@ def _listener(path: Path) -> socket.socket:
     """A listening socket at `path`, in place of one that a dead daemon left."""
     if len(os.fsencode(path)) > LONGEST:
         raise PublishError(f"{path}: longer than {LONGEST} bytes, which a Unix socket cannot be")
+
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
     try:
         if path.is_socket():
@@ -124,6 +125,7 @@ def _listener(path: Path) -> socket.socket:
             "a file of this name is there" if error.errno == errno.EADDRINUSE else error.strerror
         )
         raise PublishError(f"{path}: cannot make the status socket: {reason}") from None
+
     return listener
 
 

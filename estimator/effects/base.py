@@ -158,7 +158,7 @@ class Effect:
         return law
 
     def load(self, load: Scalar, situation: Situation) -> Scalar:
-        """The load on the soil [N], from the weights on the axle."""
+        """The load on the soil (n,) [N], from the weights on the axle (n,) [N]."""
         return load
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
@@ -170,13 +170,13 @@ class Effect:
         return reaction
 
     def torque_loss(self, situation: Situation) -> Scalar:
-        """Torque consumed between motor and axle, seen from the axle [N·m], positive for forward
-        rotation.
+        """Torque consumed between motor and axle (n,), seen from the axle [N·m], positive for
+        forward rotation.
         """
         return 0.0
 
     def torque_factor(self, situation: Situation) -> Scalar:
-        """True over configured torque constant [-]."""
+        """True over configured torque constant (n,) [-]."""
         return 1.0
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
@@ -241,7 +241,7 @@ TURNING = 0.01  # [rad/s] width over which a friction torque changes sign
 
 
 def turning(wheel_speed: Scalar) -> Scalar:
-    """Sign of the rotation, −1 … 1, smooth over ±TURNING so that a standing wheel has none.
+    """Sign of the rotation (n,), −1 … 1, smooth over ±TURNING: a standing wheel has none.
 
     tanh instead of a jump: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30,
     1083-1138, section 3.

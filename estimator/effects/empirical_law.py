@@ -85,6 +85,7 @@ class EmpiricalLaw(Effect):
             self.torque_sinkage,
             self.torque_speed,
         )
+
         pull = (
             self.pull_constant,
             self.pull_slip,
@@ -92,6 +93,7 @@ class EmpiricalLaw(Effect):
             self.pull_sinkage,
             self.pull_speed,
         )
+
         depth = (
             self.depth_constant,
             self.depth_slip,
@@ -99,6 +101,7 @@ class EmpiricalLaw(Effect):
             self.depth_sinkage,
             self.depth_speed,
         )
+
         return replace(
             reaction,
             torque=reaction.torque + situation.direction * _sum(torque, terms),
@@ -113,6 +116,7 @@ class EmpiricalLaw(Effect):
         speed = np.clip(
             situation.radius * np.abs(situation.wheel_speed), self.speed_from, self.speed_to
         )
+
         return (
             1.0,
             slip,

@@ -33,6 +33,7 @@ def _find() -> dict[str, type[Effect]]:
                 f"estimator/effects/{module}.py: expected one subclass of Effect, found {len(own)}"
             )
         effects[module] = own[0]
+
     return effects
 
 
@@ -42,7 +43,9 @@ def make(name: str, values: Mapping[str, float]) -> Effect:
     """
     if name not in EFFECTS:
         raise ValueError(f"effects: no effect '{name}'; there are {', '.join(EFFECTS)}")
+
     effect = EFFECTS[name]
+
     known = {parameter.name: parameter for parameter in effect.parameters()}
     for key, value in values.items():
         if key not in known:
@@ -53,6 +56,7 @@ def make(name: str, values: Mapping[str, float]) -> Effect:
                 f"effects.{name}.{key}: {value:g} is outside"
                 f" {bounds.low:g} … {bounds.high:g} {bounds.unit}"
             )
+
     return effect(**values)
 
 

@@ -62,6 +62,7 @@ def _face(theta_1: Array, slip: Array) -> tuple[Array, Array]:
     5 × 5 nodes.
     """
     moment, force = np.zeros(np.shape(theta_1)), np.zeros(np.shape(theta_1))
+
     # V/r
     rolling = 1.0 - np.maximum(slip, 0.0) - np.minimum(slip, 0.0) / np.maximum(1.0 + slip, 0.05)
     top = np.cos(theta_1)
@@ -74,4 +75,5 @@ def _face(theta_1: Array, slip: Array) -> tuple[Array, Array]:
             area = weight * share * np.sin(theta_1) * depth
             moment = moment + area * (x * x - y * (rolling - y)) / sliding
             force = force - area * (rolling - y) / sliding
+
     return moment, force

@@ -61,6 +61,7 @@ def cross_covariances(
         p01 * h0 + p11 * h1 + p12 * h2 + dot(c1, g),
         p02 * h0 + p12 * h1 + p22 * h2 + dot(c2, g),
     )
+
     nuisance = [
         a * h0 + b * h1 + c * h2 + v * w
         for a, b, c, v, w in zip(c0, c1, c2, variances, g, strict=True)

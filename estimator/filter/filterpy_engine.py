@@ -43,12 +43,14 @@ class FilterpyEngine:
         ekf.x[:STATES], ekf.P[:STATES, :STATES] = estimate.x, estimate.P
         ekf.P[:STATES, STATES:] = estimate.cross
         ekf.P[STATES:, :STATES] = ekf.P[:STATES, STATES:].T
+
         H = np.array([h + g for h, g in zip(update.H, update.G, strict=True)])
         y, R = np.array(update.innovation), np.array(update.R)
         if consider_k or self._size > STATES:
             ekf.consider(y, H, R, slice(LN_K if consider_k else STATES, None))
         else:
             ekf.update(y, lambda _: H, lambda _: np.zeros_like(y), R=R)
+
         P = 0.5 * (ekf.P + ekf.P.T)
         return Estimate(
             tuple(ekf.x[:STATES].tolist()), _rows(P[:STATES, :STATES]), _rows(P[:STATES, STATES:])

@@ -54,6 +54,7 @@ class Measurement:
         """
         if not self._variants:
             return now
+
         here = _innovation(now, _predicted(self.model, estimate, now))
         columns = []
         for model, chain in self._variants:
@@ -64,6 +65,7 @@ class Measurement:
             )
             there = _innovation(moved, _predicted(model, estimate, moved))
             columns.append((here[0] - there[0], here[1] - there[1]))
+
         return now._replace(columns=tuple(columns))
 
     def predict(self, estimate: Estimate, now: WheelState) -> Prediction:
@@ -196,14 +198,17 @@ def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Predic
     the estimate.
     """
     ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
+
     prediction = model.predict(*ground, now.theta_1.value, now.slip.value, now.load.value)
     if now.here is not None:
         here = now.here
         prediction = Prediction(
             *(_by_estimate(quantity, estimate, here) for quantity in prediction)
         )
+
     if now.added is None:
         return prediction
+
     x = soil(estimate)
     return prediction._replace(
         torque=_plus(prediction.torque, now.added[:4], x),

@@ -72,6 +72,7 @@ class WheelModel:
         depth = radius * (cos(theta_m) - cos(theta_1.value))
         if depth <= 0.0:
             return Measured(0.0, 0.0)
+
         sigma_m = self._modulus * depth**soil.exponent.value
         shift = self._at(k, theta_1.value, slip)
         load = scalar.load(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift)
@@ -79,6 +80,7 @@ class WheelModel:
         relative = hypot(
             soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma
         )
+
         return Measured(load, abs(load) * relative)
 
 
@@ -90,6 +92,7 @@ def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
     )
     if not share and not shaping:
         return None
+
     soil = settings.soil
     prior = Soil(
         soil.cohesion.value,
@@ -98,4 +101,5 @@ def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
         soil.exponent.value,
         soil.pressure_sinkage.modulus(settings.wheel.width),
     )
+
     return IntegralShift(chain.wheel, prior, shaping, share)

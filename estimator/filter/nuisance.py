@@ -17,6 +17,7 @@ from math import hypot
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings, Uncertain
+from gritd.estimator.messages.readings import ENCODERS
 
 
 class Sensitivity(NamedTuple):
@@ -47,50 +48,61 @@ def nuisances(settings: Settings) -> tuple[Nuisance, ...]:
 
 
 def _all(settings: Settings) -> Iterator[Nuisance]:
-    channels, drive, wrench = settings.channels, settings.drive, settings.wrench
-    pot, shunt = channels["sinkage_pot"].calibration, channels["motor_shunt"].calibration
+    yield from _of_motion(settings)
+    yield from _of_torque(settings)
+    yield from _of_closed_forms(settings)
+    yield from _of_forces(settings)
+
+
+def _of_motion(settings: Settings) -> Iterator[Nuisance]:
+    """Sinkage and slip."""
+    pot = settings.channels["sinkage_pot"].calibration
     yield Nuisance("sinkage offset [m]", pot.offset.sigma, lambda s: _scaled(-1.0, s.by_sinkage))
     yield Nuisance(
         "sinkage scale [-]", _relative(pot.scale), lambda s: _scaled(-s.sinkage, s.by_sinkage)
     )
-    rates = (
-        _relative(channels[name].calibration.scale)
-        for name in ("wheel_encoder", "carriage_encoder")
-    )
-    yield Nuisance("speed ratio [-]", hypot(*rates), lambda s: _scaled(1.0 - s.slip, s.by_slip))
+
+    encoders = (settings.channels[name].calibration for name in ENCODERS)
+    ratio = hypot(*(_relative(calibration.scale) for calibration in encoders))
+    yield Nuisance("speed ratio [-]", ratio, lambda s: _scaled(1.0 - s.slip, s.by_slip))
+
+
+def _of_torque(settings: Settings) -> Iterator[Nuisance]:
+    """From the motor's current, or from the wrench."""
+    drive, wrench = settings.drive, settings.wrench
     if drive.torque_source == "motor_shunt":
-        gain = hypot(_relative(drive.torque_constant), _relative(shunt.scale))
-        yield Nuisance("torque scale [-]", gain, lambda s: (s.torque, 0.0))
-        yield Nuisance(
-            "torque offset [N·m]",
-            shunt.offset.sigma * drive.torque_constant.value,
-            lambda s: (1.0, 0.0),
-        )
+        shunt = settings.channels["motor_shunt"].calibration
+        scale = hypot(_relative(drive.torque_constant), _relative(shunt.scale))
+        offset = shunt.offset.sigma * drive.torque_constant.value
     elif wrench is not None:
-        yield Nuisance(
-            "torque scale [-]", _relative(wrench.torque.scale), lambda s: (s.torque, 0.0)
-        )
-        yield Nuisance("torque offset [N·m]", wrench.torque.offset.sigma, lambda s: (1.0, 0.0))
-    radius, model = settings.wheel.radius, settings.filter.model_sigma
-    yield Nuisance("closed forms, torque [-]", model, lambda s: (s.torque, 0.0))
-    yield Nuisance(
-        "closed forms, pull [-]", model, lambda s: (0.0, s.torque / radius)
-    )  # of the thrust, about T/r
-    if wrench is None:
-        yield Nuisance("load [N]", settings.load.nominal.sigma, lambda s: _scaled(-1.0, s.by_load))
+        scale, offset = _relative(wrench.torque.scale), wrench.torque.offset.sigma
+    else:
         return
-    yield Nuisance("load offset [N]", wrench.load.offset.sigma, lambda s: _scaled(-1.0, s.by_load))
-    yield Nuisance(
-        "load scale [-]", _relative(wrench.load.scale), lambda s: _scaled(-s.load, s.by_load)
-    )
-    yield Nuisance(
-        "drawbar pull offset [N]", wrench.drawbar_pull.offset.sigma, lambda _: (0.0, 1.0)
-    )
-    yield Nuisance(
-        "drawbar pull scale [-]",
-        _relative(wrench.drawbar_pull.scale),
-        lambda s: (0.0, s.drawbar_pull),
-    )
+
+    yield Nuisance("torque scale [-]", scale, lambda s: (s.torque, 0.0))
+    yield Nuisance("torque offset [N·m]", offset, lambda s: (1.0, 0.0))
+
+
+def _of_closed_forms(settings: Settings) -> Iterator[Nuisance]:
+    """What the closed forms miss: a share of the torque, and of the thrust, which is about T/r."""
+    radius, sigma = settings.wheel.radius, settings.filter.model_sigma
+    yield Nuisance("closed forms, torque [-]", sigma, lambda s: (s.torque, 0.0))
+    yield Nuisance("closed forms, pull [-]", sigma, lambda s: (0.0, s.torque / radius))
+
+
+def _of_forces(settings: Settings) -> Iterator[Nuisance]:
+    """Load and drawbar pull by the wrench; without one the weights."""
+    wrench = settings.wrench
+    if wrench is None:
+        sigma = settings.load.nominal.sigma
+        yield Nuisance("load [N]", sigma, lambda s: _scaled(-1.0, s.by_load))
+        return
+
+    load, pull = wrench.load, wrench.drawbar_pull
+    yield Nuisance("load offset [N]", load.offset.sigma, lambda s: _scaled(-1.0, s.by_load))
+    yield Nuisance("load scale [-]", _relative(load.scale), lambda s: _scaled(-s.load, s.by_load))
+    yield Nuisance("drawbar pull offset [N]", pull.offset.sigma, lambda _: (0.0, 1.0))
+    yield Nuisance("drawbar pull scale [-]", _relative(pull.scale), lambda s: (0.0, s.drawbar_pull))
 
 
 def _relative(quantity: Uncertain) -> float:

@@ -50,6 +50,7 @@ class PlainEngine:
             [p + e * k - d * value for p, k, value in zip(row, gain, m, strict=True)]
             for row, d, e in zip(estimate.P, gain, rest, strict=True)
         ]
+
         return Estimate(x, _symmetric(P), cross)
 
     def _two(self, estimate: Estimate, update: Update, states: int) -> Estimate:
@@ -79,6 +80,7 @@ class PlainEngine:
             ]
             for i, row in enumerate(estimate.P)
         ]
+
         return Estimate(x, _symmetric(P), cross)
 
 

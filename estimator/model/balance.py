@@ -42,10 +42,13 @@ class Balance(NamedTuple):
 
 
 def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER) -> Forces:
-    """Forces of Eqs. (8)-(10) under the contact law; θₘ and θ₂ keep their ratio to θ₁."""
+    """Forces of Eqs. (8)-(10) under the contact law at θ₁ (n,) [rad]; θₘ and θ₂ keep their ratio
+    to θ₁.
+    """
     soil, law = contact.soil, contact.law
     cohesion = soil.cohesion * law.strength * law.adhesion
     tan_phi = soil.tan_phi * law.strength * law.friction
+
     return forces(
         wheel,
         replace(soil, cohesion=cohesion, tan_phi=tan_phi),
@@ -73,6 +76,7 @@ def solve(
         for s in parts
     ]
     joined = [np.concatenate([part[field] for part in solved]) for field in (0, 2)]
+
     return Balance(
         joined[0],
         Forces(*map(np.concatenate, zip(*(part[1] for part in solved), strict=True))),
@@ -103,6 +107,7 @@ def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balanc
     left = np.arange(guess.size)  # samples not yet solved
     x = np.log(np.clip(guess, 10.0 * SHALLOWEST, DEEPEST))
     slope = np.broadcast_to(2.0 * np.asarray(contact.soil.exponent) + 1.0, x.shape)
+
     low, high = np.full(x.size, np.log(SHALLOWEST)), np.full(x.size, np.inf)
     before = np.full((2, x.size), np.nan)  # the last x and its miss
     for _ in range(ROUNDS):
@@ -124,6 +129,7 @@ def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balanc
             low[rest],
             high[rest],
         )
+
     return Balance(np.exp(solution), Forces(*kept), overloaded)
 
 

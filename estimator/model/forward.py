@@ -81,6 +81,7 @@ def simulate_arrays(
     situation, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
+
     return _response(situation, solved, reaction, motor_torque, effects)
 
 
@@ -122,8 +123,8 @@ def paper_contact(wheel: Wheel, situation: Situation) -> ContactLaw:
 
 
 def loaded(situation: Situation, wheel: Wheel, theta_1: Scalar, forces: Forces) -> Situation:
-    """The situation once the rim stresses are known; in reverse drawbar pull and torque change
-    sign.
+    """The situation once the rim stresses are known, θ₁ (n,) [rad]; in reverse drawbar pull and
+    torque change sign.
     """
     return replace(
         situation,
@@ -147,7 +148,7 @@ def react(situation: Situation, effects: Sequence[Effect]) -> Reaction:
 def drive(
     situation: Situation, effects: Sequence[Effect], torque_constant: float
 ) -> tuple[Situation, Scalar]:
-    """Motor current for the axle torque of the situation, and the motor torque behind it [N·m].
+    """Motor current for the axle torque of the situation, and motor torque behind it (n,) [N·m].
 
     The factor on the torque constant may depend on the current itself (heating), hence the rounds.
     """
@@ -165,7 +166,7 @@ def drive(
 
 
 def torque_factor(situation: Situation, effects: Sequence[Effect]) -> Scalar:
-    """True over configured torque constant, all effects together."""
+    """True over configured torque constant (n,), all effects together."""
     factor: Scalar = 1.0
     for effect in effects:
         factor = factor * effect.torque_factor(situation)
@@ -173,7 +174,7 @@ def torque_factor(situation: Situation, effects: Sequence[Effect]) -> Scalar:
 
 
 def axle_torque(situation: Situation, effects: Sequence[Effect], torque_constant: float) -> Scalar:
-    """Axle torque [N·m] behind the true current of the situation: the exact inverse of `drive`."""
+    """Axle torque (n,) [N·m] behind the situation's true current: the exact inverse of `drive`."""
     torque = torque_constant * torque_factor(situation, effects) * situation.current
     return reduce(lambda torque, e: torque - e.torque_loss(situation), effects, torque)
 

@@ -93,8 +93,8 @@ def estimates(settings: Settings, recording: Recording, engine: str = "plain") -
 
 
 def window_ends(ticks: Ints, length: int) -> Ints:
-    """Numbers of the ticks that end a window of `length` [ns]: the first, then each that comes a
-    window later.
+    """Numbers (m,) of the ticks (k,) [ns] that end a window of `length` [ns]: the first, then each
+    that comes a window later.
     """
     stamps, ends, following = ticks.tolist(), [], 0
     while following < len(stamps):

@@ -1,4 +1,4 @@
-"""Snapshots of a whole recording at once: what `sync.Sync` would say at chosen ticks, from
+"""Snapshots of a whole recording at once: what `Sync` would say at chosen ticks, from
 arrays.
 
 `Sync` takes one reading after another, because on line there is no other way. A recording has
@@ -152,6 +152,7 @@ class Motion(Series):
 
     @property
     def moves(self) -> Bools:
+        """Whether a speed differs from zero by more than its noise explains (m,)."""
         return np.abs(self.value) > 4.0 * self.sigma
 
 
@@ -289,7 +290,7 @@ class View:
         return Accepted(stamp, values, members(stamp, self.ends - self.length, self.ends))
 
     def _rebaselined(self, accepted: Accepted, max_rate: float) -> Ints:
-        """Counts with every jump taken out; see sync.SlopeWindow."""
+        """Counts with every jump taken out; see wheel.windows.SlopeWindow."""
         stamp, counts, _ = accepted
         step, elapsed = np.diff(counts), np.diff(stamp)
         opened = np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp[1:])]
@@ -311,7 +312,7 @@ class View:
         return shifted
 
     def stale(self) -> Ints:
-        """CHANNEL_BITS of channels whose last bytes came longer ago than they may, or never."""
+        """CHANNEL_BITS (m,) of channels last heard of longer ago than they may be, or never."""
         silence = {name: channel.stale_after for name, channel in self._settings.channels.items()}
         if self._settings.wrench is not None:
             silence["wrench"] = self._settings.wrench.stale_after
@@ -331,7 +332,7 @@ class View:
     def stuck(
         self, wheel: Motion, carriage: Motion, means: Mapping[str, Series], axes: Sequence[Series]
     ) -> Ints:
-        """CHANNEL_BITS of channels that stand still while others move; see sync.Sync."""
+        """CHANNEL_BITS (m,) of channels that stand still while others move; see sync.Sync."""
         bits = CHANNEL_BITS["wheel_encoder"] * (carriage.moves & (wheel.still >= STUCK_AFTER))
         moving = wheel.moves | carriage.moves
         for name in ANALOGUE:

@@ -4,7 +4,7 @@ offline.
 Two kinds of windows. `Members` are windows that may overlap, each with a beginning and an end of
 its
 own: what a tick looks back on. Blocks lie side by side between `edges`: a grid for a whole
-recording. On line `wheel/sync.py` makes the same means and slopes as `Members`, one reading
+recording. On line `wheel/windows.py` makes the same means and slopes as `Members`, one reading
 after another.
 """
 
@@ -77,7 +77,7 @@ class Lines(NamedTuple):
 
 
 def lines(members: Members, stamp: Ints, counts: Ints) -> Lines:
-    """Lines through the counts (n,) at the stamps (n,) [ns]; see sync.SlopeWindow."""
+    """Lines through the counts (n,) at the stamps (n,) [ns]; see wheel.windows.SlopeWindow."""
     reading, window = members.reading, members.window
     origin = counts[members.first]
     size = np.maximum(members.size, 1)
@@ -154,6 +154,7 @@ def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
         )
         calm = calm & _neighbours(same, reach).all(axis=1) & np.isfinite(far.rate)
         best = Slopes(*(np.where(calm, one, other) for one, other in zip(far, best, strict=True)))
+
     return best
 
 

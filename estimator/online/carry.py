@@ -67,6 +67,7 @@ def carry_over(pipeline: Pipeline, state: State, before: Settings) -> State:
     )
     if pipeline.settings.soil == before.soil:
         track = _kept(track, state.track)
+
     return replace(
         fresh, track=track, pull=state.pull, first=state.first, late=state.late, jumps=state.jumps
     )

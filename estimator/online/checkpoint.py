@@ -20,7 +20,8 @@ from typing import Any
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.online.pipeline import State
-from gritd.estimator.wheel.sync import Counters, MeanWindow, Sample, SlopeWindow, Sync
+from gritd.estimator.wheel.sync import Sync
+from gritd.estimator.wheel.windows import Counters, MeanWindow, Sample, SlopeWindow
 
 DEEPEST = 40  # levels of a state; a text of more is none
 _FIELDS = "__dataclass_fields__"
@@ -68,6 +69,7 @@ def _plain(value: Any) -> Any:
         return {"dict": {key: _plain(item) for key, item in value.items()}}
     if type(value).__name__ not in _kinds():
         raise TypeError(f"a state holds no {type(value).__name__}")
+
     return {type(value).__name__: [_plain(getattr(value, name)) for name in _field_names(value)]}
 
 

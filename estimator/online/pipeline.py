@@ -94,6 +94,7 @@ class Pipeline:
         flags = account.flags
         flags += Flag.LATE_READINGS * (after.late > before.late)
         flags += Flag.COUNTER_JUMP * (after.jumps > before.jumps)
+
         return Head(
             stamp=t,
             evaluated=snapshot.evaluated,

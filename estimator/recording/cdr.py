@@ -87,6 +87,7 @@ class Codec:
                     f"field {name!r}: type {kind!r} is not one of {TIME}, {STRING},"
                     f" {', '.join(CODES)}"
                 )
+
         self.names = tuple(name for name, _, _ in fields)
         self.kinds = tuple(kind for _, kind, _ in fields)
         self.flat = STRING not in self.kinds
@@ -128,6 +129,7 @@ class Codec:
         """
         if len(data) < 4 or data[:2] != b"\x00\x01":
             raise ValueError("not little-endian CDR")
+
         try:
             plain = (
                 list(self._struct.unpack_from(data)[1:])
@@ -136,8 +138,10 @@ class Codec:
             )
         except (struct.error, IndexError, UnicodeDecodeError) as error:
             raise ValueError(f"not a message of these fields: {error}") from None
+
         for i in self.times:  # left to right: each join shifts the rest into its final place
             plain[i : i + 2] = [plain[i] * BILLION + plain[i + 1]]
+
         return tuple(plain)
 
     def _decode_each(self, body: bytes) -> list[Any]:

@@ -101,6 +101,7 @@ def select(
     kind of others.
     """
     whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
+
     good = np.zeros(starts.shape, bool)
     complaints = []
     for channel, own in whole.groups.items():
@@ -113,6 +114,7 @@ def select(
                 else f"are of channel {channel}, undefined"
             )
             complaints.append(f"{bad} messages skipped: they {what}")
+
     return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
 
 
@@ -125,6 +127,7 @@ def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
         return True
     if not codec.flat:
         return [_decodes(codec, chunk.body(i)) for i in own.tolist()]
+
     excess = chunk.heads["length"][own].astype(np.int64) - (
         MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size
     )
@@ -133,6 +136,7 @@ def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
         chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")])
     )
     fits[fits] = kinds["kind"] == _CDR_LE
+
     return fits
 
 

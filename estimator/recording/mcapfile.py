@@ -148,6 +148,7 @@ class McapFile:
             raise RecordingError(
                 f"{path}: compression {compression!r} is not one of zstd, lz4, none"
             )
+
         self.path = path
         self._compression = "" if compression == "none" else compression
         self._compress = _compressor(compression)
@@ -160,12 +161,14 @@ class McapFile:
         self._length = 0
         self._crc = 0
         self._draft = path.with_name(f".{path.name}{DRAFT}")
+
         with reported(path, "create"):
             if os.path.lexists(path):
                 raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
             self._file = _created(self._draft)
             if mode is not None:
                 os.fchmod(self._file.fileno(), mode)
+
         with self._discarding():
             self._append(MAGIC + record_bytes(Header(PROFILE, library)))
 
@@ -220,6 +223,7 @@ class McapFile:
         """
         if len(starts) == 0:
             return
+
         heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
         preamble = b"".join(self._preambles[int(c)] for c in np.unique(heads["channel"]))
         content = preamble + messages
@@ -304,6 +308,7 @@ class McapFile:
         start = place = self._length + len(data_end)
         crc, offsets = 0, b""
         yield data_end
+
         for opcode, group in self._summary_groups():
             began = place
             for piece in group:
@@ -311,6 +316,7 @@ class McapFile:
                 crc, place = zlib.crc32(piece, crc), place + len(piece)
             if place > began:
                 offsets += record_bytes(SummaryOffset(opcode, began, place - began))
+
         footer = Footer(summary_start=start, summary_offset_start=place, summary_crc=0)
         crc = zlib.crc32(offsets + record_bytes(footer)[:-4], crc)
         yield offsets + record_bytes(Footer(start, place, crc)) + MAGIC

@@ -175,8 +175,10 @@ class _Encoder:
                 ENCAPSULATION,
                 *flat,
             )
+
         body = self._codec.encode(values)
         length = MESSAGE_HEAD.size - RECORD_HEAD.size + len(body)
+
         return (
             MESSAGE_HEAD.pack(Opcode.MESSAGE, length, self._channel, number, log_time, log_time)
             + body
@@ -203,4 +205,5 @@ def _define(file: McapFile, topics: Iterable[Topic]) -> dict[str, _Encoder]:
             )
         file.define(schema, Channel(number, topic.name, "cdr", {}, schema.id))
         encoders[topic.name] = _Encoder(number, topic)
+
     return encoders

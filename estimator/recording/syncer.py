@@ -78,7 +78,9 @@ class Syncer:
     def _sync(self) -> None:
         with self._lock:
             files, self._files = self._files, {}
+
         self._since = time.monotonic()
+
         for file in files.values():
             try:
                 sync(file)
@@ -87,4 +89,5 @@ class Syncer:
                     self._error = error
             finally:
                 os.close(file)
+
         self._since = 0.0

@@ -154,6 +154,7 @@ class WriterThread:
         if self._thread.ident is None:  # never started
             self._attempt(self._finish)
         left = wait_until(lambda: not self._thread.is_alive(), timeout)
+
         confirmed, path = self._sync.stop(left), self._parts.files[-1]
         if self._state == "closed" and not confirmed:
             self._error = f"{path}: the medium has not confirmed the last of it"
@@ -162,6 +163,7 @@ class WriterThread:
                 self._sync.raise_error(path)
             except RecordingError as error:
                 self._error = str(error)
+
         return self.status()
 
     def _run(self) -> None:
@@ -355,8 +357,10 @@ class _Parts:
         # at once: whoever tidies the folder must know which file is open
         self.files.append(path)
         new.adopt(old)
+
         with suppress(RecordingError):  # without an index it is readable still
             old.finish(self._sync)
+
         self._sync_name(path)
 
     def _sync_name(self, path: Path) -> None:

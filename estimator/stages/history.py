@@ -15,7 +15,7 @@ SMOOTHING = 0.2  # [s] span over which a measured speed or sinkage is averaged
 
 
 def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
-    """Moving average over `span` [s] of evenly sampled values; the window narrows at the ends."""
+    """Moving average (n,) over `span` [s] of evenly sampled values (n,); it narrows at the ends."""
     time, value = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
     if value.ndim == 0:
         return value
@@ -30,8 +30,8 @@ def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
 
 
 def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
-    """Time derivative of a measured quantity, smoothed over `span` [s]; 0 where there are not
-    enough instants.
+    """Time derivative (n,) [1/s] of a measured quantity (n,), smoothed over `span` [s]; 0 where
+    there are not enough instants.
     """
     if np.ndim(value) == 0 or np.size(value) < 3:
         return np.zeros(np.shape(value))
@@ -40,8 +40,8 @@ def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
 
 
 def delayed(time: Scalar, value: Scalar, delay: float) -> Scalar:
-    """The value `delay` [s] earlier, linear between samples, held before the first and after the
-    last.
+    """The value (n,) `delay` [s] earlier, linear between samples, held before the first and after
+    the last.
     """
     if delay == 0.0 or np.ndim(value) == 0:
         return value
@@ -49,8 +49,8 @@ def delayed(time: Scalar, value: Scalar, delay: float) -> Scalar:
 
 
 def relaxed(time: Scalar, drive: Scalar, duration: float, run: Scalar = 0.0) -> Array:
-    """y with duration · dy/dt = drive − y and y = 0 where a run begins; exact for a drive constant
-    between samples.
+    """y (n,) with duration [s] · dy/dt = drive − y and y = 0 where a run begins; exact for a drive
+    constant between samples.
     """
     begins = run_begins(run, np.size(time))
     share = -np.expm1(-np.diff(time, prepend=np.ravel(time)[:1]) / duration)
@@ -58,12 +58,12 @@ def relaxed(time: Scalar, drive: Scalar, duration: float, run: Scalar = 0.0) -> 
 
 
 def followed(target: Scalar, share: Array, run: Scalar = 0.0) -> Array:
-    """y that goes a share of the way to its target at each sample; a run begins at its target."""
+    """y (n,) that goes a share (n,) of the way to its target; a run begins at its target."""
     return _relax(np.asarray(target), np.where(run_begins(run, share.size), 1.0, share))
 
 
 def path_relaxed(path: Scalar, length: float, start: float = 1.0) -> Array:
-    """y with length · dy/ds = sign(dx) − y along the path length s of x."""
+    """y (n,) with length · dy/ds = sign(dx) − y along the path length s [m] of x (n,) [m]."""
     moved = np.diff(path, prepend=np.ravel(path)[:1])
     share = -np.expm1(-np.abs(moved) / length)
     return _relax(np.append(start, np.sign(moved)), np.append(1.0, share))[1:]

@@ -122,6 +122,7 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
     acceleration = motion.wheel_acceleration
     if acceleration is None:
         acceleration = rate_of(motion.time, motion.wheel_speed)
+
     return Situation(
         time=motion.time,
         wheel_angle=motion.wheel_angle,
@@ -142,7 +143,7 @@ def situation_of(motion: Motion, wheel: Wheel) -> Situation:
 
 
 def signed_slip(rim_speed: Scalar, carriage_speed: Scalar) -> tuple[Scalar, Scalar]:
-    """Slip i and direction of travel from rω and v [m/s].
+    """Slip i and direction of travel, each (n,), from rω and v [m/s].
 
     Along the direction of travel i = (rω − v)/rω when driving and (rω − v)/v when braking, so the
     faster of the two divides. Opposed motions saturate at ±1; at rest both results go to 0

@@ -214,7 +214,7 @@ def integrals(theta_1: Value, ratio: Value, f: Value, maths: Maths = NUMBERS) ->
 
 
 def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scalar) -> Array:
-    """Triangular σ [Pa], Eqs. (11) and (12)."""
+    """Triangular σ [Pa] at θ [rad], Eqs. (11) and (12); numbers, or arrays of one shape (n,)."""
     front, rear = (
         np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m),
         np.divide(theta, theta_m),
@@ -303,6 +303,7 @@ def _theta_1_derivative(
         bare.real, one.imag, hat.imag,
         one.real, hat.real, bare.imag,
     )  # fmt: skip
+
     return Integrals(*(value + theta_1 * slope for value, slope in zip(x, dx, strict=True))), dx
 
 

@@ -77,6 +77,7 @@ def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bo
     """
     alpha = 1.0 - lam
     lost = -maths.expm1(-eta * alpha)  # 1 − e^(−ηv) at the peak
+
     if turning:
         front, rear = (
             maths.turning(theta_1 * alpha, eta * alpha),
@@ -87,10 +88,12 @@ def kernels(maths: Maths, theta_1: Value, lam: Value, eta: Value, *, turning: bo
     else:
         front, rear = maths.straight(eta * alpha), maths.straight(eta * lam)
         phase = 1.0
+
     (m0, m1, m2), (d0, d1, d2) = front
     (r0, r1, r2), (e0, e1, e2) = rear
     n0, n1, n2 = r0 - e0, r1 - e1, r2 - e2
     kept = phase * (1.0 - lost)
+
     return Kernels(
         fold(lam, m0, m1, m2, phase * r0, phase * r1, phase * r2),
         fold(
@@ -185,10 +188,12 @@ class Numbers:
             return (
                 (mu, delta) if math.hypot(angle, eta) < SMALL else (mu, forward(mu, y, eta, step))
             )
+
         half = 0.5 * angle
         m0 = cmath.exp(-1j * half) * (math.sin(half) / half)
         m1 = (m0 - end) / y
         mu = (m0, m1, (2.0 * m1 - end) / y)
+
         return mu, forward(mu, y, eta, step)
 
 

@@ -7,7 +7,7 @@ that shape. Angles inside the contact carry the quadrature nodes on the axis bef
 ≤ θ₁ ≤ π/2, −1 < i ≤ 1.
 
 The pieces can be called apart: `contact` gives σ and τ at the nodes, `integrate` sums whatever
-    stands there.
+stands there.
 """
 
 from __future__ import annotations
@@ -58,25 +58,24 @@ class Forces(NamedTuple):
 
 
 def theta_m(wheel: Wheel, slip: Scalar, theta_1: Scalar) -> Scalar:
-    """Angle of maximum stress [rad], kept inside [0, θ₁]. Eq. (5)."""
+    """Angle of maximum stress (n,) [rad], kept inside [0, θ₁]. Eq. (5)."""
     return np.clip(wheel.c1 + wheel.c2 * slip, 0.0, 1.0) * theta_1
 
 
 def velocity_ratio(slip: Scalar) -> Array:
-    """Carriage speed over rim speed, v/(rω): 1 − i when driving, 1/(1 + i) when braking.
+    """Carriage speed over rim speed (n,), v/(rω): 1 − i when driving, 1/(1 + i) when braking.
 
     Slip is i = 1 − v/(rω) for i ≥ 0 and i = rω/v − 1 for i < 0. Both branches meet at i = 0 with
     the same slope.
     """
-    q = np.clip(
-        1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0
-    )  # 1 when driving, 1 + i when braking
+    # 1 when driving, 1 + i when braking
+    q = np.clip(1.0 + np.asarray(slip, dtype=float), LOCKED, 1.0)
     return np.asarray(1.0 - slip / q)
 
 
 def arc(theta_1: Scalar, theta: Scalar) -> Arc:
-    """Angles of a point θ on the rim; differences of sines and cosines keep their digits however
-    small the angles.
+    """Angles of points θ (2·order, n) on the rim, θ₁ (n,) [rad]; differences of sines and cosines
+    keep their digits however small the angles.
     """
     turned = np.subtract(theta_1, theta)
     u = np.tan(0.5 * turned)  # one tangent instead of sine and cosine: numpy vectorises it
@@ -95,15 +94,16 @@ def front_stress(wheel: Wheel, soil: Soil, front: Arc) -> Array:
 def rear_stress(
     wheel: Wheel, soil: Soil, theta_1: Scalar, theta_m: Scalar, theta: Scalar, theta_2: Scalar = 0.0
 ) -> Array:
-    """Normal stress σ [Pa] between θ₂ and θₘ, Eq. (4): the front zone's, mirrored and stretched
-    about θₘ.
+    """Normal stress σ [Pa] at θ (2·order, n) between θ₂ and θₘ, Eq. (4): the front zone's,
+    mirrored and stretched about θₘ.
     """
     mirrored = theta_1 - (theta - theta_2) * (theta_1 - theta_m) / (theta_m - theta_2)
     return front_stress(wheel, soil, arc(theta_1, mirrored))
 
 
 def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
-    """Shear displacement j [m] of the soil, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ − sin θ)].
+    """Shear displacement j (2·order, n) [m] of the soil, Eq. (6): r[θ₁ − θ − (1 − i)(sin θ₁ −
+    sin θ)].
 
     The rim moves past the soil at rω − v cos θ while θ falls from θ₁ at the rate ω, so j = r∫(1 −
     (v/rω) cos θ) dθ. Written with v/(rω) it holds for driving and braking; j < 0 where the soil has
@@ -165,12 +165,14 @@ def contact(
     sigma = np.concatenate(
         (sigma, sigma)
     )  # Eq. (4) gives the rear zone the same stress at the same s
+
     displacement = shear_displacement(wheel, slip, points)
     tau = shear_stress(soil, sigma, displacement, mobilisation)
     if np.any(side_slip):
         total = np.hypot(displacement, lateral_displacement(wheel, slip, points, side_slip))
         along = displacement / np.maximum(total, UNMOVED)
         tau = shear_stress(soil, sigma, total, mobilisation) * along
+
     return Contact(points, weight, sigma, tau)
 
 

@@ -162,6 +162,7 @@ def _integrals(theta_1: float, eta: float, lam: float) -> tuple[Integrals, Integ
     e2, h2, e2_s, h2_s = _transforms(both, turn(-both), turn(-both * alpha), lam)
     bare, one, hat = ahead * h1, ahead * (e1 - e2), ahead * (h1 - h2)
     share = -ahead * (eta / both)
+
     return (
         (1.0 - e0, 0.5 - h0, bare, one, hat),
         (-e0_s, -h0_s, turning * bare + ahead * h1_s, turning * one + ahead * (e1_s - e2_s),

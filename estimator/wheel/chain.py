@@ -108,6 +108,7 @@ class Chain:
             load,
             snapshot.axle_torque.value,
         )
+
         situation = replace(situation, carried=load)
         true = corrected(read, situation, self.effects)
         carried = self._carried(float(true.load), situation)
@@ -116,9 +117,11 @@ class Chain:
         situation = self._placed(
             replace(situation, torque=torque, drawbar_pull=true.drawbar_pull), wheel
         )
+
         felt = react(situation, self.effects)
         present = float(carried - (felt.load - carried))
         slip, load = self._answered(situation, present)
+
         return Undone(
             wheel_speed=float(situation.wheel_speed),
             travel_speed=(travel := _travel_speed(situation, slip)),
@@ -198,6 +201,7 @@ class Chain:
             tan_phi=context.tan_phi,
             shear_modulus=context.k,
         )
+
         return wheel, situation
 
     @staticmethod
@@ -288,6 +292,7 @@ def with_latencies(settings: Settings) -> Settings:
     }
     if not any(delays.values()):
         return settings
+
     names = {"sinkage_pot": "sinkage", "motor_shunt": "current"}
     channels = {
         name: replace(channel, latency=channel.latency + delays.get(names.get(name, ""), 0.0))
@@ -297,6 +302,7 @@ def with_latencies(settings: Settings) -> Settings:
         settings.wrench, latency=settings.wrench.latency + delays.get("force", 0.0)
     )
     horizon = settings.rates.horizon + max(0.0, *delays.values())
+
     return replace(
         settings, channels=channels, wrench=wrench, rates=replace(settings.rates, horizon=horizon)
     )

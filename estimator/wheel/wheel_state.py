@@ -68,6 +68,7 @@ def wheel_state(
     """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain accounted for."""
     if chain is None or context is None or not chain.acting or not snapshot.ready:
         return _plain(settings, snapshot)
+
     undone = chain.undo(snapshot, _load(settings, snapshot)[0].value, context)
     true = snapshot._replace(
         wheel_speed=snapshot.wheel_speed._replace(value=undone.wheel_speed),
@@ -76,6 +77,7 @@ def wheel_state(
         drawbar_pull=snapshot.drawbar_pull._replace(value=undone.drawbar_pull),
     )
     now = _plain(replace(settings, wheel=chain.wheel), true)
+
     return now._replace(
         torque=now.torque._replace(value=undone.torque),
         load=_doubted(now.load, undone.load, undone.load_doubt),
@@ -103,6 +105,7 @@ def _plain(settings: Settings, snapshot: Snapshot) -> WheelState:
     )
     angle = entry_angle(radius, snapshot.sinkage.value) if snapshot.ready else EntryAngle(0.0, 0.0)
     load, flags = _load(settings, snapshot)
+
     return WheelState(
         rim_speed=rim,
         travel_speed=travel,
@@ -177,6 +180,7 @@ def _travel(settings: Settings, now: WheelState) -> Status | None:
         return Status.STALL
     if now.slip.value < BRAKING_SLIP:
         return Status.BRAKING
+
     return None
 
 
@@ -197,6 +201,7 @@ def _steadiness(now: WheelState, before: WheelState | None) -> Status:
         )
     ):
         return Status.UNSTEADY
+
     return Status.TRACKING
 
 

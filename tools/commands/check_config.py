@@ -12,6 +12,7 @@ from gritd.config import packaged
 from gritd.drivers.build import build_decoder, build_link, used_devices
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.estimator.config import configuration as config
+from gritd.estimator.config.channels import UNITS
 from gritd.estimator.config.settings import (
     Calibration,
     Channel,
@@ -20,7 +21,6 @@ from gritd.estimator.config.settings import (
     Uncertain,
     Wrench,
 )
-from gritd.estimator.config.table import UNITS
 from gritd.estimator.messages.readings import ENCODERS
 from gritd.estimator.wheel import geometry
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser

@@ -1,0 +1,179 @@
+"""The readings of one channel on both sides of the horizon, and their mean or slope.
+
+This is the streaming form, in exact integers where a count is concerned. The same means and slopes
+from arrays stand in `offline/windows.py`; a test holds the two equal.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections import deque
+from dataclasses import dataclass, field
+from math import inf, sqrt
+from typing import NamedTuple
+
+from gritd.estimator.messages.readings import NS
+from gritd.estimator.wheel.geometry import slope_sigma
+
+
+class Sample(NamedTuple):
+    """A reading inside a channel's window: latency-corrected stamp [ns] and value."""
+
+    stamp: int
+    value: float
+
+
+@dataclass
+class Counters:
+    """Exact counts since the start of the run."""
+
+    late: int = 0
+    duplicates: int = 0
+    jumps: int = 0
+    invalid: int = 0
+
+
+class Slope(NamedTuple):
+    """A count over the window: mean [raw], rate [raw/s] and their standard deviations."""
+
+    mean: float
+    rate: float
+    rate_sigma: float
+
+
+class Mean(NamedTuple):
+    value: float  # raw
+    sigma: float  # raw
+
+
+@dataclass
+class Window:
+    """The readings of one channel, or of one axis of it, on both sides of the horizon.
+
+    noise: standard deviation of one reading [raw]; latency [ns]; length of the window [ns].
+    """
+
+    noise: float
+    latency: int
+    length: int
+    pending: list[Sample] = field(default_factory=list)  # newer than the horizon, sorted
+    inside: deque[Sample] = field(default_factory=deque)  # within the window, sorted
+    closed: int = -1  # end of the last window [ns]; nothing older is accepted
+    still_since: int = -1  # stamp since which the value has not changed [ns]
+    last: float = inf
+
+    def insert(self, stamp: int, value: float, counters: Counters) -> None:
+        """Sort one reading in; drop it as late or duplicate, and count that."""
+        sample = Sample(stamp - self.latency, value)
+        if sample.stamp <= self.closed:
+            same = self._has(self.inside, sample.stamp)
+            counters.duplicates += same
+            counters.late += not same
+        elif self.pending and sample.stamp <= self.pending[-1].stamp:
+            if self._has(self.pending, sample.stamp):
+                counters.duplicates += 1
+            else:
+                insort(self.pending, sample)
+        else:
+            self.pending.append(sample)
+
+    @staticmethod
+    def _has(samples: list[Sample] | deque[Sample], stamp: int) -> bool:
+        place = bisect_left(samples, stamp, key=lambda sample: sample.stamp)
+        return place < len(samples) and samples[place].stamp == stamp
+
+    def advance(self, end: int) -> None:
+        """Close the window at `end` [ns]: (end − length, end]."""
+        self.closed = end
+        pending, inside = self.pending, self.inside
+        ready = 0
+        while ready < len(pending) and pending[ready].stamp <= end:
+            self._enter(pending[ready])
+            ready += 1
+        del pending[:ready]
+        start = end - self.length
+        while inside and inside[0].stamp <= start:
+            self._leave(inside.popleft())
+
+    def _enter(self, sample: Sample) -> None:
+        if sample.value != self.last:
+            self.last, self.still_since = sample.value, sample.stamp
+        self.inside.append(sample)
+
+    def _leave(self, sample: Sample) -> None:
+        """A reading has left the window."""
+
+    def still_for(self) -> int:
+        """How long the value has not changed at all [ns]."""
+        return self.closed - self.still_since if self.inside else 0
+
+
+class MeanWindow(Window):
+    """Mean of an analogue channel over the window."""
+
+    def mean(self) -> Mean | None:
+        inside = self.inside
+        if not inside:
+            return None
+        count = len(inside)
+        return Mean(sum([sample.value for sample in inside]) / count, self.noise / sqrt(count))
+
+
+@dataclass
+class SlopeWindow(Window):
+    """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
+
+    max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken
+    out by a shift of the baseline, so neither position nor speed shows it.
+    """
+
+    max_rate: float = inf
+    counters: Counters = field(default_factory=Counters)
+    shift: int = 0  # counts added since the first jump
+    origin: tuple[int, int] = (
+        0,
+        0,
+    )  # stamp and count the sums are taken about: keeps the integers short
+    sums: tuple[int, int, int, int] = (0, 0, 0, 0)  # Σt, Σx, Σt², Σtx
+
+    def _enter(self, sample: Sample) -> None:
+        value = int(sample.value) + self.shift
+        if self.inside:
+            before = self.inside[-1]
+            step = value - int(before.value)
+            if abs(step) * NS > self.max_rate * (sample.stamp - before.stamp) + 2 * NS:
+                lost = step - self._expected_step(sample.stamp - before.stamp)
+                self.shift -= lost
+                value -= lost
+                self.counters.jumps += 1
+        else:
+            self.origin = (sample.stamp, value)
+            self.sums = (0, 0, 0, 0)
+
+        super()._enter(Sample(sample.stamp, value))
+        self._add(sample.stamp, value, 1)
+
+    def _expected_step(self, elapsed: int) -> int:
+        """Counts the window's own slope predicts for a time [ns]."""
+        slope = self.slope()
+        return round(slope.rate * elapsed / NS) if slope else 0
+
+    def _leave(self, sample: Sample) -> None:
+        self._add(sample.stamp, int(sample.value), -1)
+
+    def _add(self, stamp: int, value: int, sign: int) -> None:
+        t, x = stamp - self.origin[0], value - self.origin[1]
+        st, sx, stt, stx = self.sums
+        self.sums = (st + sign * t, sx + sign * x, stt + sign * t * t, stx + sign * t * x)
+
+    def slope(self) -> Slope | None:
+        """None until the readings span half the window: a slope over less is not the window's."""
+        count = len(self.inside)
+        if count < 3 or self.inside[-1].stamp - self.inside[0].stamp < self.length // 2:
+            return None
+        st, sx, stt, stx = self.sums
+        spread = count * stt - st * st  # count · Σ(t − t̄)² [ns²], exact
+        rate = (count * stx - st * sx) / spread * NS
+        moved = abs(self.inside[-1].value - self.inside[0].value)
+        sigma = slope_sigma(self.noise, sqrt(spread / count) / NS, count, moved)
+        return Slope(self.origin[1] + sx / count, rate, sigma)

@@ -141,12 +141,12 @@ class CanFraming:
 
         if wanted.device_time is not None:
             device_us = int(values[wanted.device_time.name])
+
+        # a multiplexed message carries some of its signals
         return [
             Frame(key, sequence, device_us, tuple(values[name] for name in names))
             for key, names in wanted.picks.items()
-            if all(
-                name in values for name in names
-            )  # a multiplexed message carries some of its signals
+            if all(name in values for name in names)
         ]
 
     def _want(self, key: str) -> None:

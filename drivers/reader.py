@@ -66,9 +66,8 @@ class Reader:
         self._last_received = 0
         self._bytes = self._readings = self._opened = 0
         self._new_session = False
-        self.beats = (
-            0  # moves while the thread is not held up in the hardware: the watchdog's pulse
-        )
+        # moves while the thread is not held up in the hardware: the watchdog's pulse
+        self.beats = 0
 
     @property
     def alive(self) -> bool:

@@ -12,12 +12,8 @@ import serial
 from gritd.drivers.errors import DeviceError
 from gritd.drivers.link import POLL, Chunk, Clock
 
-_FAILURES = (
-    OSError,
-    ValueError,
-    TypeError,
-    termios.error,
-)  # what pyserial lets through; SerialException is an OSError
+# what pyserial lets through; SerialException is an OSError
+_FAILURES = (OSError, ValueError, TypeError, termios.error)
 
 
 class SerialLink:

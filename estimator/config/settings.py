@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Literal
 
 from gritd.estimator.messages.run_info import RunInfo
@@ -59,9 +60,8 @@ class Channel:
     latency: float = 0.0  # [s] the sample is older than its stamp by this much
     stale_after: float = 0.04  # [s] silence after which the channel is STALE
     bits: int = 32  # width of an encoder's counter on the wire
-    max_rate: float = float(
-        "inf"
-    )  # fastest believable change [raw/s]; a faster one is a counter jump
+    # fastest believable change [raw/s]; a faster one is a counter jump
+    max_rate: float = inf
 
 
 @dataclass(frozen=True)
@@ -96,12 +96,10 @@ class Device:
     channel: str = "can0"
     bitrate: int = 500_000
     dbc: str = ""  # path, resolved against the configuration file's folder
-    options: dict[str, str | int | float | bool] = field(
-        default_factory=dict
-    )  # passed to python-can
-    signals: dict[str, dict[str, object]] = field(
-        default_factory=dict
-    )  # inline definitions instead of a DBC
+    # passed to python-can
+    options: dict[str, str | int | float | bool] = field(default_factory=dict)
+    # inline definitions instead of a DBC
+    signals: dict[str, dict[str, object]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

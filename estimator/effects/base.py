@@ -128,15 +128,12 @@ class Effect:
     # other effect -> key of EXPERIMENTS
     confusable_with: ClassVar[Mapping[str, str]] = told_apart()
     at_start: ClassVar[Recall] = (0.0,)  # what `remember` starts from
-    filter_only: ClassVar[bool] = (
-        False  # acts on the on-line filter alone; the forward model needs nothing of it
-    )
-    by_run: ClassVar[bool] = (
-        False  # looks along time, so a campaign's runs go through the forward model one by one
-    )
-    needs_sinkage: ClassVar[bool] = (
-        False  # the load stage needs a predicted sinkage: the balance is solved twice
-    )
+    # acts on the on-line filter alone; the forward model needs nothing of it
+    filter_only: ClassVar[bool] = False
+    # looks along time, so a campaign's runs go through the forward model one by one
+    by_run: ClassVar[bool] = False
+    # the load stage needs a predicted sinkage: the balance is solved twice
+    needs_sinkage: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]
@@ -234,9 +231,8 @@ def _parameter(
 
 
 RATE_REFERENCE = 0.02  # [m/s] speed at which the soil's parameters were found
-RATE_FLOOR = (
-    0.001  # [m/s] slower than this speed no longer matters, so a standing wheel stays finite
-)
+# [m/s] slower than this speed no longer matters, so a standing wheel stays finite
+RATE_FLOOR = 0.001
 TURNING = 0.01  # [rad/s] width over which a friction torque changes sign
 
 

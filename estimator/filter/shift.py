@@ -97,9 +97,8 @@ class IntegralShift:
         u, du = _unit(theta_1, THETA_1)
         v, dv = _unit(slip, SLIP)
         rows, columns = _polynomials(u, ORDERS[0], du), _polynomials(v, ORDERS[1], dv)
-        along_slip = (rows @ self._coefficients).reshape(
-            -1, DEGREE[1] + 1
-        )  # (2 for θ₁ · quantities, powers of i)
+        # (2 for θ₁ · quantities, powers of i)
+        along_slip = (rows @ self._coefficients).reshape(-1, DEGREE[1] + 1)
         by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
         tables = np.array((by_value[0], by_value[1], by_slip[0]))
         by_ln_k = tables[:, BY_LN_K]

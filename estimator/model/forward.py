@@ -30,9 +30,8 @@ from gritd.estimator.stages.situation import (
 from gritd.estimator.terramechanics.original import Forces
 from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 
-HEATING_ROUNDS = (
-    30  # at most; current and torque factor depend on each other and settle in a few rounds
-)
+# at most; current and torque factor depend on each other and settle in a few rounds
+HEATING_ROUNDS = 30
 
 
 @dataclass(frozen=True)

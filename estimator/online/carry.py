@@ -17,13 +17,8 @@ from gritd.estimator.filter.tracker import TrackState
 from gritd.estimator.online.pipeline import Pipeline, State
 
 _FIXED = ("testbed", "wheel", "pulley_radius", "devices", "rates", "place")
-_WIRING = (
-    "device",
-    "signal",
-    "bits",
-    "low",
-    "high",
-)  # of a channel: the reader's decoder was built with them
+# of a channel: the reader's decoder was built with them
+_WIRING = ("device", "signal", "bits", "low", "high")
 _WRENCH_WIRING = ("device", "signal", "max_force", "max_torque")
 
 

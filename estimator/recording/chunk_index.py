@@ -14,9 +14,8 @@ from collections.abc import Iterator, Sequence
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 
-_ROW = struct.Struct(
-    "<5QH"
-)  # gap before, length, first log_time since the last one, span, unpacked size; channels
+# gap before, length, first log_time since the last one, span, unpacked size; channels
+_ROW = struct.Struct("<5QH")
 _CHANNEL = struct.Struct("<HQ")  # its number, length of its MessageIndex record
 TOGETHER = 100  # records
 PIECE = 1024  # [bytes] unpacked at once

@@ -22,9 +22,8 @@ from gritd.estimator.recording.mcapfile import (
 )
 
 _PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
-_CDR_LE = (
-    0x0100  # the first two bytes of the encapsulation header, 00 01, as a little-endian number
-)
+# the first two bytes of the encapsulation header, 00 01, as a little-endian number
+_CDR_LE = 0x0100
 
 
 @dataclass(frozen=True)

@@ -36,12 +36,10 @@ class Motion:
     pass_number: Scalar = 1.0  # 1 on fresh soil
     start_position: Scalar = 0.0  # [m] on the bed, where the run begins
     temperature: Scalar | None = None  # of the motor housing [°C], where measured
-    wheel_acceleration: Scalar | None = (
-        None  # dω/dt [rad/s²]; differentiated from wheel_speed where absent
-    )
-    sinkage: Scalar | None = (
-        None  # measured [m]; only its direction is used, predicted where absent
-    )
+    # dω/dt [rad/s²]; differentiated from wheel_speed where absent
+    wheel_acceleration: Scalar | None = None
+    # measured [m]; only its direction is used, predicted where absent
+    sinkage: Scalar | None = None
     run: Scalar = 0.0  # number of the run, where several stand one after another
 
 
@@ -77,9 +75,8 @@ class Situation:
     drawbar_pull: Scalar = 0.0  # DP [N]
     # the drivetrain
     current: Scalar = 0.0  # [A]
-    memory: Mapping[str, Recall] = field(
-        default_factory=dict
-    )  # on line: what an effect remembers, by its name
+    # on line: what an effect remembers, by its name
+    memory: Mapping[str, Recall] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

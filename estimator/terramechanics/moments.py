@@ -31,9 +31,8 @@ from numpy.typing import NDArray
 from gritd.estimator.terramechanics.soil import Array
 
 SMALL = 0.25  # |y + η| below which the recurrence runs backward
-BACKWARD = (
-    11  # where it starts; what is left out there weighs SMALL¹¹/11! of it, below 1e-14, in μ₀
-)
+# where it starts; what is left out there weighs SMALL¹¹/11! of it, below 1e-14, in μ₀
+BACKWARD = 11
 
 # A real or complex number, or an array of them: the arithmetic below is the same for all.
 Value = Any

@@ -162,9 +162,7 @@ def contact(
     points = arc(theta_1, np.concatenate(np.broadcast_arrays(rear, front)))
     weight = np.concatenate(np.broadcast_arrays(ds * (peak - theta_2), ds * (theta_1 - peak)))
     sigma = front_stress(wheel, soil, Arc(*(field[order:] for field in points)))
-    sigma = np.concatenate(
-        (sigma, sigma)
-    )  # Eq. (4) gives the rear zone the same stress at the same s
+    sigma = np.concatenate((sigma, sigma))  # by Eq. (4) the rear zone's is the same at the same s
 
     displacement = shear_displacement(wheel, slip, points)
     tau = shear_stress(soil, sigma, displacement, mobilisation)

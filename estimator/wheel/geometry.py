@@ -14,9 +14,8 @@ from __future__ import annotations
 from math import acos, hypot, isnan, nan, sin, sqrt
 from typing import NamedTuple
 
-AT_REST = (
-    1e-12  # [m/s] a slower wheel has no slip to speak of, and its square is no number any more
-)
+# [m/s] a slower wheel has no slip to speak of, and its square is no number any more
+AT_REST = 1e-12
 SMALLEST_SINE = 1e-6  # below this θ₁ a sinkage error is not a small error of angle
 
 

@@ -28,9 +28,8 @@ STALL_SLIP = 0.95
 LOAD_SIGMA_MAX = 0.1  # likewise, relative error of the load
 SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
-STEADY = (
-    0.05  # relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
-)
+# relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
+STEADY = 0.05
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 REQUIRED_BITS = sum(CHANNEL_BITS[name] for name in REQUIRED)
 
@@ -49,9 +48,8 @@ class WheelState(NamedTuple):
     drawbar_pull: Measured  # [N], NaN ± 0 without the sensor
     flags: Flag
     added: Added | None = None  # what wheel and testbed effects add to the closed forms
-    here: Here | None = (
-        None  # the soil under this window from the estimated one; None where it is the same
-    )
+    # the soil under this window from the estimated one; None where it is the same
+    here: Here | None = None
     columns: tuple[
         tuple[float, float], ...
     ] = ()  # change of predicted (T, DP) with each uncertain effect parameter

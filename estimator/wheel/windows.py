@@ -130,10 +130,8 @@ class SlopeWindow(Window):
     max_rate: float = inf
     counters: Counters = field(default_factory=Counters)
     shift: int = 0  # counts added since the first jump
-    origin: tuple[int, int] = (
-        0,
-        0,
-    )  # stamp and count the sums are taken about: keeps the integers short
+    # stamp and count the sums are taken about: keeps the integers short
+    origin: tuple[int, int] = (0, 0)
     sums: tuple[int, int, int, int] = (0, 0, 0, 0)  # Σt, Σx, Σt², Σtx
 
     def _enter(self, sample: Sample) -> None:

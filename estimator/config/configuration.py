@@ -11,6 +11,8 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import yaml
+
 from gritd.estimator.config.effects import quantities
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.config.table import EffectSchema, table
@@ -18,6 +20,7 @@ from gritd.estimator.config.yamltree import (
     ConfigError,
     Place,
     compose,
+    dumped,
     is_ended,
     read_text,
     serialise,
@@ -62,6 +65,15 @@ def reload(path: str | os.PathLike[str]) -> Configuration:
     if not configuration.ended:
         raise Place(str(path), text.count("\n") + 1, "").error("no end", "'...' as the last line")
     return configuration
+
+
+def with_engine(configuration: Configuration, engine: str | None) -> Configuration:
+    """The configuration with another filter engine, in settings and text; None keeps its own."""
+    if engine in (None, configuration.settings.filter.engine):
+        return configuration
+    document = yaml.safe_load(configuration.text)
+    document["filter"]["engine"] = engine
+    return loads(dumped(document), configuration.source)
 
 
 def loads(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import cos, tan
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,12 @@ WHEEL = {
 SOIL = {
     "cohesion": Key(uncertain("Pa", low=0, high=1e6), "cohesion c, before the run"),
     "tan_phi": Key(
-        uncertain("", above=0, high=5), "tangent of the internal friction angle φ, before the run"
+        uncertain("", above=0, high=5),
+        "tangent of the internal friction angle φ, before the run",
+        ABSENT,
+    ),
+    "phi": Key(
+        uncertain("rad", above=0, high=1.373), "φ itself, instead of `tan_phi`: `30 deg`", ABSENT
     ),
     "shear_modulus": Key(uncertain("m", above=0, high=1), "shear deformation modulus k, Eq. (2)"),
     "exponent": Key(uncertain("", above=0, high=5), "sinkage exponent n"),
@@ -105,8 +111,11 @@ LOAD = {
 FORMS = {"bekker": ("k_c", "k_phi"), "reece": ("k1", "k2")}
 
 
-def _soil(exponent: Uncertain, **values: Any) -> SoilPrior:
-    """Raises Impossible unless the moduli stand there in exactly one form."""
+def _soil(
+    exponent: Uncertain, tan_phi: Uncertain | None, phi: Uncertain | None, **values: Any
+) -> SoilPrior:
+    """Raises Impossible unless friction and moduli stand there in exactly one form each."""
+    friction = _friction(tan_phi, phi)
     moduli = {form: [values.pop(name) for name in names] for form, names in FORMS.items()}
     begun = [form for form, pair in moduli.items() if pair != [None, None]]
     expected = "the moduli in one form, k_c and k_phi or k1 and k2"
@@ -121,7 +130,16 @@ def _soil(exponent: Uncertain, **values: Any) -> SoilPrior:
             raise Impossible(name, expected)
 
     law = PressureSinkage("bekker" if form == "bekker" else "reece", exponent.value, *moduli[form])
-    return SoilPrior(exponent=exponent, pressure_sinkage=law, **values)
+    return SoilPrior(exponent=exponent, tan_phi=friction, pressure_sinkage=law, **values)
+
+
+def _friction(tan_phi: Uncertain | None, phi: Uncertain | None) -> Uncertain:
+    """tan φ, from φ [rad] where that is given: d tan φ = dφ / cos² φ. Raises Impossible."""
+    if phi is None and tan_phi is not None:
+        return tan_phi
+    if phi is not None and tan_phi is None:
+        return Uncertain(tan(phi.value), phi.sigma / cos(phi.value) ** 2)
+    raise Impossible("tan_phi", "the friction in one form, tan_phi or phi")
 
 
 def _load(nominal: Uncertain, minimum: float) -> Load:

@@ -100,11 +100,17 @@ def parse(text: str, expected: str) -> float:
     number, suffix = split(text)
     given = unit(suffix)
     if given.dimension != unit(expected).dimension:
-        raise UnitError(
-            f"{suffix or 'no unit'} is not a unit of the same kind as"
-            f" {expected or 'a plain number'}"
-        )
+        raise UnitError(_mismatch(suffix, expected))
     return _scaled(number, given.factor)
+
+
+def _mismatch(suffix: str, expected: str) -> str:
+    """Why a quantity of the unit `suffix` is none of the unit `expected`; one may be empty."""
+    if not suffix:
+        return "its unit is missing"
+    if not expected:
+        return f"this quantity has no unit, not {suffix}"
+    return f"{suffix} is not a unit of the same kind as {expected}"
 
 
 def parse_any(text: str) -> float:

@@ -22,19 +22,14 @@ from gritd.estimator.recording.mcapfile import RecordingError
 
 
 class Rerun:
-    """`settings_of` gives the run's settings from a configuration; `engine` replaces the configured
-    one.
-    """
+    """`settings_of` gives the run's settings from a configuration."""
 
     def __init__(
-        self,
-        configuration: Configuration,
-        settings_of: Callable[[Configuration], Settings],
-        engine: str | None = None,
+        self, configuration: Configuration, settings_of: Callable[[Configuration], Settings]
     ) -> None:
-        self._settings_of, self._engine = settings_of, engine
+        self._settings_of = settings_of
         self._text = configuration.text
-        self.pipeline = Pipeline(settings_of(configuration), engine)
+        self.pipeline = Pipeline(settings_of(configuration))
         self._state = self.pipeline.start()
         self.known = True  # whether the state is the run's own, so that its ticks can be compared
 
@@ -46,17 +41,25 @@ class Rerun:
         """Messages are missing from here on: until the next checkpoint the state is anybody's."""
         self.known = False
 
-    def reconfigure(self, checkpoint: Checkpoint) -> None:
-        """Take over the checkpoint's configuration, as the daemon did. Raises RecordingError."""
+    def reconfigure(self, checkpoint: Checkpoint) -> bool:
+        """Take over the checkpoint's configuration, as the daemon did; whether it is another.
+        Raises RecordingError.
+        """
         if checkpoint.configuration == self._text:
-            return
+            return False
         configuration = _configuration(checkpoint)
         if configuration.text == self._text:  # as another version of gritd writes it
-            return
+            return False
+
         settings = self._settings_of(configuration)
-        before, self.pipeline = self.pipeline.settings, Pipeline(settings, self._engine)
+        before, self.pipeline = self.pipeline.settings, Pipeline(settings)
         self._state = carry_over(self.pipeline, self._state, before)
         self._text = configuration.text
+        return True
+
+    def checkpoint(self, stamp: int) -> Checkpoint:
+        """What a recording of this rerun holds where the configuration changed."""
+        return Checkpoint(stamp, self._text, encode(self._state))
 
     def resume(self, checkpoint: Checkpoint) -> bool:
         """Go on from the logged state; False if one that was known differs from it. Raises

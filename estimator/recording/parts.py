@@ -24,5 +24,8 @@ def parts(path: Path) -> list[Path]:
     """The recording and the files that continue it, in order, as far as they exist. What has a
     part's name and is no file is passed over, as the writer did.
     """
+    if not path.name:  # `.` or `/`: a folder, which no file continues
+        return [path]
+
     names = takewhile(os.path.lexists, (part_path(path, part) for part in count(1)))
     return [path, *(name for name in names if name.is_file())]

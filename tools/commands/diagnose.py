@@ -60,6 +60,9 @@ def main(argv: Sequence[str]) -> int:
         )
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     reference = references.given(arguments.reference, arguments.bed)
+    if not arguments.other_rig:
+        given = read_all([*arguments.files, *reference.files])
+        provenance.check_rig(given, configuration.settings, configuration.source)
     named = [*map(str, arguments.files)]
     if arguments.reference:
         named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
@@ -211,6 +214,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
     parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
+    parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="the configuration may be of another testbed than the recordings",
+    )
     parser.add_argument(
         "--reference",
         nargs="+",

@@ -28,13 +28,13 @@ def main(argv: Sequence[str]) -> int:
 
     arguments = parser.parse_args(argv)
     source: Path = arguments.file
-    target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
 
     try:
         recording = read(source, topics=())
     except RecordingError as error:
         raise unread(source, error) from None
 
+    target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
     try:
         recover(recording, vacant(target))
     except RecordingError as error:

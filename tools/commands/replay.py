@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gritd.estimator.config.configuration import Configuration, load, loads
-from gritd.estimator.config.settings import ENGINES, Settings, settings_of_run
+from gritd.estimator.config.configuration import Configuration, load, loads, with_engine
+from gritd.estimator.config.settings import ENGINES
 from gritd.estimator.messages.status import Status
-from gritd.estimator.messages.tick import TICK_FIELDS, TICK_NAMES, TickRow
+from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.offline.batch import estimates
-from gritd.estimator.offline.playback import RecordedTick, recorded_ticks, without_absent
-from gritd.estimator.offline.rerun import Rerun
+from gritd.estimator.offline.playback import Checkpoint
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
+from gritd.estimator.recording.topics import CHECKPOINT, TICK_TOPIC, TOPICS
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
-from gritd.tools.cli.progress import Progress
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
 from gritd.tools.commands.readiness import never_ready
 from gritd.tools.commands.replay_report import Rows, report
-
-SHOWN = 5  # differing fields named in full
+from gritd.tools.commands.replay_run import rerun_of, run_settings, ticks_of, told
+from gritd.tools.commands.replay_verify import verify
+from gritd.tools.diagnose.explain.provenance import check_rig
 
 
 def main(argv: Sequence[str]) -> int:
@@ -65,10 +63,12 @@ def _replay(path: Path, arguments: Namespace) -> int:
             print(visible(f"{recording.path}: {line}"), file=sys.stderr)
 
     damaged = any(recording.damage for recording in recordings)
-    configuration = _configuration(recordings[0], arguments.config)
+    configuration = _configuration(recordings[0], arguments)
+    if arguments.config and not arguments.other_rig:
+        check_rig(recordings, configuration.settings, arguments.config)
 
     if arguments.verify:
-        return max(_verify(recordings, configuration), DAMAGED if damaged else DONE)
+        return max(verify(recordings, configuration), DAMAGED if damaged else DONE)
 
     try:
         _recompute(recordings, configuration, arguments)
@@ -80,95 +80,18 @@ def _replay(path: Path, arguments: Namespace) -> int:
     return DAMAGED if damaged else DONE
 
 
-def _configuration(recording: Recording, path: str | None) -> Configuration:
-    """The given configuration, or the one the recording was made with."""
-    if path is not None:
-        return load(path)
+def _configuration(recording: Recording, arguments: Namespace) -> Configuration:
+    """The given configuration, or the one the recording was made with, with the engine that is
+    asked for.
+    """
+    if arguments.config is not None:
+        return with_engine(load(arguments.config), arguments.engine)
     if recording.config_yaml is None:
         raise CommandError(
             f"{recording.path}: holds no configuration; give one with --config", USAGE
         )
-    return loads(recording.config_yaml, f"{recording.path}: gritd.config")
-
-
-# --- verification ---
-
-
-def _verify(recordings: list[Recording], configuration: Configuration) -> int:
-    """Recompute every tick and compare it, bit for bit, with the logged one."""
-    first = recordings[0]
-    if not first.counts["/tick"]:
-        raise CommandError(f"{first.path}: holds no /tick to verify against", USAGE)
-    if first.topics["/tick"].names != TICK_TOPIC.names:
-        version = first.versions.get("gritd", "another version")
-        raise CommandError(
-            f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE
-        )
-
-    rerun = _rerun(recordings, configuration, None, as_it_ran=True)
-    if first.run.part:
-        rerun.lose()
-
-    differing = Differences()
-
-    for recording, tick in _ticks(recordings, configuration, "verifying"):
-        if recording.run.lost_before and recording is not differing.recording:
-            rerun.lose()
-        differing.recording = recording
-        if tick.checkpoint is not None:
-            differing.resumed(tick.stamp, rerun.resume(tick.checkpoint))
-
-        record = rerun.step(tick)
-        if tick.logged is not None and rerun.known:
-            differing.compare(tick.logged, record)
-        elif tick.logged is not None:
-            differing.unknown += 1
-
-    print(f"{first.path}: {differing.compared} ticks, {len(TICK_NAMES)} fields each: {differing}")
-
-    if not differing.compared:
-        raise CommandError(
-            f"{first.path}: its first state is not known; verify from the run's first part", USAGE
-        )
-    return FAILED if differing.ticks else DONE
-
-
-@dataclass
-class Differences:
-    """Fields of /tick that a replay did not reproduce."""
-
-    ticks: int = 0
-    compared: int = 0
-    unknown: int = 0  # after a loss, before the next checkpoint
-    recording: Recording | None = None  # the last part looked at
-    lines: list[str] = field(default_factory=list)
-
-    def resumed(self, stamp: int, same: bool) -> None:
-        """A checkpoint was met from the ticks before it."""
-        if not same:
-            self.ticks += 1
-            self.lines.append(
-                f"checkpoint before the tick at {stamp}: "
-                "not the state that the ticks before it lead to"
-            )
-
-    def compare(self, logged: TickRow, computed: TickRow) -> None:
-        self.compared += 1
-        encode = TICK_TOPIC.codec.encode
-        if encode(logged) == encode(computed):
-            return
-        self.ticks += 1
-        for name, was, now in zip(TICK_NAMES, logged, computed, strict=True):
-            if repr(was) != repr(now) and float(was) != float(now) and len(self.lines) < SHOWN:
-                self.lines.append(f"tick {self.compared}: {name}: logged {was!r}, replayed {now!r}")
-
-    def __str__(self) -> str:
-        if not self.ticks:
-            after = (
-                f"; {self.unknown} more after lost messages not comparable" if self.unknown else ""
-            )
-            return f"identical bit for bit{after}"
-        return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])
+    recorded = loads(recording.config_yaml, f"{recording.path}: gritd.config")
+    return with_engine(recorded, arguments.engine)
 
 
 # --- recomputation ---
@@ -186,11 +109,8 @@ def _recompute(
     if arguments.output or len(recordings) > 1 or reloaded:
         rows, each = _every_tick(recordings, configuration, arguments), "ticks"
     else:
-        settings = _told(first, configuration, first)
-        rows, each = (
-            estimates(settings, first, arguments.engine or settings.filter.engine),
-            "windows",
-        )
+        settings = told(first, configuration, first)
+        rows, each = estimates(settings, first, settings.filter.engine), "windows"
 
     if not len(rows):
         raise CommandError(f"{first.path}: holds no readings", DAMAGED)
@@ -198,7 +118,7 @@ def _recompute(
     print(report(first.path, rows, each))
     if np.all(rows["status"] == Status.STARTING):
         print(
-            f"{first.path}: {never_ready(_settings(first, configuration, first), first)}",
+            f"{first.path}: {never_ready(run_settings(first, configuration, first), first)}",
             file=sys.stderr,
         )
 
@@ -211,11 +131,14 @@ def _every_tick(
     writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
 
     records = []
-    rerun = _rerun(recordings, configuration, arguments.engine, as_it_ran=False)
+    rerun = rerun_of(recordings, configuration, as_it_ran=False)
 
-    for _, tick in _ticks(recordings, configuration, "replaying"):
+    for _, tick in ticks_of(recordings, configuration, "replaying"):
         if tick.checkpoint is not None and not arguments.config:
-            rerun.reconfigure(tick.checkpoint)
+            stamp = tick.checkpoint.stamp
+            changed = rerun.reconfigure(_with_engine(tick.checkpoint, arguments.engine))
+            if changed and writer is not None:
+                writer.message(CHECKPOINT, stamp, rerun.checkpoint(stamp))
         record = rerun.step(tick)
         records.append(record)
         if writer is not None:
@@ -232,51 +155,20 @@ def _every_tick(
     )
 
 
+def _with_engine(checkpoint: Checkpoint, engine: str | None) -> Checkpoint:
+    """The checkpoint as a run with this engine would have logged it."""
+    if engine is None:
+        return checkpoint
+    configuration = with_engine(loads(checkpoint.configuration, CHECKPOINT), engine)
+    return checkpoint._replace(configuration=configuration.text)
+
+
 def _target(arguments: Namespace, path: Path) -> Path:
     """The output file; a folder where there are several recordings."""
     output = Path(arguments.output)
     if len(arguments.files) > 1 and not output.is_dir():
         raise CommandError(f"{output}: several recordings need a folder to be written to", USAGE)
     return output / path.name if output.is_dir() else output
-
-
-def _rerun(
-    recordings: list[Recording], configuration: Configuration, engine: str | None, as_it_ran: bool
-) -> Rerun:
-    """as_it_ran: the recording's own ticks again; a force/torque sensor that never spoke was
-    silent, not absent.
-    """
-    first = recordings[0]
-    recorded = first if not as_it_ran or not first.counts["/tick"] else None
-    _told(first, configuration, recorded)
-    return Rerun(configuration, lambda given: _settings(first, given, recorded), engine)
-
-
-def _told(first: Recording, configuration: Configuration, recorded: Recording | None) -> Settings:
-    """The settings of a run; says so where they do without a configured sensor."""
-    settings = _settings(first, configuration, recorded)
-    if settings.wrench is None and configuration.settings.wrench is not None:
-        print(f"{first.path}: no /raw/wrench: replayed with the configured load", file=sys.stderr)
-    return settings
-
-
-def _settings(first: Recording, given: Configuration, recorded: Recording | None) -> Settings:
-    """Settings of the run, without the sensors that `recorded` does not hold."""
-    return settings_of_run(
-        without_absent(given.settings, recorded) if recorded else given.settings, first.run
-    )
-
-
-def _ticks(
-    recordings: list[Recording], configuration: Configuration, what: str
-) -> Iterator[tuple[Recording, RecordedTick]]:
-    """Every tick of a run, its parts one after the other."""
-    total = sum(recording.counts["/tick"] for recording in recordings)
-    with Progress(f"{what} {recordings[0].path.name}", total) as progress:
-        for recording in recordings:
-            for tick in recorded_ticks(recording, configuration.settings.rates.tick):
-                progress.advance()
-                yield recording, tick
 
 
 def _parser() -> Parser:
@@ -288,6 +180,11 @@ def _parser() -> Parser:
         "--config",
         metavar="F",
         help="recompute with this configuration instead of the recorded one",
+    )
+    parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="F may be of another testbed than the recordings",
     )
     parser.add_argument(
         "--verify", action="store_true", help="compare every field of every /tick, bit for bit"

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from math import tan
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 SOIL_VALUES = {  # with the bounds that they have in a configuration
     "cohesion": Quantity("Pa", low=0.0, high=1e6),
     "tan_phi": Quantity("", above=0.0, high=5.0),
+    "phi": Quantity("rad", above=0.0, high=1.373),
     "shear_modulus": Quantity("m", above=0.0, high=1.0),
     "exponent": Quantity("", above=0.0, high=5.0),
     "modulus_factor": Quantity("", above=0.0, high=100.0),
@@ -218,6 +220,9 @@ def _soil_changes(given: Sequence[str]) -> dict[str, float]:
         changes[name] = _quantity(f"--soil {text}", value, kind.unit or "")
         if not kind.holds(changes[name]):
             raise CommandError(f"--soil {text}: found {value}; expected {kind.expected}", USAGE)
+
+    if "phi" in changes:
+        changes["tan_phi"] = tan(changes.pop("phi"))
     return changes
 
 

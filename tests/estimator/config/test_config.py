@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 import tracemalloc
@@ -490,3 +491,14 @@ def test_an_effect_needs_only_what_differs_from_the_library():
     assert config.loads(read.text, "effective").settings == read.settings
     with pytest.raises(config.ConfigError, match="at least one of"):
         config.loads(MINIMAL + "\neffects: {grousers: {}}\n", "rig.yaml")
+
+
+def test_the_friction_angle_stands_for_its_tangent() -> None:
+    text = changed("tan_phi: 0.6", "phi: {value: 30 deg, sigma: 3 deg}")
+    given = config.loads(text, "c").settings.soil.tan_phi
+    assert given.value == pytest.approx(math.tan(math.pi / 6))
+    assert given.sigma == pytest.approx(math.radians(3.0) / 0.75)
+
+    for both in ("phi: 30 deg\n  tan_phi: 0.6", "# none"):
+        with pytest.raises(ConfigError, match=r"soil\.tan_phi: found .*tan_phi or phi"):
+            config.loads(changed("tan_phi: 0.6", both), "c")

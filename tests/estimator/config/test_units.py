@@ -101,3 +101,16 @@ def test_any_text_is_a_number_or_a_unit_error(text: str) -> None:
 @given(st.sampled_from(sorted(units.SYMBOLS)), st.sampled_from(sorted(units.SYMBOLS)))
 def test_quotient_undoes_product(left: str, right: str) -> None:
     assert units.unit(f"{left}*{right}/{right}") == units.unit(left)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "words"),
+    [
+        ("72", "m", "its unit is missing"),
+        ("72 N", "m", "N is not a unit of the same kind as m"),
+        ("1 Pa", "", "this quantity has no unit, not Pa"),
+    ],
+)
+def test_what_is_wrong_with_a_unit_is_said(text: str, unit: str, words: str) -> None:
+    with pytest.raises(units.UnitError, match=f"^{words}$"):
+        units.parse(text, unit)

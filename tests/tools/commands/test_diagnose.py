@@ -99,3 +99,29 @@ def test_another_testbed_than_the_recorded_one_is_said(run: Path) -> None:
     assert provenance.remarks(recordings, other) == [
         "run.mcap was recorded with wheel.radius 0.072 (configuration: 0.08)."
     ]
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "named"),
+    [
+        ("radius: 72 mm", "radius: 90 mm", "wheel.radius 0.072 (configuration: 0.09)"),
+        ("pulley_radius: 20 mm", "pulley_radius: 21 mm", "pulley_radius 0.02"),
+    ],
+)
+def test_the_configuration_of_another_testbed_is_refused(
+    run: Path, tmp_path: Path, was: str, becomes: str, named: str
+) -> None:
+    """Of another wheel, or of another name with other numbers; a mended calibration is none."""
+    text = packaged().read_text(encoding="utf-8").replace(was, becomes, 1)
+    if "pulley" in was:
+        text = text.replace("testbed: single-wheel testbed", "testbed: the other one", 1)
+    (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
+    (tmp_path / "other.yaml").write_text(text, encoding="utf-8")
+
+    line, code = said(run, "--config", tmp_path / "other.yaml")
+    assert named in line and "--other-rig" in line and code == USAGE
+
+    mended = config.loads(
+        packaged().read_text(encoding="utf-8").replace("25 mm/V", "30 mm/V", 1), "", tmp_path
+    )
+    provenance.check_rig(read_all([run]), mended.settings, "mended.yaml")

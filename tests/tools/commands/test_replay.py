@@ -221,3 +221,49 @@ def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, confi
         "wheel_encoder has 60 readings, never three over half a window of 100 ms; "
         "motor_shunt has no readings" in said
     )
+
+
+def test_a_folder_is_no_recording_however_it_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for command in ("replay", "recover"):
+        assert cli.main([command, "."]) == 3
+        said = capsys.readouterr().err
+        assert said.startswith("gritd: .: ") and "internal error" not in said
+
+
+def test_missing_messages_are_counted_and_no_difference(recorded, tmp_path, capsys):
+    """After a gap the state is not known: what stands before it is compared, the rest is not."""
+    damaged, mended = tmp_path / "damaged.mcap", tmp_path / "mended.mcap"
+    data = bytearray(recorded.read_bytes())
+    data[data.index(b"\x28\xb5\x2f\xfd", len(data) // 2) + 100] ^= 1  # inside a zstd frame
+    damaged.write_bytes(data)
+    assert cli.main(["recover", str(damaged), "-o", str(mended)]) == 3
+
+    for path in (damaged, mended):
+        assert cli.main(["replay", str(path), "--verify"]) == 3
+        said = capsys.readouterr().out
+        lost = sum(read(recorded).counts.values()) - sum(read(mended).counts.values())
+        assert f"{path}: {lost} messages are missing" in said
+        assert "identical bit for bit; " in said and "not comparable" in said
+        assert "differ" not in said
+
+
+def test_another_engine_stands_in_the_recording_it_made(recorded, tmp_path, capsys):
+    out = tmp_path / "plain.mcap"
+    assert replay.main([str(recorded), "--engine", "plain", "-o", str(out)]) == 0
+    assert "engine: plain" in str(read(out).config_yaml)
+    assert replay.main([str(out), "--verify"]) == 0
+    assert "identical bit for bit" in capsys.readouterr().out
+
+
+def test_a_replay_with_the_configuration_of_another_wheel_is_refused(recorded, tmp_path, capsys):
+    other = tmp_path / "other.yaml"
+    other.write_text(packaged().read_text().replace("radius: 72 mm", "radius: 90 mm"))
+    (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
+    command = ["replay", str(recorded), "--config", str(other)]
+
+    assert cli.main(command) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "wheel.radius 0.072 (configuration: 0.09)" in said
+
+    assert cli.main([*command, "--other-rig"]) == 0

@@ -3,7 +3,7 @@ with.
 
 The wrong file after `--config` makes a mismatch that no physics explains. A recording holds the
 configuration it was made with, so the difference can be said; it may be meant, when a calibration
-was mended afterwards.
+was mended afterwards. The configuration of another testbed is refused.
 """
 
 from __future__ import annotations
@@ -15,14 +15,41 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.recording.salvage import Recording
+from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.diagnose.tuning import TUNING
+
+WHEEL = "wheel."  # begins the keys of what no calibration mends
+
+
+def check_rig(recordings: Sequence[Recording], settings: Settings, source: str) -> None:
+    """Raises CommandError where a recording was made on another testbed than that of the
+    configuration `source`: one of another name and other numbers, or of another wheel.
+    """
+    for recording in recordings:
+        recorded = _recorded(recording)
+        if recorded is not None and (found := _other_rig(recorded, settings)):
+            raise CommandError(
+                f"{source}: another testbed than that of {recording.path.name}: {found}; "
+                "expected its own configuration, or --other-rig where it is meant",
+                USAGE,
+            )
+
+
+def _other_rig(recorded: Settings, settings: Settings) -> str:
+    """What tells two testbeds apart; '' where nothing does."""
+    named = recorded.testbed != settings.testbed
+    limit = TUNING.explain.same_value if named else TUNING.explain.same_wheel
+    differing = [text for text in _differences(recorded, settings, limit) if named or WHEEL in text]
+    name = [f"testbed {recorded.testbed!r} (configuration: {settings.testbed!r})"] if named else []
+    return ", ".join([*name, *differing]) if differing else ""
 
 
 def remarks(recordings: Sequence[Recording], settings: Settings) -> list[str]:
     """A sentence for every set of differences that some of the recordings share."""
     shared: dict[tuple[str, ...], list[str]] = {}
     for recording in recordings:
-        if differing := tuple(_differences(recording, settings)):
+        recorded = _recorded(recording) or settings
+        if differing := tuple(_differences(recorded, settings, TUNING.explain.same_value)):
             shared.setdefault(differing, []).append(recording.path.name)
     return [
         f"{_listed(names)} recorded with {', '.join(differing)}."
@@ -30,21 +57,22 @@ def remarks(recordings: Sequence[Recording], settings: Settings) -> list[str]:
     ]
 
 
-def _differences(recording: Recording, settings: Settings) -> Iterator[str]:
+def _recorded(recording: Recording) -> Settings | None:
+    """The settings that a recording was made with; None where it does not tell them."""
     if recording.config_yaml is None:
-        return
+        return None
     try:
-        recorded = dict(_values(config.loads(recording.config_yaml, str(recording.path)).settings))
+        return config.loads(recording.config_yaml, str(recording.path)).settings
     except ConfigError:
-        return  # of another version: nothing to compare
+        return None  # of another version: nothing to compare
+
+
+def _differences(recorded: Settings, settings: Settings, limit: float) -> Iterator[str]:
+    """What differs by more than `limit`, a share, in words."""
+    values = dict(_values(recorded))
     for key, value in _values(settings):
-        before = recorded.get(key, value)
-        if not math.isclose(
-            before,
-            value,
-            rel_tol=TUNING.explain.same_value,
-            abs_tol=TUNING.explain.same_value * abs(before),
-        ):
+        before = values.get(key, value)
+        if not math.isclose(before, value, rel_tol=limit, abs_tol=limit * abs(before)):
             yield f"{key} {before:.6g} (configuration: {value:.6g})"
 
 

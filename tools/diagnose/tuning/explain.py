@@ -86,6 +86,7 @@ class Explain:
 
     # --- provenance.py ---
     same_value: float = tuned(1e-6, "-", "relative difference below which values are the same")
+    same_wheel: float = tuned(0.1, "-", "of radius and width: more is another wheel, no correction")
 
     # --- remainder.py ---
     remainder_bends: int = tuned(2, "powers", "of a covariate that describe a remainder")

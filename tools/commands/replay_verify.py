@@ -1,0 +1,140 @@
+"""`gritd replay --verify`: every tick of a recording computed again and compared with the logged
+one, bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.messages.tick import TICK_NAMES, TickRow
+from gritd.estimator.offline.playback import RecordedTick
+from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.recording.topics import TICK_TOPIC
+from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError
+from gritd.tools.commands.replay_run import rerun_of, ticks_of
+
+SHOWN = 5  # differing fields named in full
+SEQUENCE, CONSUMED = TICK_NAMES.index("sequence"), TICK_NAMES.index("consumed")
+
+
+def verify(recordings: list[Recording], configuration: Configuration) -> int:
+    """Exit code: 0 where every tick is the same; 1 where one differs; 3 where messages are
+    missing, so that not all can be compared. Raises CommandError.
+    """
+    first = recordings[0]
+    _check(first)
+
+    rerun = rerun_of(recordings, configuration, as_it_ran=True)
+    if first.run.part:
+        rerun.lose()
+
+    found, gaps = Differences(), Gaps()
+
+    for recording, tick in ticks_of(recordings, configuration, "verifying"):
+        if gaps.before(recording, tick):
+            rerun.lose()
+        if tick.checkpoint is not None:
+            found.resumed(tick.stamp, rerun.resume(tick.checkpoint))
+
+        record = rerun.step(tick)
+        if tick.logged is not None and rerun.known:
+            found.compare(tick.logged, record)
+        elif tick.logged is not None:
+            found.unknown += 1
+
+    print(f"{first.path}: {found.compared} ticks, {len(TICK_NAMES)} fields each: {found}")
+    return _code(recordings, found)
+
+
+def _check(first: Recording) -> None:
+    """Raises CommandError where there is nothing to compare with."""
+    if not first.counts["/tick"]:
+        raise CommandError(f"{first.path}: holds no /tick to verify against", USAGE)
+    if first.topics["/tick"].names != TICK_TOPIC.names:
+        version = first.versions.get("gritd", "another version")
+        raise CommandError(
+            f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE
+        )
+
+
+def _code(recordings: list[Recording], found: Differences) -> int:
+    """The exit code; says what is missing. Raises CommandError where nothing was compared."""
+    missing = [(recording.path, lost) for recording in recordings if (lost := lost_of(recording))]
+    for path, lost in missing:
+        print(f"{path}: {lost} messages are missing")
+
+    if not found.compared and not missing:
+        raise CommandError(
+            f"{recordings[0].path}: its first state is not known; verify from the run's first part",
+            USAGE,
+        )
+    return FAILED if found.ticks else DAMAGED if missing else DONE
+
+
+def lost_of(recording: Recording) -> int:
+    """Messages known to be missing from a recording, what an earlier recovery noted included."""
+    return recording.lost + int(recording.recovered.get("lost", "0"))
+
+
+class Gaps:
+    """Where a recording lacks messages: in it, if some are known to be missing, and before a part.
+
+    A tick says how many readings it consumed and which number it has. Where the file holds another
+    number of readings before it, or a number is left out, something is missing.
+    """
+
+    def __init__(self) -> None:
+        self._recording: Recording | None = None
+        self._sequence = -1  # of the last tick
+
+    def before(self, recording: Recording, tick: RecordedTick) -> bool:
+        """Whether messages are missing between the last tick and this one."""
+        begins, self._recording = recording is not self._recording, recording
+        gap = begins and recording.run.lost_before > 0
+
+        if tick.logged is not None:
+            left_out = tick.logged[SEQUENCE] != self._sequence + 1
+            incomplete = tick.logged[CONSUMED] != len(tick.readings)
+            gap |= lost_of(recording) > 0 and (left_out or incomplete)
+            self._sequence = tick.logged[SEQUENCE]
+
+        return gap
+
+
+@dataclass
+class Differences:
+    """Fields of /tick that a replay did not reproduce."""
+
+    ticks: int = 0
+    compared: int = 0
+    unknown: int = 0  # after a loss, before the next checkpoint
+    lines: list[str] = field(default_factory=list)
+
+    def resumed(self, stamp: int, same: bool) -> None:
+        """A checkpoint was met from the ticks before it."""
+        if not same:
+            self.ticks += 1
+            self.lines.append(
+                f"checkpoint before the tick at {stamp}: "
+                "not the state that the ticks before it lead to"
+            )
+
+    def compare(self, logged: TickRow, computed: TickRow) -> None:
+        """Count a tick; name what differs in it."""
+        self.compared += 1
+        encode = TICK_TOPIC.codec.encode
+        if encode(logged) == encode(computed):
+            return
+        self.ticks += 1
+        for name, was, now in zip(TICK_NAMES, logged, computed, strict=True):
+            if repr(was) != repr(now) and float(was) != float(now) and len(self.lines) < SHOWN:
+                self.lines.append(f"tick {self.compared}: {name}: logged {was!r}, replayed {now!r}")
+
+    def __str__(self) -> str:
+        if not self.ticks:
+            after = (
+                f"; {self.unknown} more after lost messages not comparable" if self.unknown else ""
+            )
+            return f"identical bit for bit{after}"
+        return "\n  ".join([f"{self.ticks} ticks differ", *self.lines])

@@ -6,6 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+MOST = 1e6  # of a load [N], a place [m], a part
+MOST_PASSES = 1000
+MOST_LOST = 2**63
+LONGEST = 40  # characters of a number
+
+Kind = type[int] | type[float]
+
 
 @dataclass(frozen=True)
 class RunInfo:
@@ -28,26 +35,37 @@ class RunInfo:
         return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
 
     @classmethod
-    def from_entries(cls, entries: Mapping[str, str]) -> RunInfo:
-        """The inverse of `entries`; unknown keys are ignored. Raises ValueError naming a key that
-        cannot be read.
+    def from_entries(cls, entries: Mapping[str, str]) -> tuple[RunInfo, list[str]]:
+        """The inverse of `entries`, and a line for each value that cannot be: the default stands
+        for it. Unknown keys are ignored.
         """
-        return cls(
+        wrong: list[str] = []
+
+        def number(key: str, kind: Kind, default: Any, low: float, high: float) -> Any:
+            text = entries.get(key, "")
+            value = _number(kind, text)
+            if value is not None and low <= value <= high:
+                return value
+            if not text:
+                return default
+            wrong.append(f"{key}: found {text[:40]!r}; expected a number from {low:g} to {high:g}")
+            return default
+
+        run = cls(
             name=entries.get("name", ""),
-            nominal_load=_number(entries, "nominal_load", float),
-            pass_number=_number(entries, "pass_number", int, 1),
-            start_position=_number(entries, "start_position", float, 0.0),
+            nominal_load=number("nominal_load", float, None, 0.0, MOST),
+            pass_number=number("pass_number", int, 1, 1, MOST_PASSES),
+            start_position=number("start_position", float, 0.0, -MOST, MOST),
             notes=entries.get("notes", ""),
-            part=_number(entries, "part", int, 0),
-            lost_before=_number(entries, "lost_before", int, 0),
+            part=number("part", int, 0, 0, MOST),
+            lost_before=number("lost_before", int, 0, 0, MOST_LOST),
         )
+        return run, wrong
 
 
-def _number(
-    entries: Mapping[str, str], key: str, kind: type[int] | type[float], default: Any = None
-) -> Any:
-    text = entries.get(key, "")
+def _number(kind: Kind, text: str) -> float | None:
+    """None where the text is no number."""
     try:
-        return kind(text) if text else default
+        return kind(text) if len(text) <= LONGEST else None
     except ValueError:
-        raise ValueError(f"{key}: {text!r} is not a number") from None
+        return None

@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from gritd.estimator.recording.blocks import Walk
 from gritd.estimator.recording.mcapfile import DRAFT, RecordingError
+from gritd.estimator.recording.walk import Walk
 
 
 def sweep(folder: Path) -> list[Path]:
@@ -36,7 +36,9 @@ def sweep(folder: Path) -> list[Path]:
 def _messages(draft: Path) -> bool:
     with draft.open("rb") as file:
         try:
-            return bool(Walk(file, draft.stat().st_size).run().blocks)
+            walk = Walk(file, draft.stat().st_size)
+            walk.begin()
+            return next(walk.blocks(), None) is not None
         except RecordingError:
             return False
 

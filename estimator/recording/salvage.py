@@ -1,183 +1,67 @@
-"""Read a recording: closed or not, cut at any byte, with flipped bits, or written by somebody
-else.
+"""Read a recording: closed or not, cut at any byte, with flipped bits, or written by somebody else.
 
-Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named
-in `damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks
-only, in file order.
+Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named in
+`damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks only,
+in file order.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema
 
+from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.recording.blocks import (
-    MAX_CHUNK,
-    MAX_WASTE,
-    Block,
-    Contents,
-    Damaged,
-    Texts,
-    Walk,
-    records,
-    split,
-    unpack,
-)
-from gritd.estimator.recording.cdr import CODES, TIME, Codec, Rows, Topic, parse_schema
-from gritd.estimator.recording.decoding import Chunk, Source, select
-from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, Starts, opened, reported
-from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RECOVERED, RUN, seal_holds
+from gritd.estimator.recording.blocks import Block, Damaged, records, split, unpack
+from gritd.estimator.recording.cdr import Topic
+from gritd.estimator.recording.decoding import Chunk, select
+from gritd.estimator.recording.definitions import Definitions
+from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, opened, reported
+from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
+from gritd.estimator.recording.recording import Message, Recording
+from gritd.estimator.recording.sequence import Sequence
 from gritd.estimator.recording.topics import RAW_TOPICS
+from gritd.estimator.recording.walk import Contents, Walk
+
+__all__ = ["Message", "Recording", "read"]
 
 # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_KEPT = 64 << 20
 MAX_LINES = 100
+MAX_WASTE = 128 << 20  # [bytes] read and unpacked in vain before giving up
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good
-
-Message = tuple[str, int, tuple[Any, ...]]
-
-
-@dataclass
-class Recording:
-    """A recording that was checked; made by `read`."""
-
-    path: Path
-    config_yaml: str | None = None  # the effective configuration, if it is intact
-    versions: dict[str, str] = field(default_factory=dict)  # of what wrote it
-    run: RunInfo = field(default_factory=RunInfo)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)  # all intact records
-    damage: list[str] = field(default_factory=list)  # what is not right, one line each
-    closed: bool = False  # ends with an intact index
-    lost: int = 0  # messages known to be missing, by the file's own count
-    counted: bool = (
-        False  # the file says how many messages it had, so that `lost` is all that is lost
-    )
-    unverified: int = 0  # messages under no checksum; other writers may leave such
-    attachments: int = 0
-    counts: Counter[str] = field(default_factory=Counter)  # messages by topic
-    sources: dict[int, Source] = field(default_factory=dict)  # by channel number
-    _blocks: list[Block] = field(default_factory=list, repr=False)
-    _kept: dict[int, Chunk] = field(default_factory=dict, repr=False)
-
-    @property
-    def complete(self) -> bool:
-        """Closed, and nothing is missing."""
-        return self.closed and not self.damage
-
-    @property
-    def saved(self) -> bool:
-        """Nothing that was written is lost, though the file may be unclosed or its index
-        damaged.
-        """
-        return not self.damage or (
-            self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys()
-        )
-
-    @property
-    def recovered(self) -> dict[str, str]:
-        """What `gritd recover` noted when it made this file; empty for an original."""
-        return self.metadata.get(RECOVERED, {})
-
-    @property
-    def topics(self) -> dict[str, Topic]:
-        """The topics that can be decoded, by name."""
-        return {source.topic.name: source.topic for source in self.sources.values() if source.codec}
-
-    def chunks(self) -> Iterator[Chunk]:
-        """The good messages, block by block in file order, still encoded."""
-        with reported(self.path, "read"), opened(self.path) as file:
-            for number, block in enumerate(self._blocks):
-                yield self._kept.get(number) or self._chunk(file, block)
-
-    def messages(self) -> Iterator[Message]:
-        """(topic, log_time [ns], values) in file order; values in the order of the topic's
-        fields.
-        """
-        for chunk in self.chunks():
-            rows: dict[int, Message] = {}
-            for channel, own in chunk.groups.items():
-                source = self.sources[channel]
-                if source.codec:
-                    times = chunk.heads["log_time"][own].tolist()
-                    for i, time, values in zip(
-                        own.tolist(), times, source.values(chunk, own), strict=True
-                    ):
-                        rows[i] = (source.topic.name, time, values)
-            yield from (rows[i] for i in sorted(rows))
-
-    def arrays(self, topic: str) -> Rows:
-        """All messages of a topic as one structured array, shape (n,), in file order.
-
-        Fields: log_time [ns]; order, the place of the message among all of the file, which tells
-        what came before what; then the topic's, a stamp as int64 [ns]. Without messages it is
-        empty. Raises RecordingError for a topic whose messages are not of fixed size or not
-        decoded.
-        """
-        known = self.topics.get(topic) or next((t for t in RAW_TOPICS if t.name == topic), None)
-        if known is None or not known.codec.flat:
-            raise RecordingError(
-                f"{self.path}: {topic}: no topic with decoded fields of fixed size"
-            )
-        tables = [np.empty(0, [("log_time", "<i8"), ("order", "<i8"), *known.codec.table_dtype])]
-        before = 0
-        for chunk in self.chunks():
-            for channel, own in chunk.groups.items():
-                if self.sources[channel].topic.name == topic:
-                    tables.append(
-                        _table(self.sources[channel], chunk, own, before, tables[0].dtype)
-                    )
-            before += len(chunk.starts)
-        joined = np.concatenate(tables)
-        return joined[np.argsort(joined["order"], kind="stable")]
-
-    def _chunk(self, file: BinaryIO, block: Block) -> Chunk:
-        content = unpack(file, block)
-        return select(content, split(file, block, content)[0], self.sources)[0]
-
-
-def _table(
-    source: Source, chunk: Chunk, own: Starts, before: int, dtype: np.dtype[np.void]
-) -> Rows:
-    table = np.empty(own.shape, dtype)
-    table["log_time"] = chunk.heads["log_time"][own]
-    table["order"] = own + before
-    source.fill(table[list(source.topic.names)], chunk, own)
-    return table
+# A chunk takes as long as some thousand messages. So many may have fewer than this, on average.
+SMALL_CHUNKS, FEW = 20_000, 4
 
 
 def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
     """Open a recording and check all of it.
 
-    `topics` are those whose fields the caller relies on; all others are taken as the file
-    defines them. Raises RecordingError if there is no such file, it is no MCAP file, or one of
-    `topics` lacks a field in it.
+    `topics` are those whose fields the caller relies on; all others are taken as the file defines
+    them. Raises RecordingError if there is no such file, it is no MCAP file, or one of `topics`
+    lacks a field in it.
     """
     path = Path(path)
+    recording = Recording(path)
     with reported(path, "read"), opened(path) as file:
         try:
-            contents = Walk(file, path.stat().st_size).run()
+            walk = Walk(file, path.stat().st_size)
+            _Check(recording, {topic.name: topic for topic in topics}).whole(file, walk)
         except RecordingError as error:
-            raise RecordingError(f"{path}: {error}") from None
-        recording = _with_metadata(
-            Recording(path, damage=contents.damage, closed=contents.closed), contents
-        )
-        check = _Check(recording, {topic.name: topic for topic in topics})
-        check.whole(file, contents)
+            message = str(error)
+            raise RecordingError(
+                message if message.startswith(str(path)) else f"{path}: {message}"
+            ) from None
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
     return recording
 
 
-def _with_metadata(recording: Recording, contents: Contents) -> Recording:
-    recording.attachments = contents.attachments
+def _take_metadata(recording: Recording, contents: Contents) -> None:
     for name, entries in contents.metadata.items():
         if seal_holds(
             name,
@@ -196,11 +80,8 @@ def _with_metadata(recording: Recording, contents: Contents) -> Recording:
     config = dict(recording.metadata.get(CONFIG, {}))
     recording.config_yaml = config.pop("yaml", None)
     recording.versions = {key: value for key, value in config.items() if key != CHECKSUM}
-    try:
-        recording.run = RunInfo.from_entries(recording.metadata.get(RUN, {}))
-    except ValueError as error:
-        recording.damage.append(f"metadata {RUN}: {error}")
-    return recording
+    recording.run, wrong = RunInfo.from_entries(recording.metadata.get(RUN, {}))
+    recording.damage += [f"metadata {RUN}: {line}" for line in wrong]
 
 
 class _Check:
@@ -210,58 +91,93 @@ class _Check:
 
     def __init__(self, recording: Recording, known: dict[str, Topic]) -> None:
         self._recording = recording
-        self._known = known
-        self._schemas: dict[int, Schema] = {}
-        self._seen: set[tuple[int, bytes]] = set()  # definitions are repeated in every chunk
-        self._numbers: dict[
-            int, list[int]
-        ] = {}  # channel -> first and last sequence number, messages
+        self._definitions = Definitions(recording.path, known)
+        recording.sources = self._definitions.sources
+        self._sequence = Sequence()
         self._waste = 0
-        self._room = MAX_KEPT
+        self._kept_room = MAX_KEPT
+        self._unpacked = self._stored = self._chunks = self._messages = 0
 
-    def whole(self, file: BinaryIO, contents: Contents) -> None:
+    def whole(self, file: BinaryIO, walk: Walk) -> None:
+        """Raises RecordingError where this is no MCAP file, or one without a field relied on."""
+        recording, contents = self._recording, walk.found
+        recording.damage = contents.damage
+        walk.begin()
         expected = self._summary(contents.summary)
-        for block in contents.blocks:
+
+        for block in walk.blocks():
+            if ending := self._ending(block):
+                recording.damage.append(f"byte {block.start}: {ending}; the rest is not read")
+                break
             try:
-                self._block(file, block)
+                self._block(file, block, numbered=contents.library == LIBRARY)
             except Damaged as why:
-                self._recording.damage.append(
+                recording.damage.append(
                     f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}"
                 )
-                self._waste += block.stored + min(block.size, MAX_CHUNK)
-            if self._waste > MAX_WASTE:
-                self._recording.damage.append(
-                    f"byte {block.start}: too much damage; the rest is not read"
-                )
-                break
+                self._waste += block.stored + min(block.size, int(limits().chunk))
+
+        recording.closed, recording.attachments = contents.closed, contents.attachments
+        _take_metadata(recording, contents)
         self._count_lost(expected, numbered=contents.library == LIBRARY)
 
-    def _block(self, file: BinaryIO, block: Block) -> None:
+    def _ending(self, block: Block) -> str:
+        """Why nothing is read from here on; '' as a rule."""
+        bounds = limits()
+        self._chunks += 1
+        self._unpacked += block.size
+        self._stored += block.stored + block.index[1] - block.index[0]
+        if self._waste > MAX_WASTE:
+            return "too much damage"
+        if self._unpacked > bounds.start + bounds.ratio * self._stored:
+            return f"unpacks to more than {bounds.ratio:g} times its size"
+        few = FEW * self._chunks > self._messages
+        return f"chunks of fewer than {FEW} messages" if self._chunks > SMALL_CHUNKS and few else ""
+
+    def _block(self, file: BinaryIO, block: Block, numbered: bool) -> None:
         content = unpack(file, block)
         starts, definitions = split(file, block, content)
         for opcode, start, end in definitions:
-            self._define(opcode, content[start:end])
+            self._definitions.add(opcode, content[start:end])
         chunk, complaints = select(content, starts, self._recording.sources)
         self._recording.damage += [f"byte {block.start}: {complaint}" for complaint in complaints]
         self._waste += _COST * (len(starts) - len(chunk.starts))
+        self._place(block, chunk, numbered)
         self._keep(block, chunk)
+
+    def _place(self, block: Block, chunk: Chunk, numbered: bool) -> None:
+        """Hold the messages' numbers against those before. Raises Damaged for a chunk that stands
+        there twice.
+        """
+        numbers = chunk.heads["sequence"]
+        found = {
+            channel: (int(numbers[own[0]]), int(numbers[own[-1]]), len(own))
+            for channel, own in chunk.groups.items()
+        }
+        if numbered and self._sequence.repeated(found):
+            self._recording.misplaced += 1
+            raise Damaged("it stands there twice")
+        if not self._sequence.add(found) and numbered:
+            self._recording.misplaced += 1
+            self._recording.damage.append(
+                f"byte {block.start}: chunk of {block.stored} bytes is not in its place: its"
+                " messages come after later ones"
+            )
 
     def _keep(self, block: Block, chunk: Chunk) -> None:
         recording = self._recording
-        self._room -= len(chunk.content)
-        if self._room >= 0:
+        self._kept_room -= len(chunk.content)
+        if self._kept_room >= 0:
             recording._kept[len(recording._blocks)] = chunk
         recording._blocks.append(block)
         recording.unverified += 0 if block.crc else len(chunk.starts)
+        self._messages += len(chunk.starts)
         for channel, own in chunk.groups.items():
-            numbers = chunk.heads["sequence"][own]
-            recording.counts[recording.sources[channel].topic.name] += len(numbers)
-            entry = self._numbers.setdefault(channel, [int(numbers[0]), 0, 0])
-            entry[1:] = [int(numbers[-1]), entry[2] + len(numbers)]
+            recording.counts[recording.sources[channel].topic.name] += len(own)
 
     def _summary(self, summary: bytes) -> dict[int, int]:
-        """Take the definitions of the summary; return its count of messages by channel, if it
-        has one.
+        """Take the definitions of the summary; return its count of messages by channel, if it has
+        one.
         """
         expected: dict[int, int] = {}
         try:
@@ -269,101 +185,26 @@ class _Check:
                 if opcode == Opcode.STATISTICS:
                     expected = _channel_counts(summary[start:end])
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    self._define(opcode, summary[start:end])
+                    self._definitions.add(opcode, summary[start:end])
         except Damaged:  # only the first part of a very long summary is read
             pass
         return expected
 
     def _count_lost(self, expected: dict[int, int], numbered: bool) -> None:
+        """By the count of the index, else by the messages' numbers."""
+        recording, counted = self._recording, self._sequence.counts()
+        recording.counted = bool(expected)
         if expected:
-            self._recording.counted = True
-            counted = {channel: entry[2] for channel, entry in self._numbers.items()}
-            lost = sum(
-                max(0, count - counted.get(channel, 0)) for channel, count in expected.items()
-            )
+            differ = [n - counted.get(channel, 0) for channel, n in expected.items()]
+            recording.lost = sum(max(0, difference) for difference in differ)
+            surplus = sum(max(0, -difference) for difference in differ)
         else:
-            lost = (
-                sum(last - first + 1 - count for first, last, count in self._numbers.values())
-                if numbered
-                else 0
-            )
-        self._recording.lost = max(0, lost)
-        if lost > 0:
-            self._recording.damage.insert(0, f"{lost} messages are missing")
+            recording.lost, surplus = self._sequence.missing if numbered else 0, 0
 
-    def _define(self, opcode: int, body: bytes) -> None:
-        """A schema or a channel. Raises Damaged where it contradicts an earlier one,
-        RecordingError where it lacks a field that the caller relies on.
-        """
-        if (opcode, body) in self._seen:
-            return
-        fields = Texts(body)
-        if opcode == Opcode.SCHEMA:
-            schema = Schema(
-                id=fields.integer(2), name=fields.text(), encoding=fields.text(), data=fields.blob()
-            )
-            fields.finish()
-            if self._schemas.setdefault(schema.id, schema) != schema:
-                raise Damaged(f"schema {schema.id} is defined twice, differently")
-        else:
-            number, schema_number = fields.integer(2), fields.integer(2)
-            channel = Channel(number, fields.text(), fields.text(), fields.table(), schema_number)
-            fields.finish()
-            self._define_channel(channel)
-        self._seen.add((opcode, body))
-
-    def _define_channel(self, channel: Channel) -> None:
-        sources = self._recording.sources
-        if channel.id not in sources:
-            sources[channel.id] = self._source(channel)
-        elif sources[channel.id].channel != channel:
-            raise Damaged(f"channel {channel.id} is defined twice, differently")
-
-    def _source(self, channel: Channel) -> Source:
-        schema = self._schemas.get(channel.schema_id)
-        if schema is None and channel.schema_id:
-            raise Damaged(
-                f"channel {channel.id} refers to schema {channel.schema_id}, which is missing"
-            )
-        fields = None
-        if schema and schema.encoding == "ros2msg" and channel.message_encoding == "cdr":
-            fields = parse_schema(schema.data.decode(errors="replace"))
-        known = self._known.get(channel.topic)
-        codec = Codec(fields) if fields else None
-        if known:
-            _require(self._recording.path, known, codec)
-        return Source(
-            schema,
-            channel,
-            known or Topic(channel.topic, schema.name if schema else "", fields or ()),
-            codec,
-        )
-
-
-def _require(path: Path, known: Topic, codec: Codec | None) -> None:
-    """Raises RecordingError, one line, unless the file's fields hold those of the topic."""
-    expected = ", ".join(f"{kind} {name}" for name, kind, _ in known.fields)
-    if codec is None or (known.codec.flat and not codec.flat):
-        raise RecordingError(
-            f"{path}: {known.name}: not CDR with a flat ros2msg schema; expected {expected}"
-        )
-    for name, kind, _ in known.fields:
-        found = dict(zip(codec.names, codec.kinds, strict=True)).get(name)
-        if found is None:
-            raise RecordingError(f"{path}: {known.name}: no field {name!r}; expected {expected}")
-        if not _fits(found, kind):
-            raise RecordingError(
-                f"{path}: {known.name}: field {name!r} is {found}; expected {kind}"
-            )
-
-
-def _fits(found: str, expected: str) -> bool:
-    """Whether values of one ROS type can stand for another without becoming something else."""
-    if found == expected:
-        return True
-    if found not in CODES or expected not in CODES:
-        return {found, expected} == {TIME, "int64"}
-    return np.can_cast(np.dtype(CODES[found]), np.dtype(CODES[expected]), "same_kind")
+        if surplus:
+            recording.damage.insert(0, f"{surplus} messages more than its index counts")
+        if recording.lost:
+            recording.damage.insert(0, f"{recording.lost} messages are missing")
 
 
 def _channel_counts(statistics: bytes) -> dict[int, int]:

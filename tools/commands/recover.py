@@ -5,7 +5,7 @@ still holds.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
@@ -16,6 +16,7 @@ from gritd.tools.cli.command import DAMAGED, DONE, Parser
 from gritd.tools.cli.files import unread, unwritten, vacant
 
 LIBRARY = "gritd recover"
+LONGEST = 18  # digits of a number of messages
 
 
 def main(argv: Sequence[str]) -> int:
@@ -74,6 +75,8 @@ def summary(recording: Recording) -> str:
     if recording.complete:
         return f"{saved}; the recording was complete"
     ending = "closed" if recording.closed else "not closed"
+    if recording.misplaced:
+        ending += f", {recording.misplaced} chunks in a wrong place or twice"
     if recording.saved:
         return f"{saved}; it was {ending}, nothing in it is lost"
     count = f"{recording.lost}" if recording.counted else f"{recording.lost} or more"
@@ -84,5 +87,11 @@ def _note(recording: Recording) -> dict[str, str]:
     """What is not in the new file, with what an earlier recovery noted."""
     earlier = recording.recovered
     damage = [line for line in (earlier.get("damage", ""), *recording.damage) if line]
-    lost = recording.lost + int(earlier.get("lost", "0"))
+    lost = recording.lost + _lost(earlier)
     return {"from": recording.path.name, "lost": str(lost), "damage": "\n".join(damage)}
+
+
+def _lost(earlier: Mapping[str, str]) -> int:
+    """Messages that an earlier recovery missed; 0 where it does not say so in figures."""
+    text = earlier.get("lost", "")
+    return int(text) if text.isdecimal() and len(text) <= LONGEST else 0

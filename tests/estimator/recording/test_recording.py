@@ -289,7 +289,7 @@ def test_a_long_recording_is_cut_into_chunks_by_itself(tmp_path: Path) -> None:
     )
 )
 def test_run_metadata_comes_back(run: RunInfo) -> None:
-    assert RunInfo.from_entries({"extra": "ignored", **run.entries()}) == run
+    assert RunInfo.from_entries({"extra": "ignored", **run.entries()}) == (run, [])
 
 
 def test_parts_are_found_in_order(tmp_path: Path) -> None:

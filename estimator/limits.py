@@ -1,0 +1,65 @@
+"""What a file from outside may cost: limits far above what a testbed records, so that no file fills
+the memory or takes hours.
+
+The environment variable GRITD_LIMITS raises or lowers them: `GRITD_LIMITS="text=1 GB, chunks=2e6"`.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+
+from gritd.estimator.config.units import UnitError, parse
+
+VARIABLE = "GRITD_LIMITS"
+
+
+class LimitsError(Exception):
+    """GRITD_LIMITS cannot be read: one line."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Each with what the largest honest file has."""
+
+    chunk: float = 32 * 2**20  # [B] of a recording, unpacked; writers use about 1 MiB
+    chunks: float = 500_000  # a day has 432,000, at five a second
+    ratio: float = 50  # unpacked to stored, of a recording; of constant readings 15, usually 3
+    start: float = 32 * 2**20  # [B] unpacked that the ratio is not asked of
+    text: float = 64 * 2**20  # [B] of one file that is imported, unpacked; known logs have 5 MB
+    rows: float = 1e6  # of one file that is imported: an hour at 277 Hz
+    readings: float = 20e6  # of one recording, held in memory: 5 h of four channels at 250 Hz
+    grid: float = 1e6  # points of the time grid of a diagnosis or comparison
+
+
+def limits() -> Limits:
+    """The limits, as the environment has them. Raises LimitsError."""
+    return _read(os.environ.get(VARIABLE, ""))
+
+
+@lru_cache(maxsize=4)
+def _read(text: str) -> Limits:
+    given = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = item.partition("=")
+        given[name] = _number(name, value)
+    return replace(Limits(), **given)
+
+
+def _number(name: str, text: str) -> float:
+    names = [each.name for each in fields(Limits)]
+    if name not in names:
+        known = ", ".join(names)
+        raise LimitsError(f"{VARIABLE}: found {name[:40]!r}; expected NAME=VALUE of {known}")
+    unit = "B" if name in ("chunk", "start", "text") else ""
+    try:
+        value = parse(text, unit)
+    except UnitError as error:
+        value, reason = 0.0, f" ({error})"
+    else:
+        reason = ""
+    if not 0.0 < value < 2**53:
+        expected = "a number of bytes such as 64 MB" if unit else "a number"
+        raise LimitsError(f"{VARIABLE}: {name}: found {text[:40]!r}{reason}; expected {expected}")
+    return value

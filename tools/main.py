@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from gritd import __version__
+from gritd.tools.cli import memory
 from gritd.tools.cli.command import Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.terminal import shown
@@ -62,6 +63,10 @@ COMMANDS = {
 }
 
 
+WITHOUT_NUMPY = ("status", "monitor")
+WITHOUT_SCIPY = ("check-config", "recover")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; its exit code. Errors are one line on standard error, never a traceback."""
     _speak_as_the_terminal_does()
@@ -75,9 +80,13 @@ def _main(given: Sequence[str]) -> int:
     if not given:
         parser.error("expected a command")
     arguments = parser.parse_args(given)
-    return guarded(
-        lambda: importlib.import_module(COMMANDS[arguments.command][0]).main(arguments.arguments)
-    )
+    return guarded(lambda: _run(arguments.command, arguments.arguments))
+
+
+def _run(command: str, arguments: Sequence[str]) -> int:
+    if command not in WITHOUT_NUMPY:
+        memory.reserve(scipy=command not in WITHOUT_SCIPY)
+    return int(importlib.import_module(COMMANDS[command][0]).main(arguments))
 
 
 def _speak_as_the_terminal_does() -> None:

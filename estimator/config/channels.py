@@ -80,7 +80,7 @@ def _calibration(scale: str, offset: str, default_scale: str) -> dict[str, Key]:
             default_scale,
         ),
         "offset": Key(
-            uncertain(offset),
+            uncertain(offset, low=-1e6, high=1e6),
             "see `scale`; its sigma is that of the zero: the physical value read at rest",
             f"0 {offset}",
         ),
@@ -149,6 +149,9 @@ def _build_channel(name: str, **values: Any) -> Channel:
 def _build_calibration(scale: Uncertain, **values: Any) -> Calibration:
     if scale.value == 0.0:
         raise Impossible("scale", "a scale other than 0", "0")
+    if scale.sigma > abs(scale.value):
+        raise Impossible("scale.sigma", "no more than the scale itself")
+
     return Calibration(scale, **values)
 
 

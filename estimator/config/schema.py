@@ -34,6 +34,8 @@ NEEDED = "\0needed"
 ABSENT = "\0absent"  # may be left out, and then there is none
 UNLIMITED = "unlimited"
 
+SMALLEST, LARGEST = 1e-12, 1e12  # of a quantity in SI units; beyond, squares lose their digits
+LARGEST_COUNT = 1e18  # of one that may be unlimited
 WHOLE = re.compile(r"-?(0|[1-9][0-9]{0,18})|0x[0-9a-fA-F]{1,16}")
 
 
@@ -104,12 +106,18 @@ class Quantity:
             return math.inf, node
         value = self._si(node, text)
         if not self.holds(value):
-            raise node.place.error(shown(text), self.expected)
+            raise node.place.error(shown(text), self.expected + self._reason(value))
         return value, node
 
     def holds(self, value: float) -> bool:
-        """Whether a value is finite and inside the bounds."""
-        return math.isfinite(value) and self.above < value and self.low <= value <= self.high
+        """Whether a value is inside the bounds, and of a size that can be calculated with."""
+        return not self._reason(value) and self.above < value and self.low <= value <= self.high
+
+    def _reason(self, value: float) -> str:
+        """Why no quantity of a testbed has such a size; '' as a rule."""
+        if value == 0.0 or SMALLEST <= abs(value) <= (LARGEST_COUNT if self.unlimited else LARGEST):
+            return ""
+        return f", of a size from {SMALLEST:g} to {LARGEST:g} in SI units"
 
     def _si(self, node: Node, text: str) -> float:
         try:
@@ -148,7 +156,7 @@ class UncertainQuantity:
                 raise node.place.error(describe(node), self.expected)
             value, _ = self.quantity.read(node)
             return Uncertain(value), node
-        sigma = Quantity(self.quantity.unit, low=0.0)
+        sigma = Quantity(self.quantity.unit, low=0.0, high=self.quantity.high)
         keys = {"value": Key(self.quantity, "value"), "sigma": Key(sigma, "standard deviation")}
         return Section(keys, Uncertain).read(node)
 

@@ -154,7 +154,9 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
 RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
     "update": Key(
-        Quantity("Hz", above=0, high=1000), "updates of the filter; its window is 1/update", "10 Hz"
+        Quantity("Hz", low=0.01, high=1000),
+        "updates of the filter; its window is 1/update",
+        "10 Hz",
     ),
     "horizon": Key(
         Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"
@@ -163,11 +165,19 @@ RATES = {
 
 FILTER = {
     "engine": Key(Choice(ENGINES), "same numbers from both; plain is the faster", "filterpy"),
-    "cohesion_walk": Key(Quantity("Pa/sqrt(s)", low=0), "random walk of c", "2 Pa/sqrt(s)"),
-    "tan_phi_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of tan φ", "2e-4 1/sqrt(s)"),
-    "ln_k_walk": Key(Quantity("1/sqrt(s)", low=0), "random walk of ln k", "1e-4 1/sqrt(s)"),
+    "cohesion_walk": Key(
+        Quantity("Pa/sqrt(s)", low=0, high=1e6), "random walk of c", "2 Pa/sqrt(s)"
+    ),
+    "tan_phi_walk": Key(
+        Quantity("1/sqrt(s)", low=0, high=10), "random walk of tan φ", "2e-4 1/sqrt(s)"
+    ),
+    "ln_k_walk": Key(
+        Quantity("1/sqrt(s)", low=0, high=10), "random walk of ln k", "1e-4 1/sqrt(s)"
+    ),
     "gate": Key(
-        Quantity("", above=0), "innovations of more standard deviations are rejected", "5.0"
+        Quantity("", low=0.1, high=1e6),
+        "innovations of more standard deviations are rejected",
+        "5.0",
     ),
     "cohesion_bounds": Key(Interval(Quantity("Pa", low=0)), "c stays inside", "[0 kPa, 50 kPa]"),
     "tan_phi_bounds": Key(Interval(Quantity("", above=0)), "tan φ stays inside", "[0.05, 1.5]"),

@@ -118,6 +118,8 @@ def _decompress(block: Block, data: bytes) -> bytes:
                 lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=block.size + 1)
             )
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        if "memory" in str(error).lower():
+            raise MemoryError(str(error)) from None
         raise Damaged(f"cannot be unpacked: {error}") from None
     if block.compression:
         raise Damaged(f"compression {block.compression!r} is not one of zstd, lz4, none")

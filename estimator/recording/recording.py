@@ -49,7 +49,7 @@ class Recording:
 
     @property
     def saved(self) -> bool:
-        """Nothing that was written is lost, though the file may be unclosed or its index damaged."""
+        """Nothing written is lost, though the file may be unclosed or its index damaged."""
         whole = self.counted and not self.lost and {CONFIG, RUN} <= self.metadata.keys()
         return not self.damage or (whole and not self.misplaced)
 
@@ -70,7 +70,7 @@ class Recording:
                 yield self._kept.get(number) or self._chunk(file, block)
 
     def messages(self) -> Iterator[Message]:
-        """(topic, log_time [ns], values) in file order; values in the order of the topic's fields."""
+        """(topic, log_time [ns], values) in file order; values as the topic has its fields."""
         for chunk in self.chunks():
             rows: dict[int, Message] = {}
             for channel, own in chunk.groups.items():

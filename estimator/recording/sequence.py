@@ -1,5 +1,5 @@
-"""The numbers of the messages of a file that we wrote: from one chunk to the next each channel counts
-on. Where it does not, messages are missing, or a chunk stands in another place or twice.
+"""The numbers of the messages of a file that we wrote: each channel counts on from one chunk to the
+next. Where it does not, messages are missing, or a chunk stands in another place or twice.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ import re, resource, sys, time
 bound = int(sys.argv[1])
 if bound:
     resource.setrlimit(resource.RLIMIT_AS, (bound, bound))
-from gritd.tools.cli.main import main
+from gritd.tools.main import main
 code = main(sys.argv[2:])
 with open("/proc/self/status") as status:
     peak = int(re.search(r"VmHWM:\\s+(\\d+) kB", status.read())[1])

@@ -8,7 +8,11 @@ from collections.abc import Callable
 
 from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
-from gritd.tools.cli.command import DONE, FAILED, INTERRUPTED, USAGE, CommandError
+from gritd.estimator.limits import LimitsError
+from gritd.tools.cli import memory
+from gritd.tools.cli.command import DAMAGED, DONE, FAILED, INTERRUPTED, USAGE, CommandError
+
+SETTINGS = (ConfigError, DeviceSettingsError, LimitsError)  # what the user set is wrong
 
 
 def guarded(command: Callable[[], int | None]) -> int:
@@ -32,15 +36,19 @@ def _fail(error: Exception) -> int:
     print(f"gritd: {_one_line(error)}", file=sys.stderr)
     if isinstance(error, CommandError):
         return error.code
-    return USAGE if isinstance(error, ConfigError | DeviceSettingsError) else FAILED
+    if memory.line(error):
+        return DAMAGED
+    return USAGE if isinstance(error, SETTINGS) else FAILED
 
 
 def _one_line(error: Exception) -> str:
     """The message of a known error; an unexpected one says so, and how to see more."""
     text = " ".join(str(error).split())
+    if want := memory.line(error):
+        return want
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"{error.filename}: {error.strerror.lower()}"
-    if isinstance(error, CommandError | ConfigError | DeviceError | DeviceSettingsError | OSError):
+    if isinstance(error, (CommandError, DeviceError, OSError, *SETTINGS)):
         return text
     return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
 

@@ -15,7 +15,7 @@ import numpy as np
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.optional import require
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
@@ -31,7 +31,9 @@ RATE = 10.0  # [Hz] of the grid on which they are compared
 
 
 def main(argv: Sequence[str]) -> int:
-    """Print the errors, draw what was asked for. Raises ConfigError or CommandError."""
+    """Print the errors, draw what was asked for. Exit 3 if a recording is damaged: then it is of
+    what was whole. Raises ConfigError or CommandError.
+    """
     arguments = _parser().parse_args(argv)
     if arguments.png:
         require("matplotlib", "--png")
@@ -52,7 +54,7 @@ def main(argv: Sequence[str]) -> int:
         ) from None
 
     print(comparison.printed(found))
-    return DONE
+    return DAMAGED if found.damage else DONE
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -88,7 +90,8 @@ def compare(
     can be compared.
     """
     settings = configuration.settings
-    rig = WheelRig([signals(recording, settings, RATE) for recording in read_all(paths)], settings)
+    recordings = read_all(paths)
+    rig = WheelRig([signals(recording, settings, RATE) for recording in recordings], settings)
     stack = Stack(rig)
 
     if stack.size == 0:
@@ -113,6 +116,7 @@ def compare(
         tuple(effect.name for effect in rig.baseline),
         tuple(rig.caveats),
         _redo(paths, configuration, command),
+        tuple(f"{recording.path}: {line}" for recording in recordings for line in recording.damage),
     )
 
 

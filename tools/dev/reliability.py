@@ -59,10 +59,16 @@ ROWS = (
     "one wrong stamp of a device clock",
     "step of a device clock",
     "random histories of a device clock",
+    "recording that unpacks to a thousand times its size",
+    "empty attachments, tiny chunks",
+    "300 and 500 MB of address space",
     "terminal escapes in names",
     "names that lead out of the folder",
     "symlinked lock, FIFO, killed parent",
     "world-writable configuration, readable recordings",
+    "chunks swapped or duplicated",
+    "file of 8 bytes",
+    "metadata and configuration of impossible numbers",
     "YAML cut at every byte",
 )
 

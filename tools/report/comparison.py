@@ -44,6 +44,11 @@ class Comparison:
     baseline: tuple[str, ...]  # effects of the configuration
     caveats: tuple[str, ...]
     redo: Mapping[str, Any]
+    damage: tuple[str, ...] = ()  # of the recordings
+
+    @property
+    def notes(self) -> list[str]:
+        return [*self.caveats, *(f"Damaged: {line}" for line in self.damage)]
 
     @property
     def channels(self) -> list[str]:
@@ -176,8 +181,8 @@ def _soil(comparison: Comparison) -> Markup | None:
 
 def _caveats(comparison: Comparison) -> Markup | None:
     return (
-        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in comparison.caveats)))
-        if comparison.caveats
+        section("Caveats", tag("ul", (tag("li", sentence(c)) for c in comparison.notes)))
+        if comparison.notes
         else None
     )
 
@@ -202,5 +207,5 @@ def printed(comparison: Comparison) -> str:
             for k, q in comparison.soil.after.items()
         ]
 
-    lines += [f"note: {caveat}" for caveat in comparison.caveats]
+    lines += [f"note: {caveat}" for caveat in comparison.notes]
     return "\n".join(map(visible, lines))

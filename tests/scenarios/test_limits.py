@@ -259,7 +259,8 @@ def test_little_address_space(tmp_path, size, figure):
     arguments = {
         "replay": (path,), "recover": (path,), "compare": (path, *CONFIG),
         "diagnose": (path, *CONFIG, "--jobs", "2"), "simulate": ("-o", tmp_path / "x.mcap"),
-        "check-config": (), "reproduce": (), "status": (), "import": ("table", tmp_path, "-o", tmp_path),
+        "check-config": (), "reproduce": (), "status": (),
+        "import": ("table", tmp_path, "-o", tmp_path),
     }  # fmt: skip
     faults, worked = [], 0
     for command, given in arguments.items():

@@ -28,14 +28,18 @@ class Limits:
     ratio: float = 50  # unpacked to stored, of a recording; of constant readings 15, usually 3
     start: float = 32 * 2**20  # [B] unpacked that the ratio is not asked of
     text: float = 64 * 2**20  # [B] of one file that is imported, unpacked; known logs have 5 MB
-    rows: float = 1e6  # of one file that is imported: an hour at 277 Hz
-    readings: float = 20e6  # of one recording, held in memory: 5 h of four channels at 250 Hz
-    grid: float = 1e6  # points of the time grid of a diagnosis or comparison
+    values: float = 4e6  # of one file that is imported: an hour of 11 columns at 100 Hz
+    conditions: float = 1000  # of a table, each 7 s of a recording; known ones have 189
 
 
 def limits() -> Limits:
     """The limits, as the environment has them. Raises LimitsError."""
     return _read(os.environ.get(VARIABLE, ""))
+
+
+def raised(name: str) -> str:
+    """How to raise a limit, in words."""
+    return f"{VARIABLE}={name}=… raises the limit"
 
 
 @lru_cache(maxsize=4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 import re
 import struct
@@ -25,6 +26,7 @@ from gritd.estimator.recording.metadata import RECOVERED, RUN, sealed
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.commands import recover
 from gritd.tools.commands.check_config import summary
+from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
 from gritd.tools.main import main
 from tests.estimator.recording.test_sequence import pieces
 from tests.scenarios.hostile import bomb, honest, mcap, record, tiny_chunks, watched
@@ -33,6 +35,7 @@ from tests.scenarios.rig import TESTBED, driven
 QUICK = True
 BOMB = "recording that unpacks to a thousand times its size"
 MANY = "empty attachments, tiny chunks"
+PACKED = "import of packed text"
 MOVED = "chunks swapped or duplicated"
 EMPTY = "file of 8 bytes"
 NUMBERS = "metadata and configuration of impossible numbers"
@@ -76,6 +79,23 @@ def test_records_that_cost_time_and_hold_nothing(tmp_path, figure):
         figure(MANY, OWN, "processor time", done.seconds, "s", 10, real=True)
         figure(MANY, OWN, "memory", done.memory, "MB", 400)
         path.unlink()
+
+
+def test_packed_text(tmp_path, figure):
+    """2 MB of gzip in an import: rows without end, and a line without end."""
+    for name, unpacked in (("rows", b"0.5," * 99 + b"0\n"), ("line", b"0" * 400)):
+        folder = tmp_path / name
+        folder.mkdir()
+        columns = ",".join(CONSTANTS + MEASURED).encode() + b"\n"
+        with gzip.open(folder / "bomb.csv.gz", "wb", 9) as file:
+            file.write(columns if name == "rows" else b"")
+            for _ in range(2000):
+                file.write(unpacked * 2500)
+        done = watched("import", "table", folder, "-o", tmp_path / "out")
+        assert done.code == 3 and done.one_line, done
+        figure(PACKED, OWN, "packed", (folder / "bomb.csv.gz").stat().st_size / 1e6, "MB")
+        figure(PACKED, OWN, "memory", done.memory, "MB", 400)
+        figure(PACKED, OWN, "processor time", done.seconds, "s", 10, real=True)
 
 
 def test_chunks_in_another_order(tmp_path, figure):

@@ -60,6 +60,7 @@ ROWS = (
     "step of a device clock",
     "random histories of a device clock",
     "recording that unpacks to a thousand times its size",
+    "import of packed text",
     "empty attachments, tiny chunks",
     "300 and 500 MB of address space",
     "terminal escapes in names",

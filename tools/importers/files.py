@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.limits import limits, raised
+from gritd.estimator.recording.mcapfile import opened
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 
 Array = NDArray[np.float64]
 LARGEST = 1e15  # no number of a rig's log is beyond: counts of it must fit into 64 bits
+MAX_LINE = 1 << 20  # [bytes]
 Table = dict[str, list[str]]
+Row = TypeVar("Row")
 
 
 class RigFileError(CommandError):
@@ -47,9 +54,21 @@ def _below(path: Path) -> Iterator[Path]:
 
 def read_text(path: Path) -> str:
     """Text of a plain or gzipped file. Raises RigFileError."""
+    return "".join(_pieces(path))
+
+
+def lines(path: Path) -> Iterator[str]:
+    """The lines of a plain or gzipped text file that are not empty. Raises RigFileError."""
+    for piece in _pieces(path):
+        yield from (line for line in piece.splitlines() if line.strip())
+
+
+def _pieces(path: Path) -> Iterator[str]:
+    """The text up to each newline, unpacked no faster than it is used."""
     try:
-        data = path.read_bytes()
-        return (gzip.decompress(data) if path.suffix == ".gz" else data).decode("utf-8-sig")
+        with opened(path) as file:
+            for piece in _bounded(path, gzip.GzipFile(fileobj=file) if _packed(path) else file):
+                yield piece.decode("utf-8")
     except (OSError, EOFError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise RigFileError(
@@ -61,11 +80,37 @@ def read_text(path: Path) -> str:
         ) from None
 
 
+def _packed(path: Path) -> bool:
+    return path.suffix == ".gz"
+
+
+def _bounded(path: Path, file: BinaryIO | gzip.GzipFile) -> Iterator[bytes]:
+    """What stands up to each newline, without the mark that some programs begin a text with. Raises
+    RigFileError where a line or the whole is longer than a log's.
+    """
+    most, size = limits().text, 0
+    while piece := file.readline(MAX_LINE + 1):
+        size += len(piece)
+        if len(piece) > MAX_LINE:
+            raise RigFileError(f"{path}: found a line of more than {MAX_LINE} bytes")
+        if size > most:
+            raise RigFileError(
+                f"{path}: found more than {most:.0f} bytes of text; {raised('text')}"
+            )
+        yield piece.removeprefix(codecs.BOM_UTF8) if size == len(piece) else piece
+
+
 def read_table(path: Path, columns: Sequence[str]) -> Table:
     """The named columns of a CSV file with a header, as text, at least one row. Raises
     RigFileError.
     """
-    reader = csv.DictReader(line for line in read_text(path).splitlines() if line.strip())
+    try:
+        return _table(path, csv.DictReader(lines(path)), columns)
+    except csv.Error as error:
+        raise RigFileError(f"{path}: found no CSV: {error}; expected a table") from None
+
+
+def _table(path: Path, reader: csv.DictReader[str], columns: Sequence[str]) -> Table:
     missing = [name for name in columns if name not in (reader.fieldnames or ())]
     if missing:
         raise RigFileError(
@@ -73,7 +118,7 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
         )
 
     table: Table = {name: [] for name in columns}
-    for number, row in enumerate(reader, start=2):
+    for number, row in enumerate(_few(path, reader, len(columns)), start=2):
         for name in columns:
             if row[name] is None:
                 raise RigFileError(
@@ -86,6 +131,15 @@ def read_table(path: Path, columns: Sequence[str]) -> Table:
         raise RigFileError(f"{path}: found no rows; expected data under {', '.join(columns)}")
 
     return table
+
+
+def _few(path: Path, rows: Iterable[Row], columns: int) -> Iterator[Row]:
+    """The rows, as long as they have no more values than can be kept. Raises RigFileError."""
+    most = limits().values
+    for number, row in enumerate(rows, start=1):
+        if number * columns > most:
+            raise RigFileError(f"{path}: found more than {most:.0f} values; {raised('values')}")
+        yield row
 
 
 def numbers(path: Path, table: Table, name: str) -> Array:
@@ -115,8 +169,8 @@ def matrix(path: Path, columns: int, skip: int = 0) -> Array:
 
     Raises RigFileError naming the row.
     """
-    lines = [line for line in read_text(path).splitlines() if line.strip()][skip:]
-    rows = [line.split(",")[:columns] for line in lines]
+    fields = (line.split(",", columns)[:columns] for line in islice(lines(path), skip, None))
+    rows = list(_few(path, fields, columns))
 
     if not rows:
         raise RigFileError(f"{path}: found no rows; expected {columns} numbers in each")

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.tools.importers.files import Array
+from gritd.estimator.limits import limits, raised
+from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.recording import NS, Stream, stamps
 
 START = 946_684_800 * NS  # 2000-01-01, for tables that do not say when
@@ -50,6 +52,16 @@ class Counting:
     carriage: float  # [m] a count
     pot_scale: float  # [m/V]
     pot_offset: float  # [m]
+
+
+def check_few(path: Path, conditions: int) -> None:
+    """Raises RigFileError where a table has more conditions than can become a recording."""
+    most = limits().conditions
+    if conditions > most:
+        raise RigFileError(
+            f"{path}: found {conditions} steady states; at most {most:.0f} are taken; "
+            f"{raised('conditions')}"
+        )
 
 
 def scatter_of_mean(value: float, sigma: float) -> Uncertain:

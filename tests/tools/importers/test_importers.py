@@ -235,6 +235,40 @@ def test_a_table_that_cannot_be_used_is_refused(
     )
 
 
+@pytest.mark.parametrize(
+    ("limit", "table", "expected"),
+    [
+        ("text=200 B", TABLE, "found more than 200 bytes of text; GRITD_LIMITS=text=… raises"),
+        ("values=15", TABLE, "found more than 15 values; GRITD_LIMITS=values=… raises"),
+        ("conditions=1", TABLE, "found 2 steady states; at most 1 are taken"),
+        ("", TABLE + "x" * 2_000_000, "found a line of more than 1048576 bytes"),
+        ("", TABLE + '"' + "x" * 200_000, "found no CSV: field larger than field limit (131072)"),
+    ],
+)
+def test_a_file_larger_than_the_limits_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, table: str, expected: str
+) -> None:
+    """Plain or packed."""
+    monkeypatch.setenv("GRITD_LIMITS", limit)
+    files = table_files(tmp_path, table)
+    said = complaint("table", files, "-o", tmp_path / "out")
+    assert expected in said and "made_up.csv" in said
+
+    (files / "made_up.csv").unlink()
+    (files / "made_up.csv.gz").write_bytes(gzip.compress(table.encode()))
+    assert expected in complaint("table", files, "-o", tmp_path / "out")
+
+
+def test_a_matlab_file_of_too_many_numbers_is_not_unpacked(tmp_path: Path) -> None:
+    log = {"t": np.arange(5_000_000.0), "qm": 0.0, "gtau": 35.0, "vir": 0.0}
+    savemat(tmp_path / "DATA_EMPS.mat", log, do_compression=True)
+    said = complaint("emps", tmp_path, "-o", tmp_path / "out")
+    assert "t: found 5000000 of kind double; expected no more than 4000000 numbers" in said
+
+    savemat(tmp_path / "DATA_EMPS.mat", {**log, "t": {"inside": np.zeros(9)}})
+    assert "t: found 1 of kind struct" in complaint("emps", tmp_path, "-o", tmp_path / "out")
+
+
 def test_a_log_without_numbers_is_refused(tmp_path: Path) -> None:
     log = tmp_path / "gr810_vx_10__11-26-20__10_20_0_1.txt"
     for text, expected in (

@@ -32,7 +32,7 @@ from gritd.tools.importers.files import (
 )
 from gritd.tools.importers.recording import NS, Stream, configuration, counts, stamps, write
 from gritd.tools.importers.registry import Tell
-from gritd.tools.importers.segments import Condition, Counting, scatter_of_mean, streams
+from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
@@ -175,6 +175,7 @@ def _straight(path: Path) -> list[tuple[float, Condition]]:
     ]
     if not rows:
         raise RigFileError(f"{path}: found no row with beta 0; expected straight driving")
+    check_few(path, len(rows))
     return [(float(speed), _condition(row)) for speed, row in zip(commanded, rows, strict=True)]
 
 

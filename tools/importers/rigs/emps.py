@@ -10,12 +10,14 @@ which steps by 5 V at every edge of the gate.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
+from scipy.io import loadmat, whosmat
 
+from gritd.estimator.limits import limits, raised
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.importers.files import LARGEST, Array, RigFileError, find, increasing
 from gritd.tools.importers.recording import Stream, configuration, stamps, write
@@ -26,6 +28,8 @@ NAME = "emps"
 SUMMARY = "motor drive with friction, no soil: position and motor force at 1 kHz"
 
 FILE = re.compile(r"DATA_EMPS(_PULSES)?\.mat")
+VARIABLES = ("t", "qm", "vir", "gtau")
+NUMERIC = ("double", "single", *(f"{u}int{bits}" for u in ("", "u") for bits in (8, 16, 32, 64)))
 COUNT = 5e-8  # [m] the last digit of qm in DATA_EMPS
 
 
@@ -62,13 +66,16 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 def read_log(path: Path) -> dict[str, Array]:
     """t [s], qm [m], vir [V], each (n,), and gtau [N/V] (1,). Raises RigFileError."""
     try:
-        content = loadmat(path)
+        _check_size(path)
+        content = loadmat(path, variable_names=VARIABLES)
+    except RigFileError:
+        raise
     except Exception as error:  # scipy raises a different one for each kind of damage
         reason = " ".join(str(error).split())
         raise RigFileError(f"{path}: cannot be read: {reason}; expected a MATLAB file") from None
 
     log = {}
-    for name in ("t", "qm", "vir", "gtau"):
+    for name in VARIABLES:
         if name not in content:
             raise RigFileError(f"{path}: found no variable {name}; expected t, qm, vir and gtau")
         log[name] = np.ravel(np.asarray(content[name], dtype=np.float64))
@@ -82,6 +89,17 @@ def read_log(path: Path) -> dict[str, Array]:
 
     increasing(path, "t", log["t"], first=1)
     return log
+
+
+def _check_size(path: Path) -> None:
+    """Raises RigFileError unless the variables are numbers, and few enough to be unpacked."""
+    most = limits().values
+    for name, shape, kind in whosmat(path):
+        if name in VARIABLES and (kind not in NUMERIC or math.prod(shape) > most):
+            raise RigFileError(
+                f"{path}: {name}: found {math.prod(shape)} of kind {kind}; expected no more than "
+                f"{most:.0f} numbers; {raised('values')}"
+            )
 
 
 def _streams(log: dict[str, Array]) -> list[Stream]:

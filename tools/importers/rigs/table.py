@@ -24,13 +24,13 @@ from gritd.tools.importers.files import (
     Table,
     find,
     finite_number,
+    lines,
     numbers,
     read_table,
-    read_text,
 )
 from gritd.tools.importers.recording import configuration, write
 from gritd.tools.importers.registry import Tell
-from gritd.tools.importers.segments import Condition, Counting, scatter_of_mean, streams
+from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
 
 NAME = "table"
 SUMMARY = (
@@ -104,7 +104,7 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
 
 
 def _has(path: Path, column: str) -> bool:
-    return column in read_text(path).partition("\n")[0].strip().split(",")
+    return column in next(lines(path), "").split(",")
 
 
 def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell) -> list[Path]:
@@ -129,6 +129,7 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
 
 
 def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Condition]:
+    check_few(path, len(table[MEASURED[0]]))
     columns = [numbers(path, table, name).tolist() for name in MEASURED]
     conditions = []
 

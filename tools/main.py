@@ -19,6 +19,7 @@ from gritd.tools.cli.terminal import shown
 
 # command -> (module, what it does)
 COMMANDS = {
+    "init": ("gritd.tools.commands.init", "a folder to work in: configuration and CAN messages"),
     "demo": (
         "gritd.tools.commands.demo",
         "the daemon against the simulated testbed on real wires, with verdict and figure",

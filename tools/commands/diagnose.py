@@ -19,15 +19,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config.configuration import ConfigError
+from gritd.estimator.config.configuration import ConfigError, read_text
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.estimator.visible import visible
+from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.terminal import control
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.diagnose.explain import provenance
-from gritd.tools.diagnose.explain.apply import applied
+from gritd.tools.diagnose.explain.apply import SOIL_KNOWN, rewritten
 from gritd.tools.diagnose.explain.innovations import with_innovations
 from gritd.tools.diagnose.explain.result import Diagnosis, NextExperiment
 from gritd.tools.diagnose.method import diagnose
@@ -44,9 +45,7 @@ def main(argv: Sequence[str]) -> int:
     With --redo, 1 if it comes out otherwise.
     """
     arguments = _parser().parse_args(argv)
-    for path in (arguments.json, arguments.report, arguments.apply):
-        if path is not None:
-            _check_output(path, [*arguments.files, *([arguments.redo] if arguments.redo else [])])
+    _check_outputs(arguments)
     if arguments.redo is not None:
         return _again(arguments)
     if arguments.data is not None:
@@ -134,6 +133,22 @@ def _one(campaign: campaigns.Campaign) -> str:
     return f"{found['verdict']}. {found['summary']}"
 
 
+def _check_outputs(arguments: argparse.Namespace) -> None:
+    """Before the work is done. Raises CommandError."""
+    if arguments.in_place and (arguments.config is None or arguments.redo is not None):
+        raise CommandError("diagnose --in-place: expected --config F with it, not --redo", USAGE)
+    if arguments.config is not None and (arguments.apply is not None or arguments.in_place):
+        source = Path(arguments.config)
+        arguments.apply = configuration_file.target(
+            source, arguments.apply, arguments.in_place, "--apply"
+        )
+
+    inputs = [*arguments.files, *([arguments.redo] if arguments.redo else [])]
+    for path in (arguments.json, arguments.report, arguments.apply):
+        if path is not None:
+            _check_output(path, inputs)
+
+
 def _check_output(path: Path, inputs: Sequence[Path]) -> None:
     """Before the work is done. Raises CommandError."""
     if not path.parent.is_dir():
@@ -157,12 +172,34 @@ def _write(
             arguments.json.write_text(written, encoding="utf-8")
         if arguments.report is not None:
             importlib.import_module("gritd.tools.report.diagnosis").write(found, arguments.report)
-        if arguments.apply is not None:
-            arguments.apply.write_text(applied(configuration, found), encoding="utf-8")
     except OSError as error:
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
         ) from None
+    if arguments.apply is not None:
+        _apply(arguments, found, configuration)
+
+
+def _apply(
+    arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration
+) -> None:
+    """Write the configuration with what was found; of an old diagnosis there is the effective text
+    alone.
+    """
+    again = arguments.redo is not None
+    source = arguments.redo if again else Path(arguments.config)
+    text = configuration.text if again else read_text(source)
+
+    changed = rewritten(text, configuration, found)
+    backup = configuration_file.save(changed, source, arguments.apply)
+
+    if backup is not None:
+        print(f"{arguments.apply}: changed; as it was: {backup}", file=sys.stderr)
+    if found.soil is not None and found.verdict not in SOIL_KNOWN:
+        print(
+            f"{arguments.apply}: the soil stays as it was, since the verdict is {found.verdict}",
+            file=sys.stderr,
+        )
 
 
 def of_files(
@@ -237,7 +274,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument(
-        "--apply", type=Path, metavar="NEW.yaml", help="the configuration with what was found"
+        "--apply",
+        type=Path,
+        metavar="NEW.yaml",
+        help="write the configuration with the effects and the soil that were found",
+    )
+    parser.add_argument(
+        "--in-place",
+        action="store_true",
+        help="change the file of --config itself; as it was it stays beside, as F.bak",
     )
     parser.add_argument(
         "--redo", type=Path, metavar="FILE", help="do a diagnosis again from its JSON or its report"

@@ -61,6 +61,20 @@ def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
     assert run.read_bytes() == before
 
 
+def test_the_configuration_that_is_read_is_replaced_only_when_asked(
+    run: Path, tmp_path: Path
+) -> None:
+    own = tmp_path / "testbed.yaml"
+    own.write_bytes(packaged().read_bytes())
+    line, code = said(run, "--config", own, "--apply", own)
+    assert "is the configuration that is read" in line and code == USAGE
+
+    line, code = said(run, "--config", own, "--apply", tmp_path / "new.yaml", "--in-place")
+    assert "expected one of them" in line and code == USAGE
+    assert "--in-place: expected --config" in said(run, "--in-place")[0]
+    assert own.read_bytes() == packaged().read_bytes()
+
+
 def test_what_cannot_be_read_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("none")
     for name, code in (("nowhere.mcap", USAGE), (".", DAMAGED), ("text.mcap", DAMAGED)):

@@ -1,42 +1,97 @@
-"""The configuration that models what was found: effects with value and sigma, for simulator,
-daemon, next campaign.
+"""The configuration that models what was found: effects and soil with value and sigma, for
+simulator, daemon, next campaign.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
-
-import yaml
+from dataclasses import replace
+from math import inf
 
 from gritd.estimator.config.configuration import Configuration
-from gritd.estimator.config.yamltree import dumped
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.visible import visible
-from gritd.tools.diagnose.explain.result import Diagnosis, Quantity
+from gritd.tools.cli.yaml_edit import EditedYaml, quantity
+from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, SoilFit
+
+HEADER = "# made by gritd diagnose: "
+SOIL_KEYS = {"c": "cohesion", "tan_phi": "tan_phi", "k": "shear_modulus", "n": "exponent"}
+SOIL_UNITS = {"c": "Pa", "tan_phi": "", "k": "m", "n": ""}
+MODULI = {
+    "bekker": (("k_c", "Pa/m^(n-1)"), ("k_phi", "Pa/m^n")),
+    "reece": (("k1", "Pa"), ("k2", "Pa/m")),
+}
+SOIL_KNOWN = ("consistent", "explained")  # verdicts under which the fitted soil can be believed
 
 
 def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
-    """YAML text; without an accepted effect or law it is the configuration as it was."""
-    document: dict[str, Any] = yaml.safe_load(configuration.text)
-    effects = dict(document.get("effects") or {})
-    for hypothesis in diagnosis.accepted:
-        effects[hypothesis.effect] = _entry(hypothesis.effect, hypothesis.parameters)
+    """The effective YAML text with the accepted effects; without one, as it was."""
+    document = EditedYaml(configuration.text, configuration.source)
+    _set_effects(document, diagnosis)
+    return document.text()
+
+
+def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> str:
+    """The text of a configuration file with the accepted effects, and the fitted soil where the
+    verdict lets it be believed. Its comments stay.
+    """
+    document = EditedYaml(_without_header(text), configuration.source)
+    _set_effects(document, diagnosis)
+    if diagnosis.soil is not None and diagnosis.verdict in SOIL_KNOWN:
+        _set_soil(document, configuration.settings, diagnosis.soil)
+    return f"{HEADER}{visible(diagnosis.summary)}\n{document.text()}"
+
+
+def _without_header(text: str) -> str:
+    first, _, rest = text.partition("\n")
+    return rest if first.startswith(HEADER) else text
+
+
+def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
+    found = {h.effect: h.parameters for h in diagnosis.accepted}
     if diagnosis.law is not None and diagnosis.law.parameters:
-        effects["empirical_law"] = _entry("empirical_law", diagnosis.law.parameters)
-    document["effects"] = effects
-    return f"# made by gritd diagnose: {visible(diagnosis.summary)}\n{dumped(document)}"
+        found["empirical_law"] = diagnosis.law.parameters
+
+    for effect, parameters in found.items():
+        document.remove("effects", effect)
+        for name, fragment in _fragments(effect, parameters).items():
+            document.set(("effects", effect, name), fragment)
 
 
-def _entry(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, Any]:
+def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str]:
     units = {p.name: p.unit for p in EFFECTS[effect].parameters()}
-    return {n: _quantity(q, units[n]) for n, q in parameters.items() if n in units}
+    return {
+        name: quantity(found.value, found.sigma, units[name])
+        for name, found in parameters.items()
+        if name in units
+    }
 
 
-def _quantity(quantity: Quantity, unit: str) -> dict[str, Any]:
-    """{value, sigma} with the unit written behind the number, as the configuration has it."""
+def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:
+    """The fitted soil as what is known before the next run, inside the filter's bounds."""
+    for name, key in SOIL_KEYS.items():
+        found, before = soil.after[name], document.written("soil", key)
+        low, high = getattr(settings.filter, f"{key}_bounds", (0.0, inf))
+        value = min(max(found.value, low), high)
+        document.set(("soil", key), quantity(value, found.sigma, SOIL_UNITS[name], before))
 
-    def written(value: float) -> Any:
-        return f"{value:.9g} {unit}" if unit else float(f"{value:.9g}")
+    _set_moduli(document, settings, soil.after["n"].value, soil.after["K"])
 
-    return {"value": written(quantity.value), "sigma": written(max(quantity.sigma, 0.0))}
+
+def _set_moduli(
+    document: EditedYaml, settings: Settings, exponent: float, modulus: Quantity
+) -> None:
+    """Both moduli by one factor: one width cannot tell k_c from k_φ. The factor makes them K at
+    the new exponent, which Reece's form contains.
+    """
+    law = replace(settings.soil.pressure_sinkage, exponent=exponent)
+    factor = modulus.value / law.modulus(settings.wheel.width)
+
+    for (key, unit), value in zip(MODULI[law.form], (law.first, law.second), strict=True):
+        before = document.written("soil", key)
+        document.set(("soil", key), quantity(factor * value, 0.0, unit, before))
+
+    relative = min(modulus.sigma / modulus.value, 1.0)
+    before = document.written("soil", "modulus_sigma")
+    document.set(("soil", "modulus_sigma"), quantity(relative, 0.0, "", before or "1 %"))

@@ -1,0 +1,39 @@
+"""`gritd init`: a folder in which the next commands work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.commands import check_config
+from gritd.tools.commands.init import main
+
+
+def test_the_folder_can_be_worked_in_as_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "bench" / "rig"
+    assert main([str(folder)]) == 0
+    assert {path.name for path in folder.iterdir()} == {"testbed.yaml", "testbed.dbc", "README.md"}
+    assert (folder / "README.md").read_text().count("\n") == 3
+
+    assert check_config.main([str(folder / "testbed.yaml")]) == 0
+    assert "valid" in capsys.readouterr().out
+
+
+def test_no_file_is_replaced_and_none_is_left_half_way(tmp_path: Path) -> None:
+    (tmp_path / "testbed.dbc").write_text("mine")
+    with pytest.raises(CommandError, match="is there already") as error:
+        main([str(tmp_path)])
+    assert error.value.code == USAGE
+    assert [path.name for path in tmp_path.iterdir()] == ["testbed.dbc"]
+    assert (tmp_path / "testbed.dbc").read_text() == "mine"
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "rig").write_text("")
+    with pytest.raises(CommandError, match="expected a folder to write into") as error:
+        main([str(tmp_path / "rig")])
+    assert error.value.code == USAGE and "\n" not in str(error.value)

@@ -1,0 +1,102 @@
+"""What `--apply` writes: the user's own file with effects and soil, in place only when asked."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gritd.estimator.config import configuration as config
+from gritd.tools.commands import diagnose, init
+from gritd.tools.diagnose.explain.apply import applied, rewritten
+from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity
+from tests.tools.report.cases import base, soil
+
+REECE = ("  k1: 100 kPa\n  k2: 900 kN/m^3\n", "k_c: 0.9 kN/m^(n+1)", "k_phi: 1523.4 kN/m^(n+2)")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    init.main([str(tmp_path)])
+    return tmp_path / "testbed.yaml"
+
+
+def found(**changed: object) -> Diagnosis:
+    """Coulomb friction and a soil."""
+    friction = Hypothesis(
+        "coulomb_friction", 0.97, 30.0, {"loss": Quantity(0.2513, 0.021, "N*m")}, accepted=True
+    )
+    return base(verdict="explained", hypotheses=(friction,), soil=soil(812.0, 64.0, 0.0), **changed)
+
+
+def test_effects_and_soil_are_the_next_prior_and_comments_stay(rig: Path) -> None:
+    text, before = rig.read_text(), config.load(rig)
+    after = rewritten(text, before, found())
+    settings = config.loads(after, "new.yaml", rig.parent).settings
+
+    prior = settings.soil
+    assert (prior.cohesion.value, prior.cohesion.sigma) == (812.0, 64.0)
+    assert (prior.tan_phi.value, prior.tan_phi.sigma) == (0.571, 0.008)
+    assert prior.shear_modulus.value == pytest.approx(0.0246)
+    assert (prior.exponent.value, prior.exponent.sigma) == (1.098, 0.006)
+    assert prior.pressure_sinkage.modulus(settings.wheel.width) == pytest.approx(1.55e6)
+    assert prior.modulus_sigma == pytest.approx(2.1e4 / 1.55e6)
+    assert {e.name for e in settings.effects} == {"stress_linearisation", "coulomb_friction"}
+
+    comments = [line.partition("#")[2] for line in text.splitlines() if "#" in line]
+    assert [c for c in comments if c not in after] == []
+    assert replace(settings, soil=before.settings.soil, effects=()) == replace(
+        before.settings, effects=()
+    )
+
+
+def test_the_modulus_is_right_in_reeces_form_too(rig: Path) -> None:
+    text = rig.read_text()
+    moduli = text[text.index("  k_c:") : text.index("  modulus_sigma")]
+    text = text.replace(moduli, REECE[0])
+    after = rewritten(text, config.loads(text, "x", rig.parent), found())
+    settings = config.loads(after, "new.yaml", rig.parent).settings
+    assert settings.soil.pressure_sinkage.form == "reece"
+    assert settings.soil.pressure_sinkage.modulus(settings.wheel.width) == pytest.approx(1.55e6)
+
+
+def test_a_soil_that_is_not_believed_stays_out(rig: Path) -> None:
+    """Where something without a name remains, the soil has taken a part of it."""
+    before = config.load(rig)
+    for verdict in ("unlisted", "insufficient"):
+        after = rewritten(rig.read_text(), before, replace(found(), verdict=verdict))
+        assert config.loads(after, "x", rig.parent).settings.soil == before.settings.soil
+
+
+def test_a_soil_beyond_the_filters_bounds_is_put_at_the_bound(rig: Path) -> None:
+    fitted = found()
+    assert fitted.soil is not None
+    far = dict(fitted.soil.after) | {"k": Quantity(4e-4, 1e-4, "m")}
+    after = rewritten(
+        rig.read_text(), config.load(rig), replace(fitted, soil=replace(fitted.soil, after=far))
+    )
+    assert config.loads(after, "x", rig.parent).settings.soil.shear_modulus.value == 1e-3
+
+
+def test_again_and_again_leaves_one_line_of_origin(rig: Path) -> None:
+    once = rewritten(rig.read_text(), config.load(rig), found())
+    again = rewritten(once, config.loads(once, "x", rig.parent), found(summary="Another."))
+    assert again.count("made by gritd diagnose") == 1 and "Another." in again
+    assert again.partition("\n")[2] == once.partition("\n")[2]
+
+
+def test_the_filters_comparison_takes_the_effects_alone(rig: Path) -> None:
+    before = config.load(rig)
+    settings = config.loads(applied(before, found()), "x").settings
+    assert settings.soil == before.settings.soil and len(settings.effects) == 2
+
+
+def test_in_place_keeps_what_was_there(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = rig.read_text()
+    arguments = argparse.Namespace(redo=None, config=str(rig), apply=rig)
+    diagnose._apply(arguments, found(), config.load(rig))
+    backup = rig.with_name("testbed.yaml.bak")
+    assert backup.read_text() == before != rig.read_text()
+    assert str(backup) in capsys.readouterr().err

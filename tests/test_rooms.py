@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[1]
 
 # the lowest first; a room imports itself and those of lower rows
 ROOMS = (
-    ("config",),
-    ("estimator.terramechanics", "estimator.messages", "estimator.threads", "estimator.visible"),
+    ("config", "estimator.limits", "estimator.visible"),
+    ("estimator.terramechanics", "estimator.messages", "estimator.threads"),
     ("estimator.stages",),
     ("estimator.effects",),
     ("estimator.model", "estimator.config", "estimator.recording"),

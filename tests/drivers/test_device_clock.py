@@ -228,7 +228,7 @@ def test_a_clock_of_another_rate_does_not_lose_the_sensor(rate):
 
 @pytest.mark.parametrize("late", [0.03, 0.1, 0.445])
 def test_a_computer_that_is_too_slow_is_no_step(late):
-    """All comes late, steadily and for seconds, as when it reads no faster than the device sends."""
+    """All comes late, steadily and for seconds: it reads no faster than the device sends."""
     clock = DeviceClock()
     steady(clock, 5.0)
     for k in range(400):

@@ -210,7 +210,7 @@ def test_a_device_that_was_opened_again_is_decoded_anew(tmp_path):
     assert again.framing.counts.bad == 0 and again.framing.counts.good == 1
 
 
-def test_a_log_that_cannot_be_written_on_is_given_up_and_said(tmp_path, monkeypatch):
+def test_a_log_that_cannot_be_written_on_is_given_up_and_reported(tmp_path, monkeypatch):
     """A full disk must not end a reader."""
     path = tmp_path / "run.wire"
     writer = WireWriter(path)

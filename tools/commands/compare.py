@@ -39,22 +39,22 @@ def main(argv: Sequence[str]) -> int:
         require("matplotlib", "--png")
 
     configuration = config.load(arguments.config)
-    found = compare(
+    fitted = compare(
         arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv]
     )
 
     try:
         if arguments.report:
-            arguments.report.write_text(comparison.render(found), encoding="utf-8")
+            arguments.report.write_text(comparison.render(fitted), encoding="utf-8")
         if arguments.png:
-            importlib.import_module("gritd.tools.report.sheet").draw(arguments.png, found)
+            importlib.import_module("gritd.tools.report.sheet").draw(arguments.png, fitted)
     except OSError as error:
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
         ) from None
 
-    print(comparison.printed(found))
-    return DAMAGED if found.damage else DONE
+    print(comparison.printed(fitted))
+    return DAMAGED if fitted.damage else DONE
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -159,8 +159,8 @@ def _soil(rig: WheelRig, fit: Fitted) -> SoilFit:
         if k.soil
     ]
     prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k, _, _ in known}
-    found = {k.name: Quantity(k.of(u), k.spread(u, s), k.unit) for k, u, s in known}
-    return SoilFit(prior, found, found, {k.name: u for k, u, _ in known})
+    fitted = {k.name: Quantity(k.of(u), k.spread(u, s), k.unit) for k, u, s in known}
+    return SoilFit(prior, fitted, fitted, {k.name: u for k, u, _ in known})
 
 
 def _redo(

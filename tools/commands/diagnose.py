@@ -14,7 +14,7 @@ import os
 import shlex
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +30,13 @@ from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.apply import SOIL_KNOWN, rewritten
 from gritd.tools.diagnose.explain.innovations import with_innovations
-from gritd.tools.diagnose.explain.result import Diagnosis, NextExperiment
+from gritd.tools.diagnose.explain.result import (
+    Diagnosis,
+    Fit,
+    Hypothesis,
+    NextExperiment,
+    SoilFit,
+)
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, read_all
@@ -67,11 +73,11 @@ def main(argv: Sequence[str]) -> int:
         named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
     named += ["--config", str(arguments.config), "--seed", str(seed)]
     command = shlex.join(["gritd", "diagnose", *named])
-    found, damage = of_files(
-        arguments.files, configuration, seed, _said, arguments.jobs, command, reference
+    diagnosis, damage = of_files(
+        arguments.files, configuration, seed, _show_step, arguments.jobs, command, reference
     )
-    _write(arguments, found, configuration)
-    print(text(found))
+    _write(arguments, diagnosis, configuration)
+    print(text(diagnosis))
     return DAMAGED if damage else DONE
 
 
@@ -85,18 +91,18 @@ def _again(arguments: argparse.Namespace) -> int:
     then = record.read(arguments.redo, arguments.data)
     record.check(then)
     configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
-    found, _ = of_files(
+    diagnosis, _ = of_files(
         list(then.files),
         configuration,
         then.seed,
-        _said,
+        _show_step,
         arguments.jobs,
         then.command,
         then.reference,
     )
-    _write(arguments, found, configuration)
-    differs = list(record.differences(then, record.Record.of(found)))
-    print(text(found))
+    _write(arguments, diagnosis, configuration)
+    differs = list(record.differences(then, record.Record.of(diagnosis)))
+    print(text(diagnosis))
     for line in record.changed_versions(then):
         print(f"note: computed with {line}")
     print(f"redone: {'; '.join(differs) or f'the same as in {arguments.redo}'}")
@@ -110,10 +116,10 @@ def _many(arguments: argparse.Namespace) -> int:
             "diagnose --campaigns: expected no recordings or --config: they are in its folders",
             USAGE,
         )
-    every = campaigns.found(arguments.campaigns)
+    every = campaigns.find(arguments.campaigns)
     failed = False
-    for campaign, said in campaigns.diagnosed(every, _one, arguments.jobs, arguments.scheduler):
-        print(f"{campaign.folder.name}: {said}", flush=True)
+    for campaign, sentence in campaigns.diagnosed(every, _one, arguments.jobs, arguments.scheduler):
+        print(f"{campaign.folder.name}: {sentence}", flush=True)
         failed |= not campaign.done
     print(
         f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: "
@@ -129,8 +135,8 @@ def _one(campaign: campaigns.Campaign) -> str:
             main(campaign.arguments())
     except (CommandError, ConfigError, RecordingError) as error:
         return f"not diagnosed: {error}"
-    found = json.loads(campaign.result.read_text(encoding="utf-8"))
-    return f"{found['verdict']}. {found['summary']}"
+    diagnosis = json.loads(campaign.result.read_text(encoding="utf-8"))
+    return f"{diagnosis['verdict']}. {diagnosis['summary']}"
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:
@@ -164,24 +170,26 @@ def _check_output(path: Path, inputs: Sequence[Path]) -> None:
 
 
 def _write(
-    arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration
+    arguments: argparse.Namespace, diagnosis: Diagnosis, configuration: config.Configuration
 ) -> None:
     try:
         if arguments.json is not None:
-            written = json.dumps(found.to_json(), ensure_ascii=False, indent=1) + "\n"
+            written = json.dumps(diagnosis.to_json(), ensure_ascii=False, indent=1) + "\n"
             arguments.json.write_text(written, encoding="utf-8")
         if arguments.report is not None:
-            importlib.import_module("gritd.tools.report.diagnosis").write(found, arguments.report)
+            importlib.import_module("gritd.tools.report.diagnosis").write(
+                diagnosis, arguments.report
+            )
     except OSError as error:
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
         ) from None
     if arguments.apply is not None:
-        _apply(arguments, found, configuration)
+        _apply(arguments, diagnosis, configuration)
 
 
 def _apply(
-    arguments: argparse.Namespace, found: Diagnosis, configuration: config.Configuration
+    arguments: argparse.Namespace, diagnosis: Diagnosis, configuration: config.Configuration
 ) -> None:
     """Write the configuration with what was found; of an old diagnosis there is the effective text
     alone.
@@ -190,16 +198,14 @@ def _apply(
     source = arguments.redo if again else Path(arguments.config)
     text = configuration.text if again else read_text(source)
 
-    changed = rewritten(text, configuration, found)
+    changed = rewritten(text, configuration, diagnosis)
     backup = configuration_file.save(changed, source, arguments.apply)
 
     if backup is not None:
         print(f"{arguments.apply}: changed; as it was: {backup}", file=sys.stderr)
-    if found.soil is not None and found.verdict not in SOIL_KNOWN:
-        print(
-            f"{arguments.apply}: the soil stays as it was, since the verdict is {found.verdict}",
-            file=sys.stderr,
-        )
+    if diagnosis.soil is not None and diagnosis.verdict not in SOIL_KNOWN:
+        reason = f"since the verdict is {diagnosis.verdict}"
+        print(f"{arguments.apply}: the soil stays as it was, {reason}", file=sys.stderr)
 
 
 def of_files(
@@ -229,16 +235,18 @@ def of_files(
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
-        found = with_innovations(found, configuration, recordings, soil=found.soil is not None)
+        diagnosis = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
+        diagnosis = with_innovations(
+            diagnosis, configuration, recordings, soil=diagnosis.soil is not None
+        )
     if reference.files:
-        found = references.told(found, rig, reference)
+        diagnosis = references.with_reference(diagnosis, rig, reference)
     damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
-    said = [
+    remarks = [
         *provenance.remarks(recordings, configuration.settings),
         *(f"Damaged: {line}" for line in damage),
     ]
-    return replace(found, caveats=(*found.caveats, *said)), damage
+    return replace(diagnosis, caveats=(*diagnosis.caveats, *remarks)), damage
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -314,57 +322,69 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _said(what: str) -> None:
+def _show_step(what: str) -> None:
     if sys.stderr.isatty():
         out = control(sys.stderr)
         print(f"\r\033[K{visible(what)} …", end="", file=out, flush=True)
 
 
+def text(diagnosis: Diagnosis) -> str:
+    """The verdict for a person."""
+    lines = [
+        f"verdict: {diagnosis.verdict}",
+        diagnosis.summary,
+        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:4]),
+        *map(_hypothesis, diagnosis.hypotheses[:4]),
+    ]
+    if diagnosis.law is not None:
+        lines.append(f"  law: {diagnosis.law.expression} (takes {diagnosis.law.share:.0%})")
+    if diagnosis.soil is not None:
+        lines += _soil(diagnosis.soil)
+    lines += _fit(diagnosis.fit)
+
+    if diagnosis.next_experiment is not None:
+        following = diagnosis.next_experiment
+        lines.append(f"  next: {following.action}{_foreseen(following)}")
+    lines += [diagnosis.remaining_words, *(f"note: {c}" for c in diagnosis.caveats)]
+    return "\n".join(map(visible, lines))
+
+
+def _hypothesis(of: Hypothesis) -> str:
+    values = ", ".join(
+        f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in of.parameters.items()
+    )
+    alike = f"; like {', '.join(of.indistinguishable_from)}" if of.indistinguishable_from else ""
+    return f"  {'*' if of.accepted else ' '} {of.effect} {of.probability:.2f}: {values}{alike}"
+
+
+def _soil(soil: SoilFit) -> Iterator[str]:
+    for name in ("c", "tan_phi"):
+        before, after = soil.before[name], soil.after[name]
+        yield (
+            f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
+            f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
+        )
+    if strained := soil.strained():
+        yield f"  {strained}"
+
+
+def _fit(fit: Fit) -> Iterator[str]:
+    for channel, unit in fit.unit.items():
+        yield (
+            f"  held-out {channel}: {fit.before[channel]:.3g} before, "
+            f"{fit.after[channel]:.3g} after, noise {fit.noise_floor[channel]:.2g} {unit}"
+        )
+
+    if fit.innovation_before and fit.innovation_after:
+        ratios = ", ".join(
+            f"{name} {ratio:.2g} before, {fit.innovation_after.get(name, ratio):.2g} after"
+            for name, ratio in fit.innovation_before.items()
+        )
+        yield f"  on-line filter, innovation over its sigma: {ratios}"
+    elif fit.innovation_note:
+        yield f"  on-line filter: {fit.innovation_note}"
+
+
 def _foreseen(following: NextExperiment) -> str:
     gain = following.expected_gain_nats
     return f" (expected gain {gain:.0f} nats)" if math.isfinite(gain) else ""
-
-
-def text(found: Diagnosis) -> str:
-    """The verdict for a person."""
-    lines = [f"verdict: {found.verdict}", found.summary]
-    for place in found.location[:4]:
-        lines.append(f"  where: {place.where} (p {place.p:.2g})")
-    for h in found.hypotheses[:4]:
-        values = ", ".join(
-            f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in h.parameters.items()
-        )
-        alike = f"; like {', '.join(h.indistinguishable_from)}" if h.indistinguishable_from else ""
-        lines.append(
-            f"  {'*' if h.accepted else ' '} {h.effect} {h.probability:.2f}: {values}{alike}"
-        )
-    if found.law is not None:
-        lines.append(f"  law: {found.law.expression} (takes {found.law.share:.0%})")
-    if found.soil is not None:
-        for name in ("c", "tan_phi"):
-            before, after = found.soil.before[name], found.soil.after[name]
-            lines.append(
-                f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
-                f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
-            )
-        if strained := found.soil.strained():
-            lines.append(f"  {strained}")
-    for channel, unit in found.fit.unit.items():
-        lines.append(
-            f"  held-out {channel}: {found.fit.before[channel]:.3g} before, "
-            f"{found.fit.after[channel]:.3g} after, "
-            f"noise {found.fit.noise_floor[channel]:.2g} {unit}"
-        )
-    if found.fit.innovation_before and found.fit.innovation_after:
-        pairs = found.fit.innovation_before.items()
-        said = ", ".join(
-            f"{n} {v:.2g} before, {found.fit.innovation_after.get(n, v):.2g} after"
-            for n, v in pairs
-        )
-        lines.append(f"  on-line filter, innovation over its sigma: {said}")
-    elif found.fit.innovation_note:
-        lines.append(f"  on-line filter: {found.fit.innovation_note}")
-    if found.next_experiment is not None:
-        lines.append(f"  next: {found.next_experiment.action}{_foreseen(found.next_experiment)}")
-    lines += [found.remaining_words, *(f"note: {c}" for c in found.caveats)]
-    return "\n".join(map(visible, lines))

@@ -54,7 +54,7 @@ class Campaign:
         ]
 
 
-def found(folder: Path) -> list[Campaign]:
+def find(folder: Path) -> list[Campaign]:
     """The campaigns of a folder, by name. Raises CommandError where there is none, or one without a
     configuration.
     """

@@ -131,8 +131,8 @@ def _trouble(report: Report) -> Iterator[str]:
             yield f"{TROUBLE} {name} {stats['state']} {stats['last_error']}".rstrip()
     if report["log"]["state"] != "writing":
         yield f"{TROUBLE} log {report['log']['state']} {report['log']['error']}".rstrip()
-    if found := report.get("disagreement"):
-        yield f"{TROUBLE} model {disagreement(found)}"
+    if disagreeing := report.get("disagreement"):
+        yield f"{TROUBLE} model {disagreement(disagreeing)}"
 
 
 def _quantity(

@@ -29,22 +29,24 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
     if first.run.part:
         rerun.lose()
 
-    found, gaps = Differences(), Gaps()
+    differences, gaps = Differences(), Gaps()
 
     for recording, tick in ticks_of(recordings, configuration, "verifying"):
         if gaps.before(recording, tick):
             rerun.lose()
         if tick.checkpoint is not None:
-            found.resumed(tick.stamp, rerun.resume(tick.checkpoint))
+            differences.resumed(tick.stamp, rerun.resume(tick.checkpoint))
 
         record = rerun.step(tick)
         if tick.logged is not None and rerun.known:
-            found.compare(tick.logged, record)
+            differences.compare(tick.logged, record)
         elif tick.logged is not None:
-            found.unknown += 1
+            differences.unknown += 1
 
-    print(f"{first.path}: {found.compared} ticks, {len(TICK_NAMES)} fields each: {found}")
-    return _code(recordings, found)
+    print(
+        f"{first.path}: {differences.compared} ticks, {len(TICK_NAMES)} fields each: {differences}"
+    )
+    return _code(recordings, differences)
 
 
 def _check(first: Recording) -> None:
@@ -58,18 +60,18 @@ def _check(first: Recording) -> None:
         )
 
 
-def _code(recordings: list[Recording], found: Differences) -> int:
+def _code(recordings: list[Recording], differences: Differences) -> int:
     """The exit code; says what is missing. Raises CommandError where nothing was compared."""
     missing = [(recording.path, lost) for recording in recordings if (lost := lost_of(recording))]
     for path, lost in missing:
         print(f"{path}: {lost} messages are missing")
 
-    if not found.compared and not missing:
+    if not differences.compared and not missing:
         raise CommandError(
             f"{recordings[0].path}: its first state is not known; verify from the run's first part",
             USAGE,
         )
-    return FAILED if found.ticks else DAMAGED if missing else DONE
+    return FAILED if differences.ticks else DAMAGED if missing else DONE
 
 
 def lost_of(recording: Recording) -> int:

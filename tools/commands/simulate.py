@@ -119,9 +119,9 @@ def _driven(recording: Recording, settings: Settings) -> Motion:
 def _check_length(what: Path, seconds: float, rate: float) -> None:
     """Raises CommandError where a run would not fit into memory."""
     if seconds * rate > MOST_SAMPLES:
-        found = f"{seconds:.0f} s, {seconds * rate:.0f} samples at {rate:g} Hz"
+        length = f"{seconds:.0f} s, {seconds * rate:.0f} samples at {rate:g} Hz"
         longest = f"{MOST_SAMPLES}, which are {MOST_SAMPLES / rate:.0f} s"
-        raise CommandError(f"{what}: found {found}; expected at most {longest}", USAGE)
+        raise CommandError(f"{what}: found {length}; expected at most {longest}", USAGE)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -109,12 +109,12 @@ def _label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def disagreement(found: Mapping[str, Any]) -> str:
+def disagreement(disagreeing: Mapping[str, Any]) -> str:
     """Channel, time and size of a disagreement between model and measurement, in words."""
-    since = time.strftime("%H:%M:%S", time.gmtime(found["since"]))
+    since = time.strftime("%H:%M:%S", time.gmtime(disagreeing["since"]))
     return (
-        f"disagrees with {found['channel'].replace('_', ' ')} since {since} UTC, "
-        f"{found['sigmas']:.1f} σ off"
+        f"disagrees with {disagreeing['channel'].replace('_', ' ')} since {since} UTC, "
+        f"{disagreeing['sigmas']:.1f} σ off"
     )
 
 
@@ -126,8 +126,8 @@ def summary(report: Report) -> Iterator[str]:
     if tick:
         yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
-    if found := report.get("disagreement"):
-        yield f"  model    {disagreement(found)}"
+    if disagreeing := report.get("disagreement"):
+        yield f"  model    {disagreement(disagreeing)}"
 
     yield (
         f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "

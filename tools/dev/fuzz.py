@@ -158,11 +158,11 @@ def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], byte
         decoder.decode(data[:cut])
         decoder.decode(data[cut:])
 
-        found = [frame for piece in probe for frame in decoder.decode(piece)]
+        intact = [frame for piece in probe for frame in decoder.decode(piece)]
 
         return (
             ""
-            if any(frame.values == (1234,) for frame in found)
+            if any(frame.values == (1234,) for frame in intact)
             else "no intact frame is read after the damage"
         )
 
@@ -245,14 +245,16 @@ def checked(path: Path, written: Sequence[str], prefix: bool) -> str:
     """What is read must have been written, in this order; what is missing must be said."""
     try:
         recording = read(path)
-        found = [repr(message) for message in recording.messages()]
+        messages = [repr(message) for message in recording.messages()]
     except RecordingError as error:
         return "" if "\n" not in str(error) else f"more than one line: {error}"
-    if prefix and found != written[: len(found)]:
+    if prefix and messages != written[: len(messages)]:
         return "not a prefix"
-    if not set(found) <= set(written):
-        return f"a message that was not written: {(set(found) - set(written)).pop()}"
-    return "a loss that is not reported" if len(found) < len(written) and recording.complete else ""
+    if not set(messages) <= set(written):
+        return f"a message that was not written: {(set(messages) - set(written)).pop()}"
+    return (
+        "a loss that is not reported" if len(messages) < len(written) and recording.complete else ""
+    )
 
 
 def recordings(folder: Path) -> Case:

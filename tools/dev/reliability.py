@@ -174,15 +174,15 @@ def _table(figures: Sequence[Figure]) -> Iterator[str]:
         groups.setdefault((figure["row"], figure["name"], figure["level"]), []).append(figure)
 
     for row, name, level in sorted(groups, key=lambda key: key[0].lower()):
-        found = groups[row, name, level]
-        worst, limit, unit = max(f["value"] for f in found), found[0]["limit"], found[0]["unit"]
+        runs = groups[row, name, level]
+        worst, limit, unit = max(f["value"] for f in runs), runs[0]["limit"], runs[0]["unit"]
         bound, shown = (
             "" if limit is None else f"{limit:g} {unit}".strip(),
             f"{worst:.3g} {unit}".strip(),
         )
 
-        shown = f"**{shown}**" if any(map(_above, found)) else shown
-        yield f"| {row} | {name} | {shown} | {bound} | {len(found)} | {level} |".replace("  ", " ")
+        shown = f"**{shown}**" if any(map(_above, runs)) else shown
+        yield f"| {row} | {name} | {shown} | {bound} | {len(runs)} | {level} |".replace("  ", " ")
 
 
 if __name__ == "__main__":

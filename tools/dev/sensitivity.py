@@ -92,7 +92,7 @@ def _in_odds(share: float, factor: float) -> float:
 
 
 @dataclass(frozen=True)
-class Said:
+class Outcome:
     """What counts of a diagnosis: probabilities by effect, tan φ and its standard deviation."""
 
     verdict: str
@@ -112,7 +112,7 @@ class Moved:
     sigmas: float
 
     @classmethod
-    def between(cls, before: Said, after: Said) -> Moved:
+    def between(cls, before: Outcome, after: Outcome) -> Moved:
         """sigmas: change of tan φ in its standard deviation before; 0 without a soil."""
         every = {*before.probabilities, *after.probabilities}
         most = max(
@@ -124,10 +124,10 @@ class Moved:
         return cls(before.verdict != after.verdict, names, most, 0.0 if apart != apart else apart)
 
 
-Diagnose = Callable[[Path], Said]
+Diagnose = Callable[[Path], Outcome]
 
 
-def diagnosed(folder: Path) -> Said:
+def diagnosed(folder: Path) -> Outcome:
     """A campaign up to its verdict and soil, with the numbers in force; seed 0. What fails is said
     as a verdict.
     """
@@ -138,15 +138,15 @@ def diagnosed(folder: Path) -> Said:
             warnings.simplefilter("ignore", RuntimeWarning)
             return _decided(rig_of(read_all(files), config.load(configuration).settings)[0])
     except (CommandError, ArithmeticError, LookupError, ValueError) as error:
-        return Said(f"failed: {type(error).__name__}")
+        return Outcome(f"failed: {type(error).__name__}")
 
 
-def _decided(rig: Rig) -> Said:
+def _decided(rig: Rig) -> Outcome:
     """The method without what explains a decision: that changes none of what counts here."""
     rng = np.random.default_rng(0)
     decision = decide(search_models(prepare_screening(fit_base(rig, rng), rng)))
     tan_phi = averaged_soil(rig, decision).get("tan_phi")
-    return Said(
+    return Outcome(
         decision.verdict,
         tuple(sorted(decision.best.names)),
         dict(decision.probability),
@@ -169,7 +169,7 @@ class _Counted:
         return getattr(self._numbers, name)
 
 
-def read_by(diagnose: Diagnose, folder: Path) -> tuple[Said, frozenset[Field], float]:
+def read_by(diagnose: Diagnose, folder: Path) -> tuple[Outcome, frozenset[Field], float]:
     """A diagnosis with the numbers as they are, the numbers that it read, and its seconds."""
     read: set[Field] = set()
     before = {f.name: getattr(TUNING, f.name) for f in fields(TUNING)}
@@ -177,11 +177,11 @@ def read_by(diagnose: Diagnose, folder: Path) -> tuple[Said, frozenset[Field], f
     try:
         for room, numbers in before.items():
             setattr(TUNING, room, _Counted(room, numbers, read))
-        said = diagnose(folder)
+        outcome = diagnose(folder)
     finally:
         for room, numbers in before.items():
             setattr(TUNING, room, numbers)
-    return said, frozenset(read), time.process_time() - began
+    return outcome, frozenset(read), time.process_time() - began
 
 
 # --- runs ---
@@ -200,7 +200,7 @@ class Case:
 class Runs:
     """What has been diagnosed so far."""
 
-    before: dict[Path, Said] = field(default_factory=dict)
+    before: dict[Path, Outcome] = field(default_factory=dict)
     read: dict[Path, frozenset[Field]] = field(default_factory=dict)
     seconds: dict[Path, float] = field(default_factory=dict)
     moved: dict[Case, Moved] = field(default_factory=dict)
@@ -222,11 +222,11 @@ class Runs:
 _diagnose: Diagnose = diagnosed  # what the children find when they are forked
 
 
-def _first(folder: Path) -> tuple[Path, Said, frozenset[Field], float]:
+def _first(folder: Path) -> tuple[Path, Outcome, frozenset[Field], float]:
     return folder, *read_by(_diagnose, folder)
 
 
-def _changed(case: Case) -> tuple[Case, Said]:
+def _changed(case: Case) -> tuple[Case, Outcome]:
     value = changed(case.field.value, case.field.about["unit"], case.factor)
     with replaced(case.field.room, **{case.field.name: value}):
         return case, _diagnose(case.folder)
@@ -247,12 +247,12 @@ def run(
     _diagnose, runs, end = diagnose, Runs(), time.monotonic() + 60.0 * minutes
 
     with multiprocessing.get_context("fork").Pool(jobs, maxtasksperchild=1) as pool:
-        for folder, said, read, seconds in _shown("campaigns", pool.imap, _first, folders):
-            runs.before[folder], runs.read[folder] = said, read
+        for folder, outcome, read, seconds in _shown("campaigns", pool.imap, _first, folders):
+            runs.before[folder], runs.read[folder] = outcome, read
             runs.seconds[folder] = seconds
 
-        for case, said in _shown("numbers", pool.imap, _changed, runs.cases(only)):
-            runs.moved[case] = Moved.between(runs.before[case.folder], said)
+        for case, outcome in _shown("numbers", pool.imap, _changed, runs.cases(only)):
+            runs.moved[case] = Moved.between(runs.before[case.folder], outcome)
             write(runs)
             if time.monotonic() > end:
                 pool.terminate()
@@ -300,10 +300,10 @@ def _extent(runs: Runs, only: Sequence[str], every: int) -> str:
     for folder in sorted(runs.read, key=lambda f: runs.seconds[f]):
         own = [c for c in cases if c.folder == folder]
         done = sum(c in runs.moved for c in own)
-        said = runs.before[folder]
-        names = ", ".join(said.accepted) or "no name"
+        outcome = runs.before[folder]
+        names = ", ".join(outcome.accepted) or "no name"
         lines.append(
-            f"- `{folder.name}` ({said.verdict}: {names}): {done} of {len(own)} diagnoses,"
+            f"- `{folder.name}` ({outcome.verdict}: {names}): {done} of {len(own)} diagnoses,"
             f" {len(runs.read[folder])} numbers read, {runs.seconds[folder]:.0f} s for one"
         )
 

@@ -96,14 +96,14 @@ def _seen(have: Have, *effects: Effect) -> Array:
 
 def _channels(have: Have, soil: Soil, effects: tuple[Effect, ...]) -> Array:
     """All channels of all runs, over noise and weighed by the time each sample stands for."""
-    found = []
+    columns = []
     for motion in runs(have):
         response = simulate_arrays(WHEEL, soil, motion, effects, torque_constant=TORQUE_CONSTANT)
         weight = np.sqrt(np.gradient(np.asarray(motion.time)) / CORRELATED)
-        found += [weight * values / NOISE[name] for name, values in channels(response).items()]
+        columns += [weight * values / NOISE[name] for name, values in channels(response).items()]
         if "wrench" in have:
-            found.append(weight * response.sensed.torque / NOISE["torque"])
-    return np.concatenate(found)
+            columns.append(weight * response.sensed.torque / NOISE["torque"])
+    return np.concatenate(columns)
 
 
 @cache

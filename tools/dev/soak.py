@@ -138,19 +138,19 @@ def simulated(arguments: Namespace) -> list[str]:
             progress.advance()
 
     slope = growth(memory)
-    found = dict(zip(TICK_NAMES, record, strict=True))
+    last = dict(zip(TICK_NAMES, record, strict=True))
     print(
         f"pipeline ({arguments.engine}): {ticks} ticks of {arguments.tick:g} Hz, "
         f"one reading in {arguments.thin}, {number + 1} laps of {LAP / 60:g} min "
         f"({(number + 1) * LAP / 3600:.1f} h simulated), {len(pool)} noises, "
         f"in {time.monotonic() - began:.0f} s, {unfit} ticks without a finite estimate, "
-        f"{found['updates']} updates, {found['resets']} resets, memory {memory[-1][1]:.1f} MB, "
+        f"{last['updates']} updates, {last['resets']} resets, memory {memory[-1][1]:.1f} MB, "
         f"{slope:+.3f} MB per simulated hour",
         flush=True,
     )
 
     wrong = [f"{unfit} unfit ticks"] * bool(unfit) + leak(memory)
-    return wrong + [f"{found['resets']} false resets"] * bool(found["resets"])
+    return wrong + [f"{last['resets']} false resets"] * bool(last["resets"])
 
 
 def driven(settings: Settings, seed: int) -> Iterator[list[Reading]]:
@@ -259,10 +259,10 @@ def shorten_parts(path: Path, minutes: float) -> None:
     """Let a part of the recording end after so long: what the end of a part needs has then settled
     when it counts.
     """
-    text, found = re.subn(
+    text, replaced = re.subn(
         r"(?m)^( +part_time:).*$", rf"\g<1> {minutes:g} min", path.read_text(encoding="utf-8")
     )
-    assert found == 1, f"{path}: part_time stands there {found} times"
+    assert replaced == 1, f"{path}: part_time stands there {replaced} times"
     path.write_text(text, encoding="utf-8")
 
 

@@ -89,10 +89,10 @@ def main(argv: Sequence[str]) -> int:
     """Print the table in Markdown."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--data", type=Path, required=True, metavar="DIR")
-    found = sorted(stretches(parser.parse_args(argv).data))
+    names = sorted(stretches(parser.parse_args(argv).data))
     print("| W [N] | slip | sinkage [mm]: SCM, strips, paper | T [N·m] | DP [N] |")
     print("|---|---|---|---|---|")
-    for one in found:
+    for one in names:
         three = list(zip(one.chrono, one.strips, one.paper, strict=True))
         sinkage = ", ".join(f"{1e3 * value:.1f}" for value in three[0])
         torque, pull = (

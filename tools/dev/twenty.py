@@ -393,22 +393,22 @@ def _diagnosed(campaign: Path, out: Path, gritd: Path) -> Spent:
     return Spent(round(wall, 2), round(used.ru_utime + used.ru_stime, 2), process.returncode)
 
 
-def _write_times(path: Path, found: Mapping[str, Any]) -> None:
+def _write_times(path: Path, times: Mapping[str, Any]) -> None:
     """Beside those of campaigns that were not diagnosed this time."""
     before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    text = json.dumps({**before, **found}, indent=1, sort_keys=True)
+    text = json.dumps({**before, **times}, indent=1, sort_keys=True)
     path.write_text(text + "\n", encoding="utf-8")
 
 
 def _row(result: Path, took: Spent) -> str:
     """Name, verdict, what was accepted (else what is most probable), seconds."""
-    said = f"{result.stem:26} {took.wall_s:6.1f} s  "
+    head = f"{result.stem:26} {took.wall_s:6.1f} s  "
     if not result.exists():
-        return f"{said}exit {took.exit}, no result"
-    found = json.loads(result.read_text(encoding="utf-8"))
-    first = [h for h in found["hypotheses"] if h["accepted"]] or found["hypotheses"][:2]
+        return f"{head}exit {took.exit}, no result"
+    diagnosis = json.loads(result.read_text(encoding="utf-8"))
+    first = [h for h in diagnosis["hypotheses"] if h["accepted"]] or diagnosis["hypotheses"][:2]
     names = ", ".join(f"{h['effect']} {h['probability']:.2f}" for h in first)
-    return f"{said}{found['verdict']:13} {names}"
+    return f"{head}{diagnosis['verdict']:13} {names}"
 
 
 # --- compare ---
@@ -419,11 +419,11 @@ def compare(one: Path, other: Path) -> int:
     names = sorted({p.stem for f in (one, other) for p in f.glob("*.json") if p.name != TIMES})
     if not names:
         raise SystemExit(f"{one}, {other}: found no results; expected those of `diagnose`")
-    said = {name: _compared(name, one, other) for name in names}
-    for name, differs in said.items():
+    differences = {name: _compared(name, one, other) for name in names}
+    for name, differs in differences.items():
         print(f"{name:26} {differs or 'identical'}")
 
-    count = sum(not _matters(differs) for differs in said.values())
+    count = sum(not _matters(differs) for differs in differences.values())
     print(f"{count} of {len(names)} the same")
     return int(count < len(names))
 
@@ -450,14 +450,14 @@ def _compared(name: str, one: Path, other: Path) -> str:
 def _differing(a: dict[str, Any], b: dict[str, Any]) -> str:
     """The first keys that differ; a release has another version in it, which is no difference."""
     keys = [f"{key}: {x!s:.40} | {y!s:.40}" for key, x, y in _leaves(a, b)]
-    said = "; ".join(keys[:SHOWN])
+    listed = "; ".join(keys[:SHOWN])
     versions = [{**d["redo"]["versions"], "gritd": ""} for d in (a, b)]
     same = [
         {**d, "redo": {**d["redo"], "versions": v}} for d, v in zip((a, b), versions, strict=True)
     ]
     if json.dumps(same[0]) == json.dumps(same[1]):
-        return VERSION_ONLY + said
-    return f"{len(keys)} values differ: {said}" if keys else "order or layout differs"
+        return VERSION_ONLY + listed
+    return f"{len(keys)} values differ: {listed}" if keys else "order or layout differs"
 
 
 def _leaves(a: Any, b: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:

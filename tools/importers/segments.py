@@ -82,7 +82,7 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
     )
 
     sinkage = _all([c.sinkage for c in conditions], *run, 3)
-    found = [
+    sensors = [
         Stream("wheel_encoder", times, _travel([c.rim_speed for c in conditions], counting.rim)),
         Stream(
             "carriage_encoder",
@@ -93,14 +93,14 @@ def streams(conditions: Sequence[Condition], counting: Counting, *run: int) -> l
     ]
 
     if any(c.current is not None for c in conditions):
-        found.append(Stream("motor_shunt", times, _all([c.current for c in conditions], *run, 4)))
+        sensors.append(Stream("motor_shunt", times, _all([c.current for c in conditions], *run, 4)))
 
     axes = np.zeros((len(times), 6))
     axes[:, 0] = _all([c.drawbar_pull for c in conditions], *run, 0)
     axes[:, 1] = _all([c.lateral_force for c in conditions], *run, 1)
     axes[:, 2] = _all([c.load for c in conditions], *run, 2)
 
-    return [*found, Stream("wrench", times, axes)]
+    return [*sensors, Stream("wrench", times, axes)]
 
 
 def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
@@ -114,10 +114,10 @@ def _travel(speeds: Sequence[float], per_count: float) -> NDArray[np.int64]:
 def _all(values: Sequence[Uncertain | None], *seed: int) -> Array:
     """One array of mean ± standard deviation, segment by segment; 0 where nothing was measured."""
     order = np.random.default_rng(seed)
-    scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
-    scores /= scores.std()
+    normal_scores = norm.ppf((np.arange(INDEPENDENT) + 0.5) / INDEPENDENT)
+    normal_scores /= normal_scores.std()
     length = round(RATE * DURATION / INDEPENDENT)
     known = [value or Uncertain(0.0) for value in values]
     return np.concatenate(
-        [v.value + v.sigma * np.repeat(order.permutation(scores), length) for v in known]
+        [v.value + v.sigma * np.repeat(order.permutation(normal_scores), length) for v in known]
     )

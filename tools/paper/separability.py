@@ -71,15 +71,15 @@ def fitted_soil() -> Lines:
         soil = named.under(WHEEL.width)
         prior = replace(soil, cohesion=1.25 * soil.cohesion, tan_phi=0.95 * soil.tan_phi)
 
-        found = (
+        soils = (
             fit(soil),
             fit(soil, IntegralShift(WHEEL, soil)),
             fit(soil, IntegralShift(WHEEL, prior)),
         )
 
-        c = "".join(f"{x:>{width}.0f}" for (x, _), width in zip(found, (8, 9, 11), strict=True))
+        c = "".join(f"{x:>{width}.0f}" for (x, _), width in zip(soils, (8, 9, 11), strict=True))
         tan_phi = "".join(
-            f"{x:>{width}.4f}" for (_, x), width in zip(found, (8, 9, 11), strict=True)
+            f"{x:>{width}.4f}" for (_, x), width in zip(soils, (8, 9, 11), strict=True)
         )
         yield (
             f"  {named.name:<12}{float(soil.cohesion):>8.0f}{c}    "
@@ -117,5 +117,5 @@ def fit(soil: Soil, shift: IntegralShift | None = None) -> tuple[float, float]:
         pull = (np.array([p.drawbar_pull for p in closed]) - solved.forces.drawbar_pull) / 0.5
         return np.concatenate((torque, pull))
 
-    found = least_squares(misfit, [1.0, 0.5], bounds=([0.0, 0.0], [10.0, 2.0]), xtol=1e-12).x
-    return 1e3 * float(found[0]), float(found[1])
+    solution = least_squares(misfit, [1.0, 0.5], bounds=([0.0, 0.0], [10.0, 2.0]), xtol=1e-12).x
+    return 1e3 * float(solution[0]), float(solution[1])

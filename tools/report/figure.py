@@ -131,16 +131,16 @@ def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:
 
     for field, color in UPDATES.items():
         offered = ticks[f"{field}_s"] > 0.0
-        score = ticks[f"{field}_innovation"][offered] / np.sqrt(ticks[f"{field}_s"][offered])
+        normalised = ticks[f"{field}_innovation"][offered] / np.sqrt(ticks[f"{field}_s"][offered])
         name = field.replace("_", " ")
         ax.plot(
             seconds[offered],
-            score,
+            normalised,
             ".",
             ms=4,
             color=color,
             alpha=0.75,
-            label=f"{name} ({_inside(score)} in ± 2)",
+            label=f"{name} ({_inside(normalised)} in ± 2)",
         )
 
     ax.set_ylim(-5, 5)
@@ -151,8 +151,8 @@ def _innovations(ax: Axes, ticks: Rows, seconds: Array) -> None:
     plain(ax)
 
 
-def _inside(score: Array) -> str:
-    return f"{np.mean(np.abs(score) <= 2.0):.0%}" if score.size else "none"
+def _inside(normalised: Array) -> str:
+    return f"{np.mean(np.abs(normalised) <= 2.0):.0%}" if normalised.size else "none"
 
 
 def _shade_idle(ax: Axes, ticks: Rows, seconds: Array) -> None:

@@ -60,25 +60,27 @@ def again(redo: Mapping[str, Any]) -> Given:
     return Given(tuple(Path(name) for name in kept["files"]), kept["bed"])
 
 
-def told(found: Diagnosis, rig: Rig, reference: Given) -> Diagnosis:
+def with_reference(diagnosis: Diagnosis, rig: Rig, reference: Given) -> Diagnosis:
     """The result with what it was held against, and what of it lies outside."""
     covered = coverage(Stack(rig))
     files = tuple(str(path) for path in reference.files)
     kept = Reference(files, reference.verdict, reference.bed, covered.share, covered.outside)
-    caveats = found.caveats
+    caveats = diagnosis.caveats
     if covered.share < WELL:
         caveats = (
             *caveats,
             f"{covered.share:.0%} of the new campaign lies where the reference was driven;"
             f" outside: {covered.outside}. What is said of the rest is less certain.",
         )
-    return replace(found, reference=kept, caveats=caveats)
+    return replace(diagnosis, reference=kept, caveats=caveats)
 
 
 def _earlier(path: Path) -> Mapping[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(found["redo"]["files"], dict) or not isinstance(found["verdict"], str):
+        diagnosis = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(diagnosis["redo"]["files"], dict) or not isinstance(
+            diagnosis["verdict"], str
+        ):
             raise KeyError("redo.files")
     except FileNotFoundError:
         raise CommandError(f"{path}: found no such file; expected a reference", USAGE) from None
@@ -87,7 +89,7 @@ def _earlier(path: Path) -> Mapping[str, Any]:
             f"{path}: found no diagnosis; expected recordings or the JSON of `gritd diagnose`",
             DAMAGED,
         ) from None
-    return found  # type: ignore[no-any-return]
+    return diagnosis  # type: ignore[no-any-return]
 
 
 def _beside(path: Path, name: str) -> Path:

@@ -48,8 +48,8 @@ def reports(connection: socket.socket) -> Iterator[Report]:
     """The reports as they come. Raises CommandError where the daemon ends or is silent."""
     waiting = b""
     while True:
-        line, found, rest = waiting.partition(b"\n")
-        if found:
+        line, newline, rest = waiting.partition(b"\n")
+        if newline:
             waiting = rest
             yield _parsed(line)
         else:

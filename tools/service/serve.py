@@ -71,8 +71,8 @@ def _serve(configuration: Configuration, service: Service) -> int:
     tap_of = taps.writers.__getitem__ if taps else _no_tap
     readers = build_readers(settings, clock.now, queue, tap_of, playback)
 
-    for found in sweep(service.folder):
-        say(f"{found}: a power cut had taken its name; it has it again")
+    for rescued in sweep(service.folder):
+        say(f"{rescued}: a power cut had taken its name; it has it again")
 
     path = run_path(service.folder, service.run.name, clock.now())
     daemon = Daemon(configuration, path, service.run, readers, QueueSource(queue), clock)

@@ -102,7 +102,7 @@ def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: 
         signals(read_all([empty])[0], settings, 10.0)
 
 
-def test_another_testbed_than_the_recorded_one_is_said(run: Path) -> None:
+def test_another_testbed_than_the_recorded_one_is_reported(run: Path) -> None:
     """The wrong file after --config makes a mismatch that no physics explains."""
     text = packaged().read_text(encoding="utf-8")
     other = config.loads(

@@ -35,7 +35,7 @@ def test_folders_with_recordings_are_campaigns(tmp_path: Path) -> None:
     for name in ("b", "a"):
         folder_of(tmp_path, name)
     (tmp_path / "notes").mkdir()
-    found = campaigns.found(tmp_path)
+    found = campaigns.find(tmp_path)
     assert [campaign.folder.name for campaign in found] == ["a", "b"]
     assert [path.name for path in found[0].files] == ["run-1.mcap"] and found[
         0
@@ -44,20 +44,20 @@ def test_folders_with_recordings_are_campaigns(tmp_path: Path) -> None:
 
 def test_mistakes_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(CommandError, match=r"found no folder with recordings \(\*\.mcap\) in it"):
-        campaigns.found(tmp_path)
+        campaigns.find(tmp_path)
     with pytest.raises(CommandError, match="found no folder; expected one"):
-        campaigns.found(tmp_path / "nowhere")
+        campaigns.find(tmp_path / "nowhere")
     folder_of(tmp_path, "a", configurations=2)
     with pytest.raises(
         CommandError, match=r"a: found 2 files \*\.yaml; expected its configuration"
     ):
-        campaigns.found(tmp_path)
+        campaigns.find(tmp_path)
 
 
 def test_one_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None:
     for name in ("a", "bad", "c"):
         folder_of(tmp_path, name)
-    found = campaigns.found(tmp_path)
+    found = campaigns.find(tmp_path)
     said = {c.folder.name: words for c, words in campaigns.diagnosed(found, write_result, 2, None)}
     assert said == {
         "a": "consistent",
@@ -69,7 +69,7 @@ def test_one_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None:
 
 def test_what_is_done_is_not_done_again_until_a_file_changes(tmp_path: Path) -> None:
     folder_of(tmp_path, "a")
-    found = campaigns.found(tmp_path)
+    found = campaigns.find(tmp_path)
     assert len(list(campaigns.diagnosed(found, write_result, 1, None))) == 1
     assert not list(campaigns.diagnosed(found, write_result, 1, None))
     later = found[0].result.stat().st_mtime + 10.0
@@ -91,7 +91,7 @@ def test_the_same_on_a_cluster(tmp_path: Path) -> None:
     }
 
     with distributed.LocalCluster(processes=True, **options) as cluster:
-        found = campaigns.found(tmp_path)
+        found = campaigns.find(tmp_path)
         said = {
             c.folder.name: w
             for c, w in campaigns.diagnosed(found, write_result, 1, cluster.scheduler_address)

@@ -230,7 +230,7 @@ def test_wrong_option_is_one_line(tmp_path: Path, options: list[str], said: str)
     assert not (tmp_path / "x.mcap").exists()
 
 
-def test_bogged_wheel_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bogged_wheel_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "heavy.yaml"
     path.write_text("segments:\n  - {duration: 1 s, load: 5 kN, slip: 0.2, speed: 20 mm/s}")
     main(["--schedule", str(path), "-o", str(tmp_path / "x.mcap")])

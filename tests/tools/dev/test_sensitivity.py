@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from gritd.tools.dev import sensitivity
-from gritd.tools.dev.sensitivity import Field, Said, changed
+from gritd.tools.dev.sensitivity import Field, Outcome, changed
 from gritd.tools.diagnose.tuning import TUNING
 
 LEVEL, ODDS, KINDS = Field("screen", "level"), Field("search", "odds"), Field("screen", "kinds")
 
 
-def stub(folder: Path) -> Said:
+def stub(folder: Path) -> Outcome:
     """Its verdict hangs on the level of the screen, tan φ on the odds, nothing on the kinds."""
     explained = TUNING.screen.level > 0.0075
     tan_phi = 0.5 + TUNING.search.odds
     assert TUNING.screen.sure > 0.0
     verdict, names = ("explained", ("loss",)) if explained else ("consistent", ())
-    return Said(verdict, names, {"loss": 0.75 if explained else 0.5}, tan_phi, 0.1)
+    return Outcome(verdict, names, {"loss": 0.75 if explained else 0.5}, tan_phi, 0.1)
 
 
 @pytest.fixture

@@ -95,7 +95,7 @@ def test_another_file_is_refused_in_one_line(found: Diagnosis, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"redo": 3}', "<html></html>", "[" * 100_000])
-def test_what_is_no_diagnosis_is_said(tmp_path: Path, text: str) -> None:
+def test_what_is_no_diagnosis_is_reported(tmp_path: Path, text: str) -> None:
     path = tmp_path / "x.json"
     path.write_text(text)
     with pytest.raises(

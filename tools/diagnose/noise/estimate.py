@@ -99,15 +99,15 @@ def estimate_beside_form(
     this rig does when nothing is new, waves included.
     """
     residual, cells = stack.measured - predicted, np.full(stack.size, -1, dtype=np.intp)
-    found = [
+    estimates = [
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
-    colours = tuple(f[0] for f in found)
+    colours = tuple(f[0] for f in estimates)
     return Noise(
         stack,
         colours,
-        tuple(f[1:] for f in found),
+        tuple(f[1:] for f in estimates),
         uncertain(stack, predicted, colours),
         np.zeros((stack.size, 0)),
     )

@@ -99,15 +99,15 @@ def _streams(
     for (axis, values), sigma in zip(axes, noise, strict=True):
         forces[:, axis] = values + sigma * rng.standard_normal(at.size)
 
-    found = [
+    streams = [
         Stream(name, at, np.round(_raw(values, channels[name].calibration)).astype(np.int64))
         for name, values in encoders.items()
     ]
     for name, values in analogue.items():
         channel = channels[name]
         read = _raw(values, channel.calibration) + channel.noise * rng.standard_normal(at.size)
-        found.append(Stream(name, at, read))
-    return [*found, Stream("wrench", at, forces)]
+        streams.append(Stream(name, at, read))
+    return [*streams, Stream("wrench", at, forces)]
 
 
 def _raw(values: Array, calibration: Calibration) -> Array:

@@ -320,12 +320,12 @@ def read_penetration(path: Path, series: str, which: str) -> Penetration:
 
 def _forces(path: Path) -> tuple[float, Array]:
     """Zero of Fz [N], and rows of time [s], Fx … Tz."""
-    found = re.match(r"# zero offsets[^:]*:((?: *,? *-?[\d.]+){6})\n", read_text(path))
-    if not found:
+    header = re.match(r"# zero offsets[^:]*:((?: *,? *-?[\d.]+){6})\n", read_text(path))
+    if not header:
         raise RigFileError(
             f"{path}: row 1: found no zero offsets; expected '# zero offsets …: Fx,Fy,Fz,Tx,Ty,Tz'"
         )
-    return finite_number(path, "row 1", found[1].split(",")[2]), matrix(path, 7, skip=2)
+    return finite_number(path, "row 1", header[1].split(",")[2]), matrix(path, 7, skip=2)
 
 
 def _body(series: str, which: str) -> str:

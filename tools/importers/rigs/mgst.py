@@ -200,13 +200,13 @@ def _read_sensor(path: Path) -> Sensor:
 
 def _times(path: Path, texts: list[str]) -> Array:
     """Seconds of `16:52:18.010000` or `0 days 00:00:00.003997`, shape (n,)."""
-    found = [re.fullmatch(r"(?:0 days )?(\d+):(\d\d):(\d\d(?:\.\d+)?)", text) for text in texts]
-    for row, (text, match) in enumerate(zip(texts, found, strict=True), start=2):
+    matches = [re.fullmatch(r"(?:0 days )?(\d+):(\d\d):(\d\d(?:\.\d+)?)", text) for text in texts]
+    for row, (text, match) in enumerate(zip(texts, matches, strict=True), start=2):
         if match is None:
             raise RigFileError(
                 f"{path}: row {row}: found {text[:40]!r}; expected a time such as 16:52:18.010000"
             )
-    return np.array([int(m[1]) * 3600 + int(m[2]) * 60 + float(m[3]) for m in found if m])
+    return np.array([int(m[1]) * 3600 + int(m[2]) * 60 + float(m[3]) for m in matches if m])
 
 
 def _midnight(path: Path, date: str) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gritd.tools.proof.blind.shares import counted
-from gritd.tools.proof.blind.verdicts import Row, Said
+from gritd.tools.proof.blind.verdicts import Hypothesis, Row
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 SURE = 0.9  # stated probability from which a name is meant to be relied on
@@ -25,18 +25,18 @@ def calibration(rows: Sequence[Row]) -> dict[str, Any]:
 
 def accepted(rows: Sequence[Row]) -> dict[str, Any]:
     """The same of all names that are accepted, and of those that are stated as sure."""
-    spoken = [(row, said) for row in rows for said in row.accepted]
-    sure = [(row, said) for row, said in spoken if said.probability >= SURE]
+    spoken = [(row, name) for row in rows for name in row.accepted]
+    sure = [(row, name) for row, name in spoken if name.probability >= SURE]
     return {
         by: _reliable(spoken, by)
-        | {"sure": counted(row.said_right(said, by) for row, said in sure)}
+        | {"sure": counted(row.name_right(name, by) for row, name in sure)}
         for by in ("name", "table", "engine")
     }
 
 
-def _reliable(spoken: Sequence[tuple[Row, Said]], by: str) -> dict[str, Any]:
-    stated = np.array([said.probability for _, said in spoken])
-    right = np.array([row.said_right(said, by) for row, said in spoken], dtype=float)
+def _reliable(spoken: Sequence[tuple[Row, Hypothesis]], by: str) -> dict[str, Any]:
+    stated = np.array([name.probability for _, name in spoken])
+    right = np.array([row.name_right(name, by) for row, name in spoken], dtype=float)
     table = [_bin(stated, right, low, high) for low, high in pairwise(BINS)]
     return {"table": table, "brier": float(np.mean((stated - right) ** 2)) if spoken else None}
 

@@ -142,7 +142,7 @@ def _attempt(
         reference=reference,
         noise_factor=TALL if assignment.noise == "tall" else noise_factor(not effects, rng),
         detectability=detector.detectability(effects) if effects else 0.0,
-        single=tuple(found for _, found in fitted),
+        single=tuple(distance for _, distance in fitted),
         inseparable={},
         oracle_variance={},
     )

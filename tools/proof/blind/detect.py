@@ -190,11 +190,13 @@ class Detector:
         """What is predicted without the effects, by run."""
         world, near = self._trial.world.with_effects(), [bare.scene for bare in self._bare]
         told = [_told(one, self._trial) for one in felt]
-        found = [self._read(one) for one in responses([(world, m) for m in told], False, near)]
+        expected = [self._read(one) for one in responses([(world, m) for m in told], False, near)]
         if self._trial.wrench:
             weights = [bare.load for bare in self._bare]  # not the load that was read
-            found = [signals | {"load": load} for signals, load in zip(found, weights, strict=True)]
-        return found
+            expected = [
+                signals | {"load": load} for signals, load in zip(expected, weights, strict=True)
+            ]
+        return expected
 
     def _whitened(self, signals: Signals) -> Array:
         return whitened(signals, self._roots)
@@ -213,8 +215,8 @@ class Detector:
         faster = carriage.sigma / carriage.value
         moved = [(soil, 0.0, 0.0) for soil in soils]
         moved += [(ground, SMALL * half, 0.0), (ground, 0.0, SMALL * faster)]
-        *found, alike, driven = (scaled(change, 1.0 / SMALL) for change in self._moved(moved))
-        return [*found, alike, *one_by_one(alike), driven]
+        *separate, alike, driven = (scaled(change, 1.0 / SMALL) for change in self._moved(moved))
+        return [*separate, alike, *one_by_one(alike), driven]
 
     def _moved(self, variants: Sequence[tuple[Ground, float, float]]) -> list[Signals]:
         """Changes by another soil, heavier weights or a faster carriage, either by a share."""
@@ -232,13 +234,13 @@ class Detector:
         """One sigma of offset and gain of each channel, the torque constant's in the current's."""
         known, columns = self._trial.known, []
         for name in channels(self._bare[0], self._trial.wrench):
-            said = known.instruments[INSTRUMENT[name]]
-            gain = said.scale.sigma / abs(said.scale.value)
+            instrument = known.instruments[INSTRUMENT[name]]
+            gain = instrument.scale.sigma / abs(instrument.scale.value)
             if name == "current":
                 gain = float(
                     np.hypot(gain, known.torque_constant.sigma / known.torque_constant.value)
                 )
-            columns += [self._only(name, said.offset.sigma, 0.0), self._only(name, 0.0, gain)]
+            columns += [self._only(name, instrument.offset.sigma, 0.0), self._only(name, 0.0, gain)]
         return columns
 
     def _only(self, channel: str, offset: float, gain: float) -> Signals:
@@ -288,12 +290,12 @@ def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Eff
     """The effect at the strength where its D is as wanted, and that D; at the largest strength
     where D stays below.
     """
-    found = detector.detectability([effect])
-    if found <= wanted:
-        return effect, found
+    reached = detector.detectability([effect])
+    if reached <= wanted:
+        return effect, reached
     for _ in range(6):
-        effect = replace(effect, strength=effect.strength * min(wanted / max(found, 1e-9), 3.0))
-        found = detector.detectability([effect])
-        if abs(found / wanted - 1.0) < 0.05:
+        effect = replace(effect, strength=effect.strength * min(wanted / max(reached, 1e-9), 3.0))
+        reached = detector.detectability([effect])
+        if abs(reached / wanted - 1.0) < 0.05:
             break
-    return effect, found
+    return effect, reached

@@ -47,8 +47,8 @@ class Driven(NamedTuple):
 def driven(case: Case) -> list[Driven]:
     """The campaigns of a case, the reference first."""
     alone = not case.reference
-    found = [] if case.reference is None else [_driven(case, case.reference, REFERENCE, 0)]
-    return [*found, _driven(case, case.trial, "" if alone else NEW, 0 if alone else DAY)]
+    campaigns = [] if case.reference is None else [_driven(case, case.reference, REFERENCE, 0)]
+    return [*campaigns, _driven(case, case.trial, "" if alone else NEW, 0 if alone else DAY)]
 
 
 def _driven(case: Case, trial: Trial, folder: str, later: int) -> Driven:
@@ -122,9 +122,9 @@ def truth(one: Driven, number: int) -> dict[str, Array]:
     true = {c.channel: c for c in (*chain.converters, *(chain.wrench or ()))}
 
     def shown(channel: str, physical: Array) -> Array:
-        said, is_ = known.instruments[channel], true[channel]
+        stated, is_ = known.instruments[channel], true[channel]
         raw = (physical[::every] - is_.offset) / is_.scale
-        return np.asarray(raw * said.scale.value + said.offset.value)
+        return np.asarray(raw * stated.scale.value + stated.offset.value)
 
     current = shown("motor_shunt", felt.current)
     time = felt.scene.motion.time
@@ -214,8 +214,8 @@ def _channels(document: dict[str, Any], known: Knowledge) -> None:
     channels["wrench"] = wrench
 
 
-def _calibrated(said: Instrument, scale: str, offset: str) -> dict[str, Any]:
-    return {"scale": _stated(said.scale, scale), "offset": _stated(said.offset, offset)}
+def _calibrated(instrument: Instrument, scale: str, offset: str) -> dict[str, Any]:
+    return {"scale": _stated(instrument.scale, scale), "offset": _stated(instrument.offset, offset)}
 
 
 def _stated(stated: Stated, unit: str) -> Any:

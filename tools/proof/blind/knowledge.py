@@ -188,27 +188,31 @@ def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
     return Chain(simple, wrench, float(rng.uniform(2e-5, 4e-4)), float(rng.uniform(0.0, 0.01)))
 
 
-def _converter(name: str, said: Instrument, rng: np.random.Generator) -> Converter:
+def _converter(name: str, instrument: Instrument, rng: np.random.Generator) -> Converter:
     """`said.noise` is the true total here; what the configuration will state may be wrong by a
     factor.
     """
     encoder = name.endswith("_encoder")
     share = 0.0 if encoder else float(rng.uniform(0.2, 0.6))
-    white = 0.2 if encoder else said.noise * float(np.sqrt(1.0 - share**2))
+    white = 0.2 if encoder else instrument.noise * float(np.sqrt(1.0 - share**2))
 
     noise = Noise(
         white,
-        share * said.noise,
+        share * instrument.noise,
         float(np.exp(rng.uniform(np.log(0.03), np.log(0.6)))),
         rng.random() < 0.3,
     )
 
     volts = name in ("sinkage_pot", "motor_shunt")
     quantum = (
-        1.0 if encoder else 4.8 / 2 ** int(rng.choice((12, 14, 16))) if volts else 0.2 * said.noise
+        1.0
+        if encoder
+        else 4.8 / 2 ** int(rng.choice((12, 14, 16)))
+        if volts
+        else 0.2 * instrument.noise
     )
     low, high = (0.1, 4.9) if volts else (-1e12, 1e12)
-    scale, offset = _calibrated(said, rng)
+    scale, offset = _calibrated(instrument, rng)
 
     return Converter(
         name, scale, offset, noise, quantum, low, high, 0.0 if encoder else 1e-3, 250.0
@@ -242,12 +246,14 @@ def prepared(ground: Ground, rng: np.random.Generator) -> Ground:
     return replace(ground, **drawn)
 
 
-def _calibrated(said: Instrument, rng: np.random.Generator) -> tuple[float, float]:
+def _calibrated(instrument: Instrument, rng: np.random.Generator) -> tuple[float, float]:
     """True scale and offset. Sensors are zeroed where they read nothing, so the gain errs about the
     physical zero.
     """
-    gain = _true(said.scale, rng) / said.scale.value
-    return said.scale.value / gain, (2.0 * said.offset.value - _true(said.offset, rng)) / gain
+    gain = _true(instrument.scale, rng) / instrument.scale.value
+    return instrument.scale.value / gain, (
+        2.0 * instrument.offset.value - _true(instrument.offset, rng)
+    ) / gain
 
 
 def _true(stated: Stated, rng: np.random.Generator) -> float:
@@ -257,7 +263,9 @@ def _true(stated: Stated, rng: np.random.Generator) -> float:
 def misstated(known: Knowledge, factor: float) -> Knowledge:
     """The same configuration with every analogue noise wrong by a factor."""
     changed = {
-        name: said if name.endswith("_encoder") else replace(said, noise=said.noise * factor)
-        for name, said in known.instruments.items()
+        name: instrument
+        if name.endswith("_encoder")
+        else replace(instrument, noise=instrument.noise * factor)
+        for name, instrument in known.instruments.items()
     }
     return replace(known, instruments=changed)

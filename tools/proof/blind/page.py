@@ -144,9 +144,9 @@ def _effects(effects: Mapping[str, Any]) -> str:
     rows = [
         (
             name,
-            tables.said(of["detected"]),
-            *(tables.said(of["first"][by]) for by in ("name", "table", "engine", "plant")),
-            tables.said(of["three"]["table"]),
+            tables.share_text(of["detected"]),
+            *(tables.share_text(of["first"][by]) for by in ("name", "table", "engine", "plant")),
+            tables.share_text(of["three"]["table"]),
         )
         for name, of in effects.items()
     ]

@@ -87,14 +87,14 @@ def _companions(rows: Sequence[Row]) -> dict[str, Any]:
 
 def _strata(rows: Sequence[Row]) -> dict[str, Any]:
     """By stratum, and by level within those that have several."""
-    found = {}
+    counts = {}
     for stratum in STRATA:
         inside = [row for row in rows if row.stratum == stratum]
         levels = sorted({row.level for row in inside}, key=_order)
         for level in ("", *(levels if len(levels) > 1 else ())):
             chosen = [row for row in inside if level in ("", row.level)]
-            found[f"{stratum} {level}".strip()] = _names(chosen)
-    return {name: of for name, of in found.items() if of["detected"]["n"]}
+            counts[f"{stratum} {level}".strip()] = _names(chosen)
+    return {name: of for name, of in counts.items() if of["detected"]["n"]}
 
 
 def _order(level: str) -> tuple[int, str]:
@@ -105,12 +105,12 @@ def _order(level: str) -> tuple[int, str]:
 def _two(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "one named": counted(
-            any(row.said_right(said, "table") for said in row.accepted) for row in rows
+            any(row.name_right(name, "table") for name in row.accepted) for row in rows
         ),
         "both named": counted(row.both_named() for row in rows),
         "both named by group": counted(row.both_named("table") for row in rows),
         "a wrong one accepted": counted(
-            any(not row.said_right(said, "table") for said in row.accepted) for row in rows
+            any(not row.name_right(name, "table") for name in row.accepted) for row in rows
         ),
     }
 
@@ -137,7 +137,7 @@ def _soil_groups(rows: Sequence[Row]) -> dict[str, list[Row]]:
 
 
 def _coverage(parameters: Iterable[Mapping[str, float]]) -> dict[str, Any]:
-    z = [value for found in parameters for value in found.values() if math.isfinite(value)]
+    z = [value for z_of in parameters for value in z_of.values() if math.isfinite(value)]
     return {
         "within one sigma": counted(abs(v) < 1.0 for v in z),
         "within two sigma": counted(abs(v) < 2.0 for v in z),

@@ -24,15 +24,15 @@ def soil(rows: Sequence[Row]) -> dict[str, Any]:
 
 def _quantity(name: str, rows: Sequence[Row]) -> dict[str, Any]:
     stated = [row.soil[name] for row in rows if name in row.soil]
-    found: dict[str, Any] = {}
+    counts: dict[str, Any] = {}
     for when in ("before", "after"):
         z = [one[f"z_{when}"] for one in stated]
         known = [value for value in z if math.isfinite(value)]
-        found[when] = quantiles([one[when] for one in stated])
-        found[f"within one sigma {when}"] = counted(abs(value) < 1.0 for value in known)
-        found[f"within two sigma {when}"] = counted(abs(value) < 2.0 for value in known)
-        found[f"unknown {when}"] = counted(not math.isfinite(value) for value in z)
-    return found
+        counts[when] = quantiles([one[when] for one in stated])
+        counts[f"within one sigma {when}"] = counted(abs(value) < 1.0 for value in known)
+        counts[f"within two sigma {when}"] = counted(abs(value) < 2.0 for value in known)
+        counts[f"unknown {when}"] = counted(not math.isfinite(value) for value in z)
+    return counts
 
 
 def foreign(rows: Sequence[Row]) -> dict[str, Any]:
@@ -47,7 +47,9 @@ def _foreign(rows: Sequence[Row]) -> dict[str, Any]:
     spoken = [row for row in rows if row.first is not None]
     verdicts = ("consistent", "explained", "unlisted", "insufficient", "failed")
     return {
-        "verdicts": {said: counted(row.verdict == said for row in rows) for said in verdicts},
+        "verdicts": {
+            verdict: counted(row.verdict == verdict for row in rows) for verdict in verdicts
+        },
         "first name true": counted(row.first_right("table") for row in spoken),
         "false companion": counted(row.false_companion() for row in spoken),
         "concealed first": counted(_concealed_first(row) for row in rows if row.truth),

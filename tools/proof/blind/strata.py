@@ -116,11 +116,11 @@ def _at_levels(
 ) -> list[tuple[str, str]]:
     """Names in turn, each at its levels in turn, where it begins by chance."""
     begun = {name: int(rng.integers(len(levels))) for name in names}
-    found = []
+    assigned = []
     for name in _shuffled(begun, count, rng):
-        found.append((name, levels[begun[name] % len(levels)]))
+        assigned.append((name, levels[begun[name] % len(levels)]))
         begun[name] += 1
-    return found
+    return assigned
 
 
 def _shuffled(given: Iterable[Item], count: int, rng: np.random.Generator) -> list[Item]:
@@ -158,15 +158,15 @@ def _in_worlds(
         "listed": _at_levels(tuple(LISTED), 2 * count, PLAIN, rng),
         "unlisted": _at_levels(tuple(UNLISTED), 2 * count, PLAIN, rng),
     }
-    found = []
+    assigned = []
     for world, kind in _shuffled(product(worlds, kinds), count, rng):
         fixed = (("second_pass", False),) if world == "strips" else ()
         one = Assignment(stratum, without=fixed, world=world)
         if kind != "nothing":
             name, level = _next(waiting[kind], world)
             one = replace(one, effects=(name,), level=level)
-        found.append(one)
-    return found
+        assigned.append(one)
+    return assigned
 
 
 def _next(waiting: list[tuple[str, str]], world: str) -> tuple[str, str]:

@@ -21,7 +21,7 @@ def text(score: Mapping[str, Any], rows: Sequence[Row]) -> str:
 
 def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
     """By heading; those without a row beside their head are left out."""
-    found = {
+    tables = {
         "Figures": headline(score),
         "By stratum and strength": strata(score),
         "Stated probability, and how often it was right": reliability(score),
@@ -34,7 +34,7 @@ def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
         "Campaigns alone in foreign worlds": foreign(score["foreign"]),
         "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
     }
-    return {heading: table for heading, table in found.items() if len(table) > 1}
+    return {heading: table for heading, table in tables.items() if len(table) > 1}
 
 
 def aligned(table: Table) -> str:
@@ -47,7 +47,7 @@ def aligned(table: Table) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def said(share: Mapping[str, Any]) -> str:
+def share_text(share: Mapping[str, Any]) -> str:
     """`17/20 85 % (62–97)`; nothing where nothing was asked."""
     if not share["n"]:
         return "–"
@@ -63,10 +63,10 @@ def number(value: float | None, form: str = ".2f") -> str:
 def headline(score: Mapping[str, Any]) -> Table:
     """What a batch comes to. Foreign worlds and pairs have tables of their own."""
     return [
-        ("cases, of which failed", said(score["failed"])),
+        ("cases, of which failed", share_text(score["failed"])),
         *_alarms(score["false_alarms"]),
         *_named(score),
-        ("parameters within two sigma", said(score["parameters"]["within two sigma"])),
+        ("parameters within two sigma", share_text(score["parameters"]["within two sigma"])),
         *_held_out(score["heldout"]),
         ("Brier score, by name", number(score["calibration"]["name"]["brier"], ".3f")),
         ("  by the group it states", number(score["calibration"]["engine"]["brier"], ".3f")),
@@ -77,10 +77,10 @@ def headline(score: Mapping[str, Any]) -> Table:
 
 def _alarms(alarms: Mapping[str, Any]) -> Table:
     return [
-        ("false alarms", said(alarms["all"])),
-        ("  noise as stated", said(alarms["noise as stated"])),
-        ("  noise off by two", said(alarms["noise misstated"])),
-        *((f"  {way}", said(of)) for way, of in alarms["awkward"].items()),
+        ("false alarms", share_text(alarms["all"])),
+        ("  noise as stated", share_text(alarms["noise as stated"])),
+        ("  noise off by two", share_text(alarms["noise misstated"])),
+        *((f"  {way}", share_text(of)) for way, of in alarms["awkward"].items()),
     ]
 
 
@@ -88,22 +88,22 @@ def _named(score: Mapping[str, Any]) -> Table:
     singles, two, unlisted = score["detectable_singles"], score["two"], score["unlisted"]
     first, companions, sure = singles["first"], score["companions"], score["accepted"]
     return [
-        ("detectable single effects: detected", said(singles["detected"])),
-        ("  first name right", said(first["name"])),
-        ("  … by the fixed groups", said(first["table"])),
-        ("  … by the group it states", said(first["engine"])),
-        ("  … by what the campaign can tell", said(first["plant"])),
-        ("  among the first three, by the fixed groups", said(singles["three"]["table"])),
-        ("a further name that is not there, by the fixed groups", said(companions["table"])),
-        ("  … nor in the group it is stated with", said(companions["engine"])),
-        ("names stated with 0.9 or more that are right", said(sure["name"]["sure"])),
-        ("  … by the fixed groups", said(sure["table"]["sure"])),
-        ("  … by the group it states", said(sure["engine"]["sure"])),
-        ("two effects: one named", said(two["one named"])),
-        ("  both named", said(two["both named"])),
-        ("  both named, by the fixed groups", said(two["both named by group"])),
-        ("strangers called unlisted", said(unlisted["recall"])),
-        ("  given a listed name above 0.5", said(unlisted["listed name above one half"])),
+        ("detectable single effects: detected", share_text(singles["detected"])),
+        ("  first name right", share_text(first["name"])),
+        ("  … by the fixed groups", share_text(first["table"])),
+        ("  … by the group it states", share_text(first["engine"])),
+        ("  … by what the campaign can tell", share_text(first["plant"])),
+        ("  among the first three, by the fixed groups", share_text(singles["three"]["table"])),
+        ("a further name that is not there, by the fixed groups", share_text(companions["table"])),
+        ("  … nor in the group it is stated with", share_text(companions["engine"])),
+        ("names stated with 0.9 or more that are right", share_text(sure["name"]["sure"])),
+        ("  … by the fixed groups", share_text(sure["table"]["sure"])),
+        ("  … by the group it states", share_text(sure["engine"]["sure"])),
+        ("two effects: one named", share_text(two["one named"])),
+        ("  both named", share_text(two["both named"])),
+        ("  both named, by the fixed groups", share_text(two["both named by group"])),
+        ("effect outside the list: called unlisted", share_text(unlisted["recall"])),
+        ("  given a listed name above 0.5", share_text(unlisted["listed name above one half"])),
     ]
 
 
@@ -131,7 +131,9 @@ def strata(score: Mapping[str, Any]) -> Table:
         "first, stated group",
         "three, fixed groups",
     )
-    rows = [(name, *(said(cell) for cell in _cells(of))) for name, of in score["strata"].items()]
+    rows = [
+        (name, *(share_text(cell) for cell in _cells(of))) for name, of in score["strata"].items()
+    ]
     return [head, *rows]
 
 
@@ -149,8 +151,8 @@ def reliability(score: Mapping[str, Any]) -> Table:
         (
             f"{one['from']:.1f}-{one['to']:.1f}",
             number(one["stated"]),
-            said(one["right"]),
-            said(group["right"]),
+            share_text(one["right"]),
+            share_text(group["right"]),
         )
         for one, group in zip(by_name, by_group, strict=True)
     ]
@@ -164,7 +166,7 @@ def accepted(of: Mapping[str, Any]) -> Table:
         (
             f"{bins[0]['from']:.1f}-{bins[0]['to']:.1f}",
             number(bins[0]["stated"]),
-            *(said(one["right"]) for one in bins),
+            *(share_text(one["right"]) for one in bins),
         )
         for bins in zip(*kinds, strict=True)
     ]
@@ -203,11 +205,11 @@ def coverage(groups: Mapping[str, Any]) -> Table:
 
 def _covered(of: Mapping[str, Any]) -> tuple[str, ...]:
     within = (
-        said(of[f"within {many} sigma {when}"])
+        share_text(of[f"within {many} sigma {when}"])
         for when in ("before", "after")
         for many in ("one", "two")
     )
-    return (*within, said(of["unknown after"]))
+    return (*within, share_text(of["unknown after"]))
 
 
 def pairs(groups: Mapping[str, Any]) -> Table:
@@ -220,7 +222,7 @@ def pairs(groups: Mapping[str, Any]) -> Table:
         "first, stated group",
         "further name not there",
         "0.9 or more, stated group",
-        "strangers unlisted",
+        "outside the list: called unlisted",
         "over truth",
     )
     return [head, *((name, *_new(of)) for name, of in groups.items())]
@@ -236,7 +238,7 @@ def _new(of: Mapping[str, Any]) -> tuple[str, ...]:
         of["accepted"]["engine"]["sure"],
         of["unlisted"],
     )
-    return (*map(said, shares), _median(of["over truth"]))
+    return (*map(share_text, shares), _median(of["over truth"]))
 
 
 def foreign(groups: Mapping[str, Any]) -> Table:
@@ -254,9 +256,9 @@ def foreign(groups: Mapping[str, Any]) -> Table:
 
 
 def _alone(of: Mapping[str, Any]) -> tuple[str, ...]:
-    verdicts = (of["verdicts"][said_] for said_ in ("consistent", "explained", "unlisted"))
+    verdicts = (of["verdicts"][verdict] for verdict in ("consistent", "explained", "unlisted"))
     rest = (of["first name true"], of["false companion"], of["concealed first"])
-    return tuple(map(said, (*verdicts, *rest)))
+    return tuple(map(share_text, (*verdicts, *rest)))
 
 
 def missed(row: Row) -> bool:

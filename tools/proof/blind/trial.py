@@ -77,12 +77,12 @@ def prepare(spec: Spec) -> str:
 def _truth(spec: Spec, judged: handover.Driven) -> dict[str, str]:
     """The noiseless channels, beside the answers; hashes by file name."""
     spec.answers.parent.mkdir(parents=True, exist_ok=True)
-    found = {}
+    hashes = {}
     for number in range(len(judged.felt)):
         path = spec.answers.with_name(f"{spec.name}.{judged.name(number)}.npz")
         np.savez_compressed(path, **handover.truth(judged, number))  # type: ignore[arg-type]
-        found[path.name] = seal.sha256(path)
-    return found
+        hashes[path.name] = seal.sha256(path)
+    return hashes
 
 
 def diagnose(spec: Spec) -> dict[str, Any]:
@@ -91,8 +91,8 @@ def diagnose(spec: Spec) -> dict[str, Any]:
     """
     given = spec.folder / GIVEN
     began = time.monotonic()
-    code, said = _run(_command(spec), given)
-    outcome = {"code": code, "seconds": time.monotonic() - began, "said": said[-2000:]}
+    code, stderr = _run(_command(spec), given)
+    outcome = {"code": code, "seconds": time.monotonic() - began, "said": stderr[-2000:]}
     (spec.folder / OUTCOME).write_text(json.dumps(outcome, indent=1), encoding="utf-8")
 
     if not spec.keep:

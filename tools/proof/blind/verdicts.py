@@ -25,7 +25,7 @@ SPOKEN = {"consistent": NOTHING, "unlisted": UNLISTED, "insufficient": INSUFFICI
 
 
 @dataclass(frozen=True)
-class Said:
+class Hypothesis:
     """One hypothesis as stated."""
 
     effect: str
@@ -51,7 +51,7 @@ class Row:
     inseparable: frozenset[str]  # by the plant: rivals this campaign cannot tell from the truth
     noise_factor: float
     verdict: str
-    hypotheses: tuple[Said, ...]
+    hypotheses: tuple[Hypothesis, ...]
     seconds: float
     note: str
     # c, tan_phi: relative error, and error over sigma, before and after; NaN: said to be unknown
@@ -75,18 +75,18 @@ class Row:
         return bool(self.truth) and self.detectability >= DETECTABLE * self.limit
 
     @property
-    def accepted(self) -> tuple[Said, ...]:
+    def accepted(self) -> tuple[Hypothesis, ...]:
         """What it says is there, first names first."""
         if self.verdict != "explained":
             return ()
-        return tuple(said for said in self.hypotheses if said.accepted)
+        return tuple(name for name in self.hypotheses if name.accepted)
 
     @property
     def alarmed(self) -> bool:
         return self.verdict in ("explained", "unlisted")
 
     @property
-    def first(self) -> Said | None:
+    def first(self) -> Hypothesis | None:
         return self.hypotheses[0] if self.verdict == "explained" and self.hypotheses else None
 
     @property
@@ -105,33 +105,33 @@ class Row:
             return name in true or name in self.inseparable
         return name in true
 
-    def said_right(self, said: Said, by: str = "name") -> bool:
+    def name_right(self, name: Hypothesis, by: str = "name") -> bool:
         """The same of a hypothesis; by `engine`, whether a true one is in its stated group."""
         if by == "engine":
-            return bool(said.group & self.held.union(self.truth))
-        return self.right(said.effect, by)
+            return bool(name.group & self.held.union(self.truth))
+        return self.right(name.effect, by)
 
     def false_companion(self, by: str = "table") -> bool:
         """Whether a second or third name is accepted that is not there."""
-        return any(not self.said_right(said, by) for said in self.accepted[1:])
+        return any(not self.name_right(name, by) for name in self.accepted[1:])
 
     def both_named(self, by: str = "name") -> bool:
         """Whether every concealed effect is accepted, by its name or within a group."""
-        said = self.accepted
+        accepted = self.accepted
         return all(
-            any(replace(self, truth=(t,)).said_right(s, by) for s in said) for t in self.truth
+            any(replace(self, truth=(t,)).name_right(s, by) for s in accepted) for t in self.truth
         )
 
     def first_right(self, by: str = "name") -> bool:
-        return self.first is not None and self.said_right(self.first, by)
+        return self.first is not None and self.name_right(self.first, by)
 
     def three_right(self, by: str = "name") -> bool:
         first = self.hypotheses[:3] if self.alarmed else ()
-        return any(self.said_right(said, by) for said in first)
+        return any(self.name_right(hypothesis, by) for hypothesis in first)
 
     def given(self, by: str = "name") -> float:
         """Probability given to the truth."""
-        true = [said.probability for said in self.hypotheses if self.said_right(said, by)]
+        true = [name.probability for name in self.hypotheses if self.name_right(name, by)]
         return max(true, default=0.0) if by == "engine" else min(sum(true), 1.0)
 
     def excess(self, oracle: str) -> float:
@@ -178,16 +178,16 @@ def row(spec: Spec) -> Row:
 def _result(path: Path, outcome: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """The diagnosis, or none and why."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        result = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}, (str(outcome["said"]).strip().splitlines() or ["no result"])[-1]
-    return (found, "") if isinstance(found, dict) else ({}, "result is no mapping")
+    return (result, "") if isinstance(result, dict) else ({}, "result is no mapping")
 
 
-def _hypotheses(result: Mapping[str, Any]) -> tuple[Said, ...]:
+def _hypotheses(result: Mapping[str, Any]) -> tuple[Hypothesis, ...]:
     """As listed: what was accepted first, then by probability."""
-    said = [
-        Said(
+    hypotheses = [
+        Hypothesis(
             str(h["effect"]),
             float(h.get("probability") or 0.0),
             frozenset((str(h["effect"]), *h.get("indistinguishable_from", ()))),
@@ -196,31 +196,31 @@ def _hypotheses(result: Mapping[str, Any]) -> tuple[Said, ...]:
         )
         for h in result.get("hypotheses", ())
     ]
-    return tuple(sorted(said, key=lambda s: (not s.accepted, -s.probability)))
+    return tuple(sorted(hypotheses, key=lambda s: (not s.accepted, -s.probability)))
 
 
 def _soil(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-    stated, found = result.get("soil") or {}, {}
+    stated, errors = result.get("soil") or {}, {}
 
     for name, true_name in (("c", "cohesion"), ("tan_phi", "tan_phi")):
         true = answers["soil"][true_name]
         before, after = (
             _quantity((stated.get(when) or {}).get(name)) for when in ("before", "after")
         )
-        found[name] = {
+        errors[name] = {
             "before": abs(before[0] / true - 1.0),
             "after": abs(after[0] / true - 1.0),
             "z_before": (before[0] - true) / before[1] if before[1] > 0.0 else math.nan,
             "z_after": (after[0] - true) / after[1] if after[1] > 0.0 else math.nan,
         }
 
-    return found
+    return errors
 
 
-def _quantity(said: Any) -> tuple[float, float]:
-    if not isinstance(said, Mapping):
+def _quantity(stated: Any) -> tuple[float, float]:
+    if not isinstance(stated, Mapping):
         return math.nan, math.nan
-    value, sigma = said.get("value"), said.get("sigma")
+    value, sigma = stated.get("value"), stated.get("sigma")
     return (
         math.nan if value is None else float(value),
         math.nan if sigma is None else float(sigma),
@@ -231,11 +231,15 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
     """Errors over sigma of parameters that plant and diagnosis state in the same terms, of accepted
     true effects.
     """
-    stated = {said.effect: said.parameters for said in _hypotheses(result) if said.accepted}
-    found = {}
+    stated = {
+        hypothesis.effect: hypothesis.parameters
+        for hypothesis in _hypotheses(result)
+        if hypothesis.accepted
+    }
+    errors = {}
     for effect in answers["concealed"]:
         for name, true in effect["coinciding"].items():
             value, sigma = _quantity(stated.get(effect["name"], {}).get(name))
             if sigma > 0.0:
-                found[f"{effect['name']}.{name}"] = (value - true) / sigma
-    return found
+                errors[f"{effect['name']}.{name}"] = (value - true) / sigma
+    return errors

@@ -27,10 +27,8 @@ INSTRUMENT = {
 def channels(felt: Felt, wrench: bool) -> dict[str, Array]:
     """Every analogue channel that the campaign records; a lifted wheel's sinkage says nothing."""
     down = felt.scene.motion.weight > 1.0
-    found = {"sinkage": felt.sinkage * down, "current": felt.current}
-    return (
-        found | {"pull": felt.pull, "load": felt.load, "torque": felt.torque} if wrench else found
-    )
+    read = {"sinkage": felt.sinkage * down, "current": felt.current}
+    return read | {"pull": felt.pull, "load": felt.load, "torque": felt.torque} if wrench else read
 
 
 def whitened(signals: Signals, roots: Signals) -> Array:

@@ -71,8 +71,8 @@ def log_truth(case: Case, by: Calibration) -> float:
     listed = np.where(case.count > 0, by.listed, 0.0)
     more = by.more * np.maximum(case.count - 1, 0) - case.count * np.log(case.candidates)
     weight = case.evidence / by.temperature + listed + more + by.nameless * case.nameless
-    found = float(np.sum(np.exp(weight - logsumexp(weight)) * case.right))
-    return float(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * found))
+    given_truth = float(np.sum(np.exp(weight - logsumexp(weight)) * case.right))
+    return float(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * given_truth))
 
 
 def calibration(x: Array) -> Calibration:
@@ -112,17 +112,19 @@ def _trials(path: Path) -> list[Case]:
 
 
 def _batch(folder: Path) -> list[Case]:
-    found = []
+    cases = []
     for result in sorted(folder.glob("cases/*/result.json")):
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
-        said = json.loads(result.read_text(encoding="utf-8"))
-        if said["explanations"] and answers["effects"]:
+        diagnosis = json.loads(result.read_text(encoding="utf-8"))
+        if diagnosis["explanations"] and answers["effects"]:
             stranger = answers["stratum"] == "unlisted"
-            found.append(
-                case_of(said["explanations"], answers["effects"], stranger, said["candidates"])
+            cases.append(
+                case_of(
+                    diagnosis["explanations"], answers["effects"], stranger, diagnosis["candidates"]
+                )
             )
-    return found
+    return cases
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -86,7 +86,7 @@ def _tell(proof: Proof, finding: Finding, seconds: float) -> None:
     for check in finding.checks:
         print(
             f"  {'yes' if check.met else 'NO '} {check.question} wanted {check.wanted}; "
-            f"found {check.found}"
+            f"found {check.answer}"
         )
 
 

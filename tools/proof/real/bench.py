@@ -71,8 +71,8 @@ class Bench:
         given += ["--config", str(configuration.relative_to(self.folder))]
         outputs = ("--json", result.name, "--apply", f"{name}.yaml")
         printed = self._gritd("diagnose", *given, *outputs, "--jobs", "1")
-        found = json.loads(result.read_text(encoding="utf-8"))
-        return DiagnosisRun(self.commands[-1], printed.rstrip(), found, time.monotonic() - began)
+        read = json.loads(result.read_text(encoding="utf-8"))
+        return DiagnosisRun(self.commands[-1], printed.rstrip(), read, time.monotonic() - began)
 
     def _gritd(self, *arguments: str) -> str:
         """What the command printed. Raises CommandError with its one line."""

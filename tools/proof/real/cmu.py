@@ -83,10 +83,10 @@ def _speeds(speeds: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(a for speed in speeds for a in ("--rim-speed", speed))
 
 
-def with_soil(text: str, found: dict[str, Any]) -> str:
+def with_soil(text: str, diagnosis: dict[str, Any]) -> str:
     """A configuration with the soil that a diagnosis fitted, values and sigmas."""
     document = yaml.safe_load(text)
-    after = found["soil"]["after"]
+    after = diagnosis["soil"]["after"]
 
     units = {
         "cohesion": ("c", "Pa"),
@@ -112,14 +112,14 @@ def _written(value: float, unit: str) -> Any:
     return f"{value:.6g} {unit}" if unit else float(f"{value:.6g}")
 
 
-def _conditions(judge: Judge, found: dict[str, Any]) -> dict[str, Array]:
+def _conditions(judge: Judge, diagnosis: dict[str, Any]) -> dict[str, Array]:
     """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of
     each channel.
     """
     models = (
         [run.measured for run in judge.rig.runs],
         judge.predicted(None),
-        judge.predicted(found),
+        judge.predicted(diagnosis),
     )
 
     out = {}
@@ -213,11 +213,11 @@ def _of_modulus(first: DiagnosisRun, pressed: Path) -> Check:
 
 def _of_frame(*diagnosis: DiagnosisRun) -> Check:
     values = [v["compliance"] for s in diagnosis if (v := s.values("frame_compliance"))]
-    found = f"{1e3 * max(values):.3f} mm/N" if values else "nothing said"
+    answer = f"{1e3 * max(values):.3f} mm/N" if values else "nothing said"
     return Check(
         "Is nothing said of the frame's yielding that the rigid stop denies?",
         f"at most {2e3 * YIELDS:.3f} mm/N, twice the stop's",
-        found,
+        answer,
         max(values, default=0.0) <= 2.0 * YIELDS,
     )
 

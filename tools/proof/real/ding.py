@@ -78,7 +78,7 @@ def _checks(diagnosis: DiagnosisRun) -> list[Check]:
     cohesion, angle = f"{c['value']:.0f} ± {c['sigma']:.0f} Pa", f"{phi:.1f} ± {sigma:.1f}°"
     near = abs(c["value"] - COHESION) <= SIGMAS * c["sigma"], abs(phi - FRICTION) <= SIGMAS * sigma
     grows = "Does it find that sinkage grows with slip, as that paper does?"
-    found = listed(diagnosis.accepted) or diagnosis.result["verdict"]
+    answer = listed(diagnosis.accepted) or diagnosis.result["verdict"]
 
     return [
         Check("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
@@ -89,7 +89,7 @@ def _checks(diagnosis: DiagnosisRun) -> list[Check]:
             near[1],
             REASON,
         ),
-        Check(grows, "slip_sinkage", found, "slip_sinkage" in diagnosis.group),
+        Check(grows, "slip_sinkage", answer, "slip_sinkage" in diagnosis.group),
     ]
 
 

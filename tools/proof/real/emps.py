@@ -32,7 +32,7 @@ def _run(bench: Bench) -> Finding:
     bare = np.append(
         np.linalg.lstsq(fitted.columns[:, :2], fitted.force, rcond=None)[0], (0.0, 0.0)
     )
-    found = stated(diagnosis)
+    identified = stated(diagnosis)
 
     rows = [
         (
@@ -43,7 +43,7 @@ def _run(bench: Bench) -> Finding:
         )
         for name, model in (
             ("inertia and viscous friction", bare),
-            ("with what was found", found),
+            ("with what was found", identified),
             ("the judge's least squares", fitted.solved(0.0)),
             (f"the same above {FAST * 1e3:g} mm/s", fitted.solved(FAST)),
         )
@@ -61,16 +61,16 @@ def _run(bench: Bench) -> Finding:
     )
 
     shown = (unseen.time >= SPAN[0]) & (unseen.time <= SPAN[1])
-    curves = np.stack((unseen.time, unseen.force, unseen.columns @ bare, unseen.columns @ found))[
-        :, shown
-    ]
+    curves = np.stack(
+        (unseen.time, unseen.force, unseen.columns @ bare, unseen.columns @ identified)
+    )[:, shown]
     labels = ("measured", "inertia and viscous friction", "with what was found")
 
     panel = Panel(
         "DATA_EMPS_PULSES, which the diagnosis did not see", curves, "time [s]", "force [N]", labels
     )
 
-    checks = _checks(diagnosis, found, unseen.error(bare), unseen.error(found))
+    checks = _checks(diagnosis, identified, unseen.error(bare), unseen.error(identified))
     return Finding([diagnosis], checks, Table(heads, rows), [panel])
 
 
@@ -137,7 +137,7 @@ def stated(diagnosis: DiagnosisRun) -> Array:
     )
 
 
-def _checks(diagnosis: DiagnosisRun, found: Array, before: float, after: float) -> list[Check]:
+def _checks(diagnosis: DiagnosisRun, identified: Array, before: float, after: float) -> list[Check]:
     first = (
         diagnosis.result["hypotheses"][0]["effect"] if diagnosis.result["hypotheses"] else "nothing"
     )
@@ -160,7 +160,9 @@ def _checks(diagnosis: DiagnosisRun, found: Array, before: float, after: float) 
         ),
     ]
 
-    for (name, (value, unit)), estimate in zip(PUBLISHED.items(), found.tolist(), strict=False):
+    for (name, (value, unit)), estimate in zip(
+        PUBLISHED.items(), identified.tolist(), strict=False
+    ):
         off = estimate / value - 1.0
         shown = f"{estimate:.2f} {unit} ({off:+.1%})"
         checks.append(

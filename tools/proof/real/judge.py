@@ -44,23 +44,23 @@ class Judge:
         return np.asarray(self.rig.runs[run].measured[channel])
 
     def predicted(
-        self, found: dict[str, Any] | None, when: str = "after"
+        self, diagnosis: dict[str, Any] | None, when: str = "after"
     ) -> list[dict[str, Array]]:
         """Every channel (n,) of every run: by the configuration alone (None), 'before' with the
         soil fitted without effects, 'after' with both.
         """
-        if found is None:
+        if diagnosis is None:
             return self.rig.predict(np.zeros(len(self.rig.constants)), ())
         return self.rig.predict(
-            self._constants(found, when), effects(found) if when == "after" else ()
+            self._constants(diagnosis, when), effects(diagnosis) if when == "after" else ()
         )
 
-    def freed(self, found: dict[str, Any], channel: str) -> list[Array]:
+    def freed(self, diagnosis: dict[str, Any], channel: str) -> list[Array]:
         """A channel (n,) of every run less what the accepted effects of the rig, and its
         calibration, put on it.
         """
-        u = self._constants(found, "after")
-        acting = effects(found)
+        u = self._constants(diagnosis, "after")
+        acting = effects(diagnosis)
         ideal = [e for e in acting if e.stage not in RIG_STAGES]
 
         plain = np.array(
@@ -94,10 +94,10 @@ class Judge:
         """A covariate (n,) of every run."""
         return [np.asarray(run.covariates[name]) for run in self.rig.runs]
 
-    def _constants(self, found: dict[str, Any], when: str) -> Array:
+    def _constants(self, diagnosis: dict[str, Any], when: str) -> Array:
         """In prior σ; what the result does not state stays at its prior mean."""
-        soil = (found["soil"] or {}).get(when, {})
-        stated = {**(found["nuisance"] if when == "after" else {}), **soil}
+        soil = (diagnosis["soil"] or {}).get(when, {})
+        stated = {**(diagnosis["nuisance"] if when == "after" else {}), **soil}
         return np.array(
             [
                 _strain(k, stated[k.name]["value"]) if k.name in stated else 0.0
@@ -106,11 +106,11 @@ class Judge:
         )
 
 
-def effects(found: dict[str, Any]) -> tuple[Effect, ...]:
+def effects(diagnosis: dict[str, Any]) -> tuple[Effect, ...]:
     """The accepted effects as they were fitted."""
     return tuple(
         make(h["effect"], {n: q["value"] for n, q in h["parameters"].items()})
-        for h in found["hypotheses"]
+        for h in diagnosis["hypotheses"]
         if h["accepted"]
     )
 

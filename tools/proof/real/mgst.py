@@ -149,10 +149,10 @@ def _differs(diagnosis: DiagnosisRun, channel: str) -> Check:
 
 
 def _names(diagnosis: DiagnosisRun, what: str, wanted: Sequence[str], reason: str) -> Check:
-    found = listed(diagnosis.accepted) or diagnosis.result["verdict"]
+    answer = listed(diagnosis.accepted) or diagnosis.result["verdict"]
     question = f"Does it name {what}, or a group that holds one?"
     return Check(
-        question, f"one of {listed(wanted)}", found, bool(diagnosis.group & set(wanted)), reason
+        question, f"one of {listed(wanted)}", answer, bool(diagnosis.group & set(wanted)), reason
     )
 
 
@@ -193,7 +193,7 @@ LOST: Mapping[
 
 def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
     loss = sum(LOST[n](diagnosis.values(n)) for n in diagnosis.accepted if n in LOST)
-    found = f"{loss:.2f} N·m" if loss else "none"
+    answer = f"{loss:.2f} N·m" if loss else "none"
 
     return [
         _differs(diagnosis, "torque"),
@@ -203,7 +203,7 @@ def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]
         Check(
             "How large is it?",
             f"{LOSS} ± {LOSS_ABOUT} N·m",
-            found,
+            answer,
             abs(loss - LOSS) <= LOSS_ABOUT,
             REASON_LOSS,
         ),

@@ -13,9 +13,9 @@ END = "<!-- {name}: to here -->\n"
 def page(old: str, name: str, section: str) -> str:
     """The page with the section of one proof replaced; appended where it has none."""
     begin, end = BEGIN.format(name=name), END.format(name=name)
-    head, found, rest = old.partition(begin)
-    tail = rest.partition(end)[2] if found else ""
-    return head + ("" if found else "\n") + begin + "\n" + section + "\n" + end + tail
+    head, marker, rest = old.partition(begin)
+    tail = rest.partition(end)[2] if marker else ""
+    return head + ("" if marker else "\n") + begin + "\n" + section + "\n" + end + tail
 
 
 def section(proof: Proof, finding: Finding, commands: Sequence[str], seconds: float) -> str:
@@ -91,7 +91,7 @@ def _verdict(checks: Sequence[Check]) -> str:
 
 
 def _row(check: Check) -> tuple[str, str, str, str]:
-    return "yes" if check.met else "**no**", check.question, check.wanted, check.found
+    return "yes" if check.met else "**no**", check.question, check.wanted, check.answer
 
 
 def _table(table: Table) -> Iterator[str]:

@@ -17,7 +17,7 @@ class Check:
 
     question: str
     wanted: str
-    found: str
+    answer: str
     met: bool
     reason: str = ""
 

@@ -11,7 +11,7 @@ import pytest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.proof.blind import calibration, page, score, score_worlds, seal, shares, tables
 from gritd.tools.proof.blind.plant.worlds import HELD
-from gritd.tools.proof.blind.verdicts import Row, Said
+from gritd.tools.proof.blind.verdicts import Hypothesis, Row
 
 NOBODY = Row(
     number=1,
@@ -36,11 +36,13 @@ NOBODY = Row(
 )
 
 
-def said(name: str, probability: float = 0.8, *others: str, accepted: bool = True) -> Said:
-    return Said(name, probability, frozenset((name, *others)), accepted, {})
+def said(name: str, probability: float = 0.8, *others: str, accepted: bool = True) -> Hypothesis:
+    return Hypothesis(name, probability, frozenset((name, *others)), accepted, {})
 
 
-def single(name: str, *hypotheses: Said, verdict: str = "explained", strong: float = 60.0) -> Row:
+def single(
+    name: str, *hypotheses: Hypothesis, verdict: str = "explained", strong: float = 60.0
+) -> Row:
     return replace(
         NOBODY,
         stratum="single",
@@ -161,7 +163,7 @@ def test_a_companion_is_false_where_it_is_neither_there_nor_like_what_is() -> No
 
 
 def test_both_of_two_are_named_by_name_or_by_group() -> None:
-    def two(*hypotheses: Said) -> Row:
+    def two(*hypotheses: Hypothesis) -> Row:
         one = single("bed_slope", *hypotheses)
         return replace(one, stratum="two", truth=("bed_slope", "grousers"))
 

@@ -111,14 +111,14 @@ class _Strips:
     def felt(self) -> Felt:
         """All steps, (steps, lanes). Where soil is driven again, the passes before were alike."""
         moments, passes = self._rolling.moments(), self._rolling.passes
-        found: list[Felt] = []
+        forces: list[Felt] = []
         for left in range(int(passes.max()) - 1, -1, -1):
             self._depth *= np.repeat(passes > left + 1, self._count)
             self._along[:], self._sinkage[:] = 0.0, 0.0
-            found = [
+            forces = [
                 self._step(moment, FIRST if not n else NEWTON) for n, moment in enumerate(moments)
             ]
-        return Felt(*(np.stack(parts)[:, :, 0] for parts in zip(*found, strict=True)))
+        return Felt(*(np.stack(parts)[:, :, 0] for parts in zip(*forces, strict=True)))
 
     def _step(self, now: Moment, most: int) -> Felt:
         under = self._under(now)

@@ -26,10 +26,10 @@ _MODULES = (ground, rim, wheel, lugs, travel, frame, friction, drive, sensing, z
 
 def _by_name(effects: Forms) -> dict[str, Forms]:
     """Effects of one name are forms of one effect."""
-    found: dict[str, Forms] = {}
+    forms: dict[str, Forms] = {}
     for effect in effects:
-        found[effect.name] = (*found.get(effect.name, ()), effect)
-    return found
+        forms[effect.name] = (*forms.get(effect.name, ()), effect)
+    return forms
 
 
 LISTED = _by_name(tuple(effect for module in _MODULES for effect in module.EFFECTS))

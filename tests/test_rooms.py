@@ -12,11 +12,13 @@ ROOT = Path(__file__).parents[1]
 
 # the lowest first; a room imports itself and those of lower rows
 ROOMS = (
-    ("config", "estimator.limits", "estimator.visible"),
+    ("config", "estimator.visible"),
     ("estimator.terramechanics", "estimator.messages", "estimator.threads"),
     ("estimator.stages",),
     ("estimator.effects",),
-    ("estimator.model", "estimator.config", "estimator.recording"),
+    ("estimator.model", "estimator.config"),
+    ("estimator.limits",),
+    ("estimator.recording",),
     ("estimator.wheel",),
     ("estimator.filter",),
     ("estimator.online",),

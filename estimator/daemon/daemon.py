@@ -104,7 +104,7 @@ class Daemon:
         self.rotation = Rotation()
         self._stop, self._loop_stop = StopRequest(), Event()
         self._failure = ""
-        self._wall_offset = 0.0
+        self._wall_offset = clock.wall_offset()
 
     def stop(self) -> None:
         """Ask `serve` to end; may be called from a signal handler."""

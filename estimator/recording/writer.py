@@ -66,6 +66,7 @@ class WriterStatus:
     dropped: int
     queued: int  # waiting, or being written
     files: tuple[Path, ...]  # the run's parts so far
+    unfit: int = 0  # of the dropped, those that could not be written because of themselves
 
 
 class WriterThread:
@@ -104,6 +105,7 @@ class WriterThread:
         self._config = ""  # that of a PartStart among them
         self.beats = 0  # times round
         self._rejected = 0  # messages encoded since the last flush that did not fit their topic
+        self._unfit = 0  # in all
         self._suspect = False  # the current file failed for another reason than a full disk
         self._state: State = "writing"
         self._error = ""
@@ -129,7 +131,14 @@ class WriterThread:
     def status(self) -> WriterStatus:
         accepted, written, dropped, queued = self._queue.counters()
         return WriterStatus(
-            self._state, self._error, accepted, written, dropped, queued, tuple(self._parts.files)
+            self._state,
+            self._error,
+            accepted,
+            written,
+            dropped,
+            queued,
+            tuple(self._parts.files),
+            self._unfit,
         )
 
     @property
@@ -232,8 +241,9 @@ class WriterThread:
                     self._parts.writer.reading(item)
                 elif not isinstance(item, PartStart):  # which was taken apart before
                     self._parts.writer.message(*item)
-            except ValueError as error:
+            except Exception as error:  # the message's own fault: the next one may be good
                 self._rejected += 1
+                self._unfit += 1
                 self._error = str(error)
 
     def _flush(self) -> None:

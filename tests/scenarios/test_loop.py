@@ -149,6 +149,62 @@ def test_a_step_in_the_running_daemon_is_annotated(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
+YEARS = {1901: -2_170_000_000, 1970: 50, 2040: 2_210_000_000, 2200: 7_260_000_000}  # [s]
+SET = """
+import time
+real, origin = time.time_ns, {origin} * 10**9 - time.time_ns()
+time.time_ns = lambda: real() + origin
+time.time = lambda: time.time_ns() * 1e-9
+"""
+
+
+@pytest.mark.parametrize("year", YEARS)
+def test_a_wall_clock_in_another_year(tmp_path, year, seed, figure):
+    """Everything is recorded, and a line and the status say that the stamps are not dates."""
+    prelude = SET.format(origin=YEARS[year])
+    with service(tmp_path, driven(8.0, seed, skip=1.0), prelude=prelude) as (wires, daemon):
+        wires.finish()
+        report = daemon.status()
+        daemon.stop()
+    words = f"the wall clock says {year}-"
+    assert report["wall_clock"].startswith(words)
+    assert len(daemon.lines(words)) == 1 and not daemon.lines("wall clock stepped")
+    assert sum(words in line for line in log_lines(daemon.path())) == 1
+    accepted, _, dropped, _ = daemon.account()
+    row, level = "wall clock in 1901, 1970, 2040, 2200", f"{WIRES}, its time.time_ns shifted"
+    figure(row, level, "messages recorded", accepted - dropped)
+    figure(row, level, "messages lost", dropped, "", 0)
+    assert accepted > 5000 and np.all(np.diff(rows(daemon.path(), "/tick")["stamp"]) > 0)
+    assert verified(daemon.path())
+
+
+UNFIT = """
+from gritd.estimator.daemon.log_sink import LogSink
+put, number = LogSink.put, 0
+def spoilt(self, readings, tick, loop):
+    global number
+    number += 1
+    if number % 250 == 0:
+        tick = (2**63, *tick[1:])
+    put(self, readings, tick, loop)
+LogSink.put = spoilt
+"""
+
+
+def test_a_message_that_cannot_be_written(tmp_path, seed, figure):
+    """One tick in 250 does not fit its fields: it alone is lost, counted and said."""
+    with service(tmp_path, driven(8.0, seed, skip=1.0), prelude=UNFIT) as (wires, daemon):
+        wires.finish()
+        daemon.heard("messages could not be written")
+        daemon.stop()
+    row, level = "message that cannot be written", f"{WIRES}, a tick in 250 spoilt in its process"
+    _, _, dropped, _ = daemon.account()
+    (line,) = [line for _, line in daemon.lines("loop: ")]
+    spoilt = int(line.split()[1]) // 250
+    figure(row, level, "messages spoilt", spoilt)
+    figure(row, level, "messages lost for each", dropped / spoilt, "", 1)
+
+
 # --- queue
 # ----------------------------------------------------------------------------------------
 # -------------------

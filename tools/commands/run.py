@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -69,12 +68,13 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
 
 def _played(configuration: Configuration, folder: Path, run: RunInfo, wires: Path) -> int:
     """A recording of wire logs that are played at once, and where it lies."""
+    from gritd.estimator.daemon.clock import Clock
     from gritd.estimator.recording.mcapfile import RecordingError
     from gritd.estimator.recording.parts import run_path
     from gritd.tools.cli.files import unwritten
     from gritd.tools.service.tap import play_at_once
 
-    path = run_path(folder, run.name, time.time_ns())
+    path = run_path(folder, run.name, Clock().now())
     try:
         print(play_at_once(configuration, wires, run, path))
     except RecordingError as error:

@@ -133,6 +133,8 @@ def summary(report: Report) -> Iterator[str]:
         f"  loop     {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
         f"{report['real_time']}"
     )
+    if notice := report.get("wall_clock"):
+        yield f"  clock    {notice}"
 
     for name, stats in report["devices"].items():
         yield (

@@ -59,6 +59,8 @@ ROWS = (
     "one wrong stamp of a device clock",
     "step of a device clock",
     "random histories of a device clock",
+    "wall clock in 1901, 1970, 2040, 2200",
+    "message that cannot be written",
     "recording that unpacks to a thousand times its size",
     "import of packed text",
     "empty attachments, tiny chunks",

@@ -108,7 +108,8 @@ def _listen_to_signals(daemon: Daemon, watcher: Watcher) -> None:
 def _announce(daemon: Daemon, path: Path, notice: str) -> None:
     """Where the log is, and what may be amiss from the start."""
     say(f"logging to {path}")
-    for warning in filter(None, (notice, open_to_all(Path(daemon.configuration.source)))):
+    readable = open_to_all(Path(daemon.configuration.source))
+    for warning in filter(None, (daemon.clock.notice, notice, readable)):
         say(warning, sys.stderr)
         daemon.say(WARNING, warning)
 

@@ -43,6 +43,7 @@ class Reporter:
             "healthy": not daemon.health,
             "hanging": daemon.health,
             "real_time": self._notice or "yes",
+            "wall_clock": daemon.clock.notice,
             "configuration": daemon.configuration.source,
             **_tick(daemon),
             "disagreement": disagreement and disagreement._asdict(),

@@ -57,7 +57,8 @@ class Watcher:
         self._states = {reader.device: "" for reader in readers}
         self._steps = {reader.device: 0 for reader in readers}
         self._writing, self._files, self._hanging, self._untidy = "writing", 1, "", ""
-        self._dropped, self._overflowing, self._unconfirmed = 0, False, False
+        self._dropped, self._unfit = 0, 0
+        self._overflowing = self._unconfirmed = False
 
         self._calls = 0
         self._ready = self._reload_asked = False
@@ -151,6 +152,11 @@ class Watcher:
                 WARNING if status.state == "degraded" else INFO,
                 f"log {status.state} {status.error}",
             )
+
+        if status.unfit > self._unfit and self._due(1.0):
+            new, self._unfit = status.unfit - self._unfit, status.unfit
+            line = f"log: {new} messages could not be written, {status.unfit} in all; the last: "
+            self.tell(daemon, WARNING, line + status.error)
 
         if len(status.files) > self._files:
             self._files = len(status.files)

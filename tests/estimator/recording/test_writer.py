@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -131,6 +132,32 @@ def test_a_message_that_fits_no_topic_is_dropped_and_said(
     assert (status.accepted, status.written, status.dropped, status.queued) == (3, 1, 2, 0)
     assert "/none: not a topic" in status.error
     assert counts(tmp_path / "run.mcap") == [1]
+
+
+UNFIT = [
+    ("/mixed", T0, mixed_values(0)[:-1]),
+    ("/mixed", -1, mixed_values(0)),
+    ("/mixed", T0, (1 << 62, *mixed_values(0)[1:])),
+    ("/mixed", T0, tuple(10**400 for _ in mixed_values(0))),
+    ("/mixed", T0, tuple(None for _ in mixed_values(0))),
+    ("/mixed", T0, tuple("\ud800" for _ in mixed_values(0))),
+    ("/log", T0, 5),
+    (5, T0, ()),
+]
+
+
+@pytest.mark.parametrize("message", UNFIT)
+def test_a_message_that_cannot_be_written_is_lost_alone(
+    writer: WriterThread, tmp_path: Path, message: tuple[Any, int, Any]
+) -> None:
+    writer.put([reading(1)])
+    writer.put([reading(2)], [message, ("/mixed", T0, mixed_values(0))])
+    writer.put([Reading(1 << 62, "wheel_encoder", 1, T0), reading(3)])
+    status = writer.stop()
+    assert (status.accepted, status.written, status.dropped, status.unfit) == (6, 4, 2, 2)
+    assert status.state == "closed" and "/raw/wheel_encoder" in status.error
+    assert counts(tmp_path / "run.mcap") == [1, 2, 3] and exact(status)
+    assert read(tmp_path / "run.mcap").complete
 
 
 def test_a_writer_that_is_stopped_before_it_is_started_writes_what_it_has(tmp_path: Path) -> None:

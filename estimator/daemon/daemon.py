@@ -171,7 +171,6 @@ class Daemon:
     def _look(self, loop: Thread, watch: Callable[[Daemon], None]) -> None:
         try:
             self._check(loop)
-            self._compare()
             if self.rotation.due(self.configuration.settings.logging, self.writer.status()):
                 self.loop.ask(Change(self.configuration.text))
             watch(self)
@@ -204,14 +203,6 @@ class Daemon:
                 " stamps keep the old one",
             )
             self._wall_offset = offset
-
-    def _compare(self) -> None:
-        """Say where model and measurement begin or cease to disagree."""
-        if self.loop.latest is None:
-            return
-        line = self.model.look(self.loop.latest[0])
-        if line:
-            self.say(WARNING if self.model.present else INFO, line)
 
     def _close(self, patience: float) -> WriterStatus:
         if self._failure:

@@ -1,5 +1,5 @@
 """While the wheel still turns: that model and measurement disagree, in which channel, and since
-when.
+when; that the soil changed; that the filter's estimate is not believed, and why.
 
 The filter raises Flag.MISMATCH where its innovations are larger than their stated size for seconds.
 After a reset of the covariance the figure starts anew, so a disagreement ends only when the flag
@@ -13,13 +13,19 @@ from math import exp, hypot, isfinite, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.filter.measurement import COMPONENTS
-from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.status import Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
 
 NS = 1e-9
 MEMORY = 2.0  # [s] over which a channel's normalised error is averaged
 OVER = 5.0  # [s] without the flag end a disagreement
 PLACE = {name: at for at, name in enumerate(TICK_NAMES)}
+OFF = {Flag.TORQUE_OFF: "torque", Flag.DRAWBAR_PULL_OFF: "drawbar_pull"}
+DOUBTED = {
+    Status.AT_BOUND: "it stands at a bound that the prior calls improbable",
+    Status.DIVERGED: "σ was set back again and again, or is wider than the prior's",
+    Status.MISMATCH: "neither one soil nor a change of it explains what is measured",
+}
 
 
 class Disagreement(NamedTuple):
@@ -32,6 +38,13 @@ class Disagreement(NamedTuple):
     sigmas: float
 
 
+class Notice(NamedTuple):
+    """A line to say; over: that something has ended."""
+
+    text: str
+    over: bool = False
+
+
 class Watch:
     """Follows the ticks, in order, as often as it is asked to."""
 
@@ -39,18 +52,49 @@ class Watch:
         self.present: Disagreement | None = None
         self._squares = dict.fromkeys(COMPONENTS, 1.0)
         self._at, self._flagged = 0.0, 0.0
+        self._changed = False  # whether the last tick said that the soil changed
+        self._doubted: float | None = None  # since when the estimate is not believed
 
-    def look(self, tick: tuple[float, ...]) -> str:
-        """A line to say where a disagreement begins or ends, else ''."""
-        now = float(tick[PLACE["evaluated"]]) * NS
+    def look(self, tick: tuple[float, ...]) -> tuple[Notice, ...]:
+        """What begins or ends."""
+        now, flags = float(tick[PLACE["evaluated"]]) * NS, int(tick[PLACE["flags"]])
         self._average(tick, now)
-        if int(tick[PLACE["flags"]]) & Flag.MISMATCH:
+        notices = (
+            self._change(flags),
+            self._disagreement(flags, now),
+            self._doubt(flags, int(tick[PLACE["status"]]), now),
+        )
+        return tuple(notice for notice in notices if notice is not None)
+
+    def _change(self, flags: int) -> Notice | None:
+        before, self._changed = self._changed, bool(flags & Flag.CHANGED)
+        if before or not self._changed:
+            return None
+        return Notice("the soil changed: σ of c and tan φ is widened")
+
+    def _doubt(self, flags: int, status: int, now: float) -> Notice | None:
+        if not flags & Flag.PRIOR:
+            since, self._doubted = self._doubted, None
+            if since is None:
+                return None
+            text = f"the filter's estimate is believed again, after {now - since:.0f} s"
+            return Notice(text, over=True)
+        if self._doubted is not None or status not in DOUBTED:
+            return None
+
+        self._doubted = now
+        reason = DOUBTED[Status(status)]
+        return Notice(f"the filter's estimate is not believed, c and tan φ are the prior: {reason}")
+
+    def _disagreement(self, flags: int, now: float) -> Notice | None:
+        if flags & Flag.MISMATCH:
             self._flagged = now
-            return self._goes_on(now)
+            return self._goes_on(flags, now)
         if self.present is None or now - self._flagged < OVER:
-            return ""
+            return None
+
         since, self.present = self.present.since, None
-        return f"model and measurement agree again, after {now - since:.0f} s"
+        return Notice(f"model and measurement agree again, after {now - since:.0f} s", over=True)
 
     def _average(self, tick: tuple[float, ...], now: float) -> None:
         """Take up how far each channel is from what the estimate predicts."""
@@ -62,12 +106,13 @@ class Watch:
             if isfinite(off) and isfinite(sigma) and sigma > 0.0:
                 self._squares[name] = keep * before + (1.0 - keep) * (off / sigma) ** 2
 
-    def _goes_on(self, now: float) -> str:
-        channel = max(self._squares, key=lambda name: self._squares[name])
+    def _goes_on(self, flags: int, now: float) -> Notice | None:
+        channel = next(name for flag, name in OFF.items() if flags & flag)
         begins, since = self.present is None, now if self.present is None else self.present.since
         self.present = Disagreement(channel, since, sqrt(self._squares[channel]))
         if not begins:
-            return ""
+            return None
+
         when = time.strftime("%H:%M:%S", time.gmtime(since))
-        off = f"{self.present.sigmas:.1f} σ off"
-        return f"model and measurement disagree since {when} UTC: {channel.replace('_', ' ')} {off}"
+        off = f"{channel.replace('_', ' ')} {self.present.sigmas:.1f} σ off"
+        return Notice(f"model and measurement disagree since {when} UTC: {off}")

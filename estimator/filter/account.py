@@ -8,7 +8,7 @@ from math import nan, sqrt
 
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
-from gritd.estimator.filter.tracker import Account, Tracker, TrackState
+from gritd.estimator.filter.tracker import Account, TrackState
 from gritd.estimator.messages.tick import (
     Aid,
     FilterHealth,
@@ -68,12 +68,12 @@ def soil_estimate(estimate: Estimate) -> SoilEstimate:
     )
 
 
-def predictions(measurement: Measurement, estimate: Estimate, account: Account) -> Predictions:
+def predictions(measurement: Measurement, account: Account) -> Predictions:
     """What the estimate says of this window; NaN where the wheel touches nothing."""
     if not account.touching:
         return NO_PREDICTIONS
 
-    now = account.now
+    now, estimate = account.now, account.estimate
     prediction = measurement.predict(estimate, now)
     torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(estimate, now, prediction)
     load = measurement.model.load(*soil(estimate), _with_sigma(now), now.theta_m, now.slip.value)
@@ -89,11 +89,11 @@ def predictions(measurement: Measurement, estimate: Estimate, account: Account) 
     )
 
 
-def health(tracker: Tracker, state: TrackState) -> FilterHealth:
+def health(state: TrackState, account: Account) -> FilterHealth:
     """Whether the estimate can be trusted."""
     return FilterHealth(
-        separability=tracker.separability(state.estimate),
-        consistency=state.consistency,
+        separability=account.separability,
+        consistency=state.trust.consistency,
         updates=state.updates,
         resets=state.resets,
     )

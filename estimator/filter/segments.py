@@ -3,27 +3,35 @@ measurement.
 
 An EKF linearises every measurement once, at the estimate it had then. Where the measurement is
 precise and the estimate still poor (k 10 % wrong, one load seen so far) the Jacobians of early
-windows point along a valley that later
-turns out to lie elsewhere, and the filter keeps the certainty it gained from them: c then comes out
-several σ wrong. So the windows are kept, merged as long as the condition stays the same, and
-whenever a stretch ends the filter is run again from its anchor over all of them with Jacobians at
-the present estimate. This is the iterated extended Kalman smoother (Bell 1994, SIAM J. Optim. 4,
-626–636: it is Gauss-Newton on the whole record) with a bounded memory: the oldest stretch is
-absorbed into the anchor when there are more than CAPACITY.
+windows point along a valley that later turns out to lie elsewhere, and the filter keeps the
+certainty it gained from them: c then comes out several σ wrong. So the windows are kept, merged as
+long as the condition stays the same, and the filter is run again from its anchor over all of them
+with Jacobians at the present estimate. This is the iterated extended Kalman smoother (Bell 1994,
+SIAM J. Optim. 4, 626–636: it is Gauss-Newton on the whole record) with a bounded memory: the oldest
+stretch is absorbed into the anchor when there are more than CAPACITY.
+
+A stretch is short while it is recent, so that the instant of a change is known to half a second,
+and is joined to its neighbour of the same condition as it ages.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import exp, isnan
 from typing import Any, NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.line import Line
+from gritd.estimator.filter.tuning import CHANGE
 from gritd.estimator.wheel.chain import Added, Here
 from gritd.estimator.wheel.geometry import EntryAngle, entry_angle
 from gritd.estimator.wheel.sync import Measured
 from gritd.estimator.wheel.wheel_state import WheelState
 
-CAPACITY = 24  # stretches that are linearised anew
-LONGEST = 40  # windows merged into one stretch
+CAPACITY = 36  # stretches that are linearised anew
+SHORTEST = 5  # windows merged into one stretch while it is recent …
+LONGEST = 40  # … and at most
+AGEING = 4  # a stretch may hold a quarter of the windows that came after it
 STEADY = 3  # windows that make a stretch one of steady motion
 SAME_SLIP = 0.02
 SAME_LOAD = 0.02  # relative
@@ -39,21 +47,29 @@ class Stretch(NamedTuple):
     windows: int
     components: tuple[int, ...]
     elapsed: float  # [s] since the end of the stretch before
+    unrest: float = 0.0  # random walk of the soil meanwhile, in prior σ/√s
+    line: Line | None = None  # once it is complete
+    changed: Estimate | None = None  # where the soil changed before it: what is still known then
 
-    def holds(self, now: WheelState, components: tuple[int, ...]) -> bool:
-        """Whether a window belongs to this stretch."""
+    @property
+    def judged(self) -> bool:
+        """Whether it tells of the soil: a window or two that failed a gate are outliers."""
+        measured = 1 if isnan(self.mean.drawbar_pull.value) else 2
+        return self.windows >= STEADY or len(self.components) == measured
+
+    def like(self, now: WheelState, components: tuple[int, ...]) -> bool:
+        """Whether a window is of the same condition."""
         mean = self.mean
         return (
-            self.windows < LONGEST
-            and components == self.components
+            components == self.components
             and abs(now.slip.value - mean.slip.value) <= SAME_SLIP
             and abs(now.load.value - mean.load.value) <= SAME_LOAD * mean.load.value
             and abs(now.theta_1.value - mean.theta_1.value) <= SAME_ANGLE * mean.theta_1.value
         )
 
-    def merged(self, now: WheelState, radius: float, elapsed: float) -> Stretch:
-        """The stretch with one more window. Sigmas stay those of a single window."""
-        weight = 1.0 / (self.windows + 1)
+    def merged(self, now: WheelState, radius: float, elapsed: float, windows: int = 1) -> Stretch:
+        """The stretch with one more window, or several. Sigmas stay those of a single window."""
+        weight = windows / (self.windows + windows)
         old = self.mean
 
         def mean(a: Measured, b: Measured) -> Measured:
@@ -75,7 +91,18 @@ class Stretch(NamedTuple):
                 _blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)
             ),
         )
-        return Stretch(state, self.windows + 1, self.components, self.elapsed + elapsed)
+        return self._replace(
+            mean=state,
+            windows=self.windows + windows,
+            elapsed=self.elapsed + elapsed,
+            line=None,
+        )
+
+    def joined(self, after: Stretch, radius: float) -> Stretch:
+        """This stretch and the next, both complete, as one."""
+        assert self.line is not None and after.line is not None
+        both = self.merged(after.mean, radius, after.elapsed, after.windows)
+        return both._replace(line=self.line.mixed(after.line, after.windows / both.windows))
 
 
 def _blend(old: tuple[float, ...], now: tuple[float, ...], weight: float) -> Any:
@@ -89,21 +116,77 @@ class Memory(NamedTuple):
     stretches: tuple[Stretch, ...] = ()
     pending: float = 0.0  # [s] of random walk not yet assigned to a stretch
 
+    @property
+    def since(self) -> int:
+        """Number of the first stretch after the last change of the soil; 0 without one."""
+        changes = [at for at, stretch in enumerate(self.stretches) if stretch.changed is not None]
+        return changes[-1] if changes else 0
+
     def slip_span(self) -> float:
-        """Largest difference of slip between steady stretches."""
-        slips = [stretch.mean.slip.value for stretch in self.stretches if stretch.windows >= STEADY]
+        """Largest difference of slip between steady stretches on the present soil."""
+        slips = [
+            stretch.mean.slip.value
+            for stretch in self.stretches[self.since :]
+            if stretch.windows >= STEADY and stretch.components
+        ]
         return max(slips) - min(slips) if slips else 0.0
 
-    def paused(self, elapsed: float) -> Memory:
-        """Time passed without an accepted window."""
-        return self._replace(pending=self.pending + elapsed)
-
     def extended(
-        self, now: WheelState, components: tuple[int, ...], radius: float, elapsed: float
+        self,
+        now: WheelState,
+        components: tuple[int, ...],
+        radius: float,
+        elapsed: float,
+        unrest: float,
     ) -> tuple[Memory, bool]:
         """The memory with one more window, and whether a new stretch began."""
         elapsed += self.pending
-        if self.stretches and self.stretches[-1].holds(now, components):
-            last = self.stretches[-1].merged(now, radius, elapsed)
-            return Memory(self.anchor, (*self.stretches[:-1], last)), False
-        return Memory(self.anchor, (*self.stretches, Stretch(now, 1, components, elapsed))), True
+        if not self.stretches:
+            return self._begun((), Stretch(now, 1, components, elapsed, unrest)), True
+
+        *before, last = self.stretches
+        if last.windows < SHORTEST and last.like(now, components):
+            return self._begun(before, last.merged(now, radius, elapsed)), False
+
+        kept = [*before, last] if last.judged else before
+        elapsed += 0.0 if last.judged else last.elapsed
+        return self._begun(kept, Stretch(now, 1, components, elapsed, unrest)), True
+
+    def _begun(self, before: Sequence[Stretch], last: Stretch) -> Memory:
+        return Memory(self.anchor, (*before, last))
+
+    def complete(self) -> tuple[Stretch, ...]:
+        """The stretches on the present soil that are complete."""
+        return tuple([s for s in self.stretches[self.since : -1] if s.line is not None])
+
+    def changed_at(self, number: int, known: Estimate) -> Memory:
+        """The memory with a change of the soil before the complete stretch of this number. What
+        failed its gate since then belongs to the new soil, and that may go on changing.
+        """
+        at, age, since = self.since + number, 0.0, []
+        for stretch in self.stretches[at:]:
+            measured = tuple(range(len(stretch.line.y))) if stretch.line else stretch.components
+            unrest = CHANGE.walk * exp(-age / CHANGE.cooling)
+            since.append(stretch._replace(components=measured, unrest=unrest))
+            age += stretch.elapsed
+        since[0] = since[0]._replace(changed=known)
+        return self._replace(stretches=(*self.stretches[:at], *since))
+
+    def aged(self, radius: float) -> Memory:
+        """The memory with the latest two neighbours joined that are of one condition and old
+        enough.
+        """
+        after = 0
+        for at in range(len(self.stretches) - 2, 0, -1):
+            left, right = self.stretches[at - 1 : at + 1]
+            allowed = min(LONGEST, after // AGEING)
+            if left.windows + right.windows <= allowed and _alike(left, right):
+                joined = left.joined(right, radius)
+                rest = self.stretches[at + 1 :]
+                return self._replace(stretches=(*self.stretches[: at - 1], joined, *rest))
+            after += right.windows
+        return self
+
+
+def _alike(left: Stretch, right: Stretch) -> bool:
+    return right.changed is None and left.like(right.mean, right.components)

@@ -7,7 +7,7 @@ done. It reads no clock and keeps nothing between calls.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, hypot, log, nan, sqrt
+from math import hypot, log, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
@@ -20,13 +20,14 @@ from gritd.estimator.filter.estimate import (
     Estimate,
     Update,
     Vector,
-    dot,
-    predict,
     project,
     variance,
 )
 from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
-from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
+from gritd.estimator.filter.segments import LONGEST, Memory
+from gritd.estimator.filter.smoother import Smoother
+from gritd.estimator.filter.trust import Trust
+from gritd.estimator.filter.tuning import CHANGE, TRUST
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import Aid
@@ -39,23 +40,6 @@ SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this 
 CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
-CONSISTENCY_MEMORY = 2.0  # [s]
-# Mean normalised innovation squared above which the filter is reset. A wrong calibration, of the
-# size the configuration
-# states, gives innovations of variance S that keep their sign for the whole run, so their mean
-# square does not settle
-# at 1: it exceeds 12 in 1 rig of 1,900 and 4 in 1 of 22 (chi-square, 1 degree of freedom).
-INCONSISTENT = 12.0
-MISMATCH = 4.0  # … and above which model and measurement are said to disagree
-OUTLIER = (
-    25.0  # no single window counts for more: a spike is gated, not a reason to forget the soil
-)
-PATIENCE = 5.0  # [s] after a reset before the next
-# [s] a reset so soon after another means that the prior itself is too sure: σ is doubled each time
-# …
-RELAPSE = 20.0
-WIDEST = 6  # … so often
-
 
 Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
 
@@ -68,6 +52,8 @@ class Account(NamedTuple):
     status: Status
     flags: int  # of Flag
     aids: tuple[Aid, ...]  # empty where nothing was offered to the filter
+    estimate: Estimate  # what is told: the filter's, or the prior where that is not believed
+    separability: float  # of what is told
 
     @property
     def touching(self) -> bool:
@@ -83,25 +69,16 @@ class TrackState(NamedTuple):
     recall: Mapping[str, Recall]  # what configured effects remember, by name
     columns: Columns = ()  # of the uncertain effect parameters, at the last update
     linearised: Point | None = None  # where the memory was linearised last
+    unlinearised: int = 0  # windows since then
     began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
-    slip_varied: bool = False  # from one steady stretch to another, since the last reset
-    surprise: float = 0.0  # sum of normalised innovations squared, exponentially forgotten
-    components: float = 0.0  # number of them, likewise
-    last_reset: int = -1
+    slip_varied: bool = False  # from one steady stretch to another, on the present soil
+    trust: Trust = Trust()
     updates: int = 0
     resets: int = 0
-    streak: int = 0  # resets in a row, after the first
     started: bool = False  # every required channel has filled a window once
     origin: float | None = None  # where the carriage stood in the first full window [m]
-
-    @property
-    def consistency(self) -> float:
-        """Mean normalised innovation squared per component; 1 when the stated noise is the real
-        one.
-        """
-        return self.surprise / self.components if self.components > 0.0 else nan
 
 
 class Tracker:
@@ -115,6 +92,8 @@ class Tracker:
         self._required = REQUIRED_BITS | (
             CHANNEL_BITS["wrench"] if settings.wrench is not None else 0
         )
+        # half of what the memory of innovations holds of one component
+        self._experienced = 0.5 * TRUST.memory * NS / self._window
         self._bounds = _bounds(settings)
         soil = settings.soil
         self._prior_sigma = (
@@ -123,13 +102,14 @@ class Tracker:
             soil.shear_modulus.sigma / soil.shear_modulus.value,
         )
 
-    def start(self) -> TrackState:
-        """The prior."""
-        soil = self.settings.soil
-        estimate = self._unsure(
+        self.prior = self._unsure(
             (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
         )
-        return TrackState(estimate, Memory(estimate), self.measurement.chain.fresh_memory())
+        self.smoother = Smoother(settings, self.measurement, self.engine, self._prior_sigma)
+
+    def start(self) -> TrackState:
+        """The prior."""
+        return TrackState(self.prior, Memory(self.prior), self.measurement.chain.fresh_memory())
 
     def _unsure(self, x: Vector, factor: float = 1.0) -> Estimate:
         """The state x with the prior's standard deviations, times a factor."""
@@ -153,8 +133,30 @@ class Tracker:
             if status == Status.TRACKING:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state._replace(columns=now.columns), now, elapsed)
-        return state, Account(
-            snapshot, now, status, int(now.flags) | self._flags(state, aids), aids
+
+        return state, self._account(state, snapshot, now, status, aids)
+
+    def _account(
+        self,
+        state: TrackState,
+        snapshot: Snapshot,
+        now: WheelState,
+        status: Status,
+        aids: tuple[Aid, ...],
+    ) -> Account:
+        """What is told: the filter's estimate where it is believed, else the prior and why."""
+        separability = self.separability(state.estimate)
+        standing = state.trust.standing(self._experienced, separability)
+        believed = standing == Status.TRACKING
+        told = separability if believed else 1.0
+        return Account(
+            snapshot,
+            now,
+            standing if status == Status.TRACKING else status,
+            int(now.flags) | self._flags(state, aids, told) | Flag.PRIOR * (not believed),
+            aids,
+            state.estimate if believed else self.prior,
+            told,
         )
 
     def _closed(
@@ -180,28 +182,41 @@ class Tracker:
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float
     ) -> tuple[TrackState, tuple[Aid, ...]]:
-        """Walk over the elapsed time, gate, update, remember, and judge the innovations."""
-        state = state._replace(estimate=self._walk(state.estimate, elapsed))
-        update = self.measurement.linearise(now, self.measurement.predict(state.estimate, now))
-        aids = self._gate(state.estimate, now, update)
+        """Walk over the elapsed time, gate, update, remember; judge the record where a stretch
+        ends.
+        """
+        trust = state.trust.passed(elapsed)
+        walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
+        state = state._replace(estimate=walked, trust=trust)
+
+        update = self.measurement.linearise(now, self.measurement.predict(walked, now))
+        aids = self._gate(walked, now, update)
         taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
         if taken:
-            estimate = self.engine.update(
-                state.estimate, selected(update, taken), not self.estimates_k(state)
-            )
-            state = state._replace(
-                estimate=project(estimate, self._bounds), updates=state.updates + 1
-            )
-            state = self._remember(state, now, taken, elapsed)
-        else:
-            state = state._replace(memory=state.memory.paused(elapsed))
+            update = selected(update, taken)
+            estimate = self.engine.update(walked, update, not self.estimates_k(state))
+            state = self._moved_to(state, estimate, elapsed)
+            state = state._replace(updates=state.updates + 1)
+
+        state = self._remember(state, now, taken, elapsed)
         return self._judge(state, aids, elapsed), aids
 
-    def _walk(self, estimate: Estimate, elapsed: float) -> Estimate:
-        """Random walk of the soil over the elapsed time [s]."""
-        walk = self.settings.filter
-        rates = (walk.cohesion_walk / KPA, walk.tan_phi_walk, walk.ln_k_walk)
-        return predict(estimate, tuple(rate * rate * elapsed for rate in rates))
+    def _moved_to(self, state: TrackState, estimate: Estimate, elapsed: float = 0.0) -> TrackState:
+        """The estimate inside its bounds, and for how long it has stood at one."""
+        estimate = project(estimate, self._bounds)
+        at_bound = state.trust.at_bound + elapsed if self._at_bound(estimate) else 0.0
+        return state._replace(estimate=estimate, trust=state.trust._replace(at_bound=at_bound))
+
+    def _at_bound(self, estimate: Estimate) -> bool:
+        """Whether a state stands at a bound that the prior calls improbable."""
+        return any(
+            [
+                value in bounds and abs(value - mean) > TRUST.improbable * sigma
+                for value, bounds, mean, sigma in zip(
+                    estimate.x, self._bounds, self.prior.x, self._prior_sigma, strict=True
+                )
+            ]
+        )
 
     def estimates_k(self, state: TrackState) -> bool:
         """Whether ln k is a state; otherwise it is considered."""
@@ -222,30 +237,36 @@ class Tracker:
     def _remember(
         self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
     ) -> TrackState:
-        """Add the window to the memory; when a new stretch begins and the state has moved,
-        linearise all anew.
-        """
-        memory, begun = state.memory.extended(
-            now, taken, self.measurement.chain.wheel.radius, elapsed
+        """Add the window to the memory; where a stretch ends, judge the record."""
+        radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
+        memory, begun = state.memory.extended(now, taken, radius, elapsed, state.trust.unrest)
+        varied = state.slip_varied or self._slip_varies(memory, now)
+        state = state._replace(
+            memory=memory, slip_varied=varied, unlinearised=state.unlinearised + 1
         )
-        if not state.slip_varied and memory.slip_span() > max(
-            SLIP_VARIES, CLEARLY * now.slip.sigma
-        ):
-            state = state._replace(slip_varied=True)
-        if not begun or len(memory.stretches) == 1:
-            return state._replace(memory=memory)
-        if len(memory.stretches) > CAPACITY:
-            anchor = self._absorb(memory.anchor, memory.stretches[0], state)
-            memory = Memory(anchor, memory.stretches[1:])
+        if not begun or not before:
+            return state
+
+        memory = self.smoother.completed(
+            memory, state.estimate.x, not self.estimates_k(state), state.trust.doubt
+        )
+        state = self._changed(state._replace(memory=memory))
+
+        same = before[0].like(now, taken) and state.unlinearised < LONGEST
         point = (self.estimates_k(state), state.estimate.x)
-        if not self._moved(state.linearised, point):
-            return state._replace(memory=memory)
-        estimate = memory.anchor
-        for stretch in memory.stretches:
-            estimate = self._absorb(estimate, stretch, state)
-        return state._replace(
-            memory=memory, estimate=project(estimate, self._bounds), linearised=point
-        )
+        if same or not self._moved(state.linearised, point):
+            return state
+        return self._smoothed(state, point)
+
+    def _slip_varies(self, memory: Memory, now: WheelState) -> bool:
+        return memory.slip_span() > max(SLIP_VARIES, CLEARLY * now.slip.sigma)
+
+    def _smoothed(self, state: TrackState, point: Point) -> TrackState:
+        """The filter over the whole memory, linearised at a point."""
+        memory = self.smoother.linearised(state.memory, point[1])
+        memory, estimate = self.smoother.smoothed(memory, not point[0], state.trust.doubt)
+        state = state._replace(memory=memory, linearised=point, unlinearised=0)
+        return self._moved_to(state, estimate)
 
     def _moved(self, before: Point | None, now: Point) -> bool:
         """Whether the state is so far from where the memory was linearised that its Jacobians no
@@ -256,50 +277,47 @@ class Tracker:
         steps = zip(before[1], now[1], self._prior_sigma, strict=True)
         return any(abs(b - a) > MOVED * sigma for a, b, sigma in steps)
 
-    def _absorb(self, estimate: Estimate, stretch: Stretch, state: TrackState) -> Estimate:
-        """Update with a whole stretch, its Jacobians taken at the present estimate of `state`."""
-        estimate = self._walk(estimate, stretch.elapsed)
-        prediction = self.measurement.predict(state.estimate, stretch.mean)
-        update = selected(self.measurement.linearise(stretch.mean, prediction), stretch.components)
-        offset = tuple([x - at for x, at in zip(estimate.x, state.estimate.x, strict=True)])
-        merged = Update(
-            tuple([y - dot(h, offset) for y, h in zip(update.innovation, update.H, strict=True)]),
-            update.H,
-            update.G,
-            tuple([tuple([r / stretch.windows for r in row]) for row in update.R]),
-        )
-        return self.engine.update(estimate, merged, not self.estimates_k(state))
+    def _changed(self, state: TrackState) -> TrackState:
+        """The state with σ widened where the soil changed."""
+        smoother = self.smoother
+        judgement = smoother.judgement(state.memory, state.trust.doubt)
+        if judgement is None or not judgement.change:
+            return state
+
+        # tangents taken at a poor estimate mislead: once more, along those at the best fit
+        x = project(state.estimate._replace(x=judgement.x), self._bounds).x
+        state = state._replace(memory=smoother.linearised(state.memory, x), linearised=None)
+        judgement = smoother.judgement(state.memory, state.trust.doubt)
+        if judgement is None or not judgement.change:
+            return state
+        return self._restarted(state, state.memory.changed_at(judgement.change, state.estimate))
+
+    def _restarted(self, state: TrackState, memory: Memory) -> TrackState:
+        """The state with a memory in which the soil changed."""
+        before = state.before
+        varied = before is not None and self._slip_varies(memory, before)
+        state = state._replace(memory=memory, slip_varied=varied, trust=state.trust.changed())
+        return self._smoothed(state, (self.estimates_k(state), state.estimate.x))
 
     def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
-        """Keep the running consistency figure; back to the prior's covariance, or a wider one, when
-        it is out of all measure.
+        """Keep the account of the innovations; back to the prior's covariance, or a wider one, when
+        they are out of all measure. From a bound, back to its mean as well.
         """
-        keep = exp(-elapsed / CONSISTENCY_MEMORY)
-        surprise = keep * state.surprise + sum(
-            [min(aid.innovation**2 / aid.s, OUTLIER) for aid in aids]
-        )
-        state = state._replace(surprise=surprise, components=keep * state.components + len(aids))
-        rested = state.last_reset < 0 or state.window_end - state.last_reset > PATIENCE * NS
-        if not (rested and self._experienced(state) and state.consistency > INCONSISTENT):
+        state = state._replace(trust=state.trust.surprised(aids, elapsed))
+        if not state.trust.inconsistent(self._experienced):
             return state
-        again = state.last_reset >= 0 and state.window_end - state.last_reset < RELAPSE * NS
-        streak = state.streak + 1 if again else 0
-        estimate = self._unsure(state.estimate.x, 2.0 ** min(streak, WIDEST))
+
+        trust = state.trust.reset()
+        x = self.prior.x if self._at_bound(state.estimate) else state.estimate.x
+        estimate = self._unsure(x, trust.doubt)
         return state._replace(
             estimate=estimate,
             memory=Memory(estimate),
             linearised=None,
             slip_varied=False,
-            surprise=0.0,
-            components=0.0,
-            last_reset=state.window_end,
+            trust=trust,
             resets=state.resets + 1,
-            streak=streak,
         )
-
-    def _experienced(self, state: TrackState) -> bool:
-        """Whether the consistency figure rests on at least half its memory."""
-        return state.components > 0.5 * CONSISTENCY_MEMORY * NS / self._window
 
     def separability(self, estimate: Estimate) -> float:
         """Posterior over prior standard deviation in the weakest direction of (c, tan φ)."""
@@ -311,13 +329,19 @@ class Tracker:
         b = P[C][TAN_PHI] / (sigma_c * sigma_t)
         return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
 
-    def _flags(self, state: TrackState, aids: tuple[Aid, ...]) -> int:
+    def _flags(self, state: TrackState, aids: tuple[Aid, ...], separability: float) -> int:
+        trust = state.trust
+        disagrees = trust.disagrees(self._experienced)
+        torque, drawbar_pull = trust.surprise
         return (
-            Flag.NOT_SEPARABLE * (self.separability(state.estimate) > SEPARABLE)
+            Flag.NOT_SEPARABLE * (separability > SEPARABLE)
             + Flag.K_ESTIMATED * self.estimates_k(state)
             + Flag.GATED * (not all([aid.accepted for aid in aids]))
-            + Flag.RESET * (bool(aids) and state.last_reset == state.window_end)
-            + Flag.MISMATCH * (self._experienced(state) and state.consistency > MISMATCH)
+            + Flag.RESET * (bool(aids) and trust.since_reset == 0.0)
+            + Flag.MISMATCH * disagrees
+            + Flag.CHANGED * (trust.since_change < CHANGE.settled)
+            + Flag.TORQUE_OFF * (disagrees and torque >= drawbar_pull)
+            + Flag.DRAWBAR_PULL_OFF * (disagrees and torque < drawbar_pull)
         )
 
 

@@ -116,20 +116,20 @@ def _window(tracker: Tracker, state: TrackState, account: Account) -> Window:
             stuck=snapshot.stuck,
         ),
         measurements=measurements(snapshot, account.now),
-        soil=soil_estimate(state.estimate),
-        predictions=_predictions(tracker, state, account),
-        health=health(tracker, state),
+        soil=soil_estimate(account.estimate),
+        predictions=_predictions(tracker, account),
+        health=health(state, account),
         torque=torque,
         drawbar_pull=drawbar_pull,
     )
 
 
-def _predictions(tracker: Tracker, state: TrackState, account: Account) -> PointPredictions:
+def _predictions(tracker: Tracker, account: Account) -> PointPredictions:
     """At the estimate after the update."""
     if not account.touching:
         return PointPredictions()
 
-    prediction = tracker.measurement.predict(state.estimate, account.now)
+    prediction = tracker.measurement.predict(account.estimate, account.now)
     return PointPredictions(
         torque_predicted=prediction.torque.value,
         drawbar_pull_predicted=prediction.drawbar_pull.value,

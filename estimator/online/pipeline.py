@@ -66,7 +66,7 @@ class Pipeline:
         if search is not None:
             search, pull = search_on(self.tracker.measurement, search, pull)
         elif account.aids:
-            search = Search(track.estimate, account.now)
+            search = Search(account.estimate, account.now)
 
         first = t if state.first < 0 else state.first
         late, jumps = sync.counters.late, sync.counters.jumps
@@ -75,15 +75,14 @@ class Pipeline:
 
     def _tick(self, before: State, after: State, account: Account, consumed: int, t: int) -> Tick:
         """What the tick at t [ns] says."""
-        estimate = after.track.estimate
         torque, drawbar_pull = aids(account)
         return Tick(
             head=self._head(before, after, account, consumed, t),
             measurements=measurements(account.snapshot, account.now),
-            soil=soil_estimate(estimate),
-            predictions=predictions(self.tracker.measurement, estimate, account),
+            soil=soil_estimate(account.estimate),
+            predictions=predictions(self.tracker.measurement, account),
             largest_pull=LargestPull(*after.pull),
-            health=health(self.tracker, after.track),
+            health=health(after.track, account),
             torque=torque,
             drawbar_pull=drawbar_pull,
         )

@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
+TICK_REVISION = "tick_revision"  # entry of CONFIG: messages.tick.REVISION of what computed /tick
 CHECKSUM = "crc32"
 
 

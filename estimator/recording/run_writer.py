@@ -15,9 +15,10 @@ from mcap.records import Channel, Schema
 
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.messages.tick import REVISION
 from gritd.estimator.recording.cdr import ENCAPSULATION, Topic, Values
 from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
-from gritd.estimator.recording.metadata import CONFIG, RUN, sealed, versions
+from gritd.estimator.recording.metadata import CONFIG, RUN, TICK_REVISION, sealed, versions
 from gritd.estimator.recording.topics import LOG_TOPIC, RAW_TOPICS
 
 CHUNK_SIZE = 1 << 20  # [bytes] a chunk is closed at this size even if nobody flushes
@@ -53,7 +54,8 @@ class RunWriter:
         self._file = McapFile(self.path, compression, mode=mode)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
         with self._file.beginning():
-            self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **versions()}))
+            computed = {**versions(), TICK_REVISION: str(REVISION)}
+            self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **computed}))
             self._file.add_metadata(RUN, sealed(RUN, run.entries()))
 
     def reading(self, reading: Reading) -> None:

@@ -5,7 +5,7 @@ nothing about the soil.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot, isnan
+from math import hypot, isnan, pi
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
@@ -183,6 +183,9 @@ def _travel(settings: Settings, now: WheelState) -> Status | None:
 
 
 def _steadiness(now: WheelState, before: WheelState | None) -> Status:
+    # a wheel that is in as deep as its axle, or deeper, has no entry angle
+    if now.theta_1.value >= pi / 2.0:
+        return Status.UNCERTAIN
     if now.slip.sigma > SLIP_SIGMA_MAX:
         return Status.UNCERTAIN
     if now.load.sigma > LOAD_SIGMA_MAX * now.load.value:

@@ -133,6 +133,8 @@ def _trouble(report: Report) -> Iterator[str]:
         yield f"{TROUBLE} log {report['log']['state']} {report['log']['error']}".rstrip()
     if disagreeing := report.get("disagreement"):
         yield f"{TROUBLE} model {disagreement(disagreeing)}"
+    if "PRIOR" in report["flags"]:
+        yield f"{TROUBLE} c, tan φ and k are the prior: the filter's estimate is not believed"
 
 
 def _quantity(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.status import UPDATED, Flag, Status
 
 Rows = NDArray[np.void]  # structured: fields of /tick, one row a tick or one a window
 SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
@@ -28,6 +28,7 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"{int(last['resets'])} resets",
             f"  status     {_statuses(rows)}",
             f"  flags      {_flags(rows)}",
+            *_doubted(last),
             f"  c          {last['cohesion']:.0f} ± {last['cohesion_sigma']:.0f} Pa",
             f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with "
             f"c {_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the "
@@ -58,6 +59,12 @@ def _flags(rows: Rows) -> str:
     )
 
 
+def _doubted(last: dict[str, float]) -> Iterator[str]:
+    """That the soil at the end is the stated one."""
+    if int(last["flags"]) & Flag.PRIOR:
+        yield "  soil       the prior: the filter's own estimate is not believed at the end"
+
+
 def _correlation(row: dict[str, float]) -> float:
     product = row["cohesion_sigma"] * row["tan_phi_sigma"]
     return row["cov_c_tan_phi"] / product if product else 0.0
@@ -65,7 +72,7 @@ def _correlation(row: dict[str, float]) -> float:
 
 def _side_by_side(rows: Rows) -> Iterator[str]:
     """Measured and predicted torque, drawbar pull and load while tracking."""
-    tracking, names = rows[rows["status"] == Status.TRACKING], rows.dtype.names or ()
+    tracking, names = rows[np.isin(rows["status"], UPDATED)], rows.dtype.names or ()
     for name, unit in SIDE_BY_SIDE:
         if not len(tracking) or f"{name}_predicted" not in names or isnan(tracking[name].mean()):
             continue

@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from gritd.estimator.config.configuration import Configuration
-from gritd.estimator.messages.tick import TICK_NAMES, TickRow
+from gritd.estimator.messages.tick import REVISION, TICK_NAMES, TickRow
 from gritd.estimator.offline.playback import RecordedTick
+from gritd.estimator.recording.metadata import TICK_REVISION
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK_TOPIC
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError
@@ -51,12 +52,18 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
 
 def _check(first: Recording) -> None:
     """Raises CommandError where there is nothing to compare with."""
+    path, by = first.path, f"gritd {first.versions.get('gritd', 'of another version')}"
     if not first.counts["/tick"]:
-        raise CommandError(f"{first.path}: holds no /tick to verify against", USAGE)
+        raise CommandError(f"{path}: holds no /tick to verify against", USAGE)
     if first.topics["/tick"].names != TICK_TOPIC.names:
-        version = first.versions.get("gritd", "another version")
+        raise CommandError(f"{path}: its /tick was written by {by} and has other fields", USAGE)
+
+    revision = first.versions.get(TICK_REVISION, "1")
+    if revision != str(REVISION):
         raise CommandError(
-            f"{first.path}: its /tick was written by gritd {version} and has other fields", USAGE
+            f"{path}: its /tick was computed by revision {revision} of the filter ({by}), this "
+            f"is revision {REVISION}: verify with that one, or recompute without --verify",
+            USAGE,
         )
 
 

@@ -118,13 +118,19 @@ def disagreement(disagreeing: Mapping[str, Any]) -> str:
     )
 
 
+def prior_note(report: Report) -> str:
+    """That the soil shown is the stated one, where the filter's own is not believed."""
+    return "  (the prior: the filter's estimate is not believed)" * ("PRIOR" in report["flags"])
+
+
 def summary(report: Report) -> Iterator[str]:
     """A few lines for people."""
     tick, loop, log = report["tick"], report["loop"], report["log"]
     yield f"gritd {report['pid']}: {report['status']} {' '.join(report['flags'])}".rstrip()
 
     if tick:
-        yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa"
+        note = prior_note(report)
+        yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa{note}"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
     if disagreeing := report.get("disagreement"):
         yield f"  model    {disagreement(disagreeing)}"

@@ -73,6 +73,8 @@ ROWS = (
     "file of 8 bytes",
     "metadata and configuration of impossible numbers",
     "YAML cut at every byte",
+    "step, ramp or patch of the soil",
+    "a filter out of its depth",
 )
 
 Figure = dict[str, Any]

@@ -156,7 +156,7 @@ def _inside(normalised: Array) -> str:
 
 
 def _shade_idle(ax: Axes, ticks: Rows, seconds: Array) -> None:
-    """Grey where the filter was not updated, and why is in the status."""
+    """Grey where the filter was not updated or not believed, and why is in the status."""
     idle = np.concatenate(([0], (ticks["status"] != Status.TRACKING).astype(int), [0]))
     edges = np.flatnonzero(np.diff(idle))
     last = len(seconds) - 1

@@ -74,6 +74,7 @@ class Watcher:
             self._follow(daemon, reader.stats())
         self._follow_queue(daemon)
         self._follow_writer(daemon)
+        self._follow_model(daemon)
         self._follow_health(daemon)
 
         if self._reload_asked and self._loading is None:
@@ -167,6 +168,13 @@ class Watcher:
                     WARNING,
                     f"{daemon.rotation.deleted.pop()}: was deleted while it was written",
                 )
+
+    def _follow_model(self, daemon: Daemon) -> None:
+        """What begins or ends of the model's agreement with what is measured."""
+        if daemon.loop.latest is None:
+            return
+        for notice in daemon.model.look(daemon.loop.latest[0]):
+            self.tell(daemon, INFO if notice.over else WARNING, notice.text)
 
     def _follow_health(self, daemon: Daemon) -> None:
         if not self._publisher.alive:

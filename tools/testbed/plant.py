@@ -14,13 +14,13 @@ import numpy as np
 
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings, Uncertain
-from gritd.estimator.model.forward import Response
+from gritd.estimator.model.forward import Response, simulate_arrays
 from gritd.estimator.stages.situation import Motion, Sensed, situation_of
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.sensors import readings
-from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
+from gritd.tools.testbed.simulation import Run, soil_of
 
 PlantKind = Literal["original", "linear"]
 
@@ -73,10 +73,16 @@ def drawn_soil(settings: Settings, rng: np.random.Generator) -> Soil:
 
 def drive(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion, seed: int) -> Run:
     """What the wheel does on this soil, and what the sensors send."""
-    if plant == "original":
-        return simulate_run(settings, soil, motion, configured(settings.effects), seed)
-    response = linear_response(settings, soil, motion)
+    response = respond(plant, settings, soil, motion)
     return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+
+
+def respond(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion) -> Response:
+    """What the wheel does on this soil."""
+    if plant == "linear":
+        return linear_response(settings, soil, motion)
+    constant, acting = settings.drive.torque_constant.value, configured(settings.effects)
+    return simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
 
 
 def linear_response(settings: Settings, soil: Soil, motion: Motion) -> Response:

@@ -29,8 +29,7 @@ def watched(loss: float) -> tuple[Watch, list[tuple[int, str]], list[int]]:
             batch = [_more(reading, more) for reading in batch]
         state, tick = pipeline.step(state, batch, t)
         flags.append(int(tick[TICK_NAMES.index("flags")]))
-        if line := watch.look(tick):
-            said.append((number, line))
+        said += [(number, notice.text) for notice in watch.look(tick)]
     return watch, said, flags
 
 
@@ -43,13 +42,25 @@ def _more(reading: Reading, volts: float) -> Reading:
 def test_a_motor_that_suddenly_drags_is_said_with_channel_and_time() -> None:
     _, said, flags = watched(1.0)
     assert any(flag & Flag.MISMATCH for flag in flags)
-    number, line = said[0]
+    number, line = next(each for each in said if each[1].startswith("model"))
     assert BEGINS < number <= BEGINS + 60  # within 6 s
     assert (
         line.startswith("model and measurement disagree since ")
-        and " UTC: " in line
+        and " UTC: torque " in line
         and " σ off" in line
     )
+    assert any(line.startswith("the filter's estimate is not believed") for _, line in said)
+
+
+def test_a_change_of_the_soil_is_said_once() -> None:
+    """A motor that drags a little is a change of the soil to the filter: said, and then learnt."""
+    watch, said, flags = watched(0.05)
+    assert any(flag & Flag.CHANGED for flag in flags[BEGINS:])
+    assert not any(flag & (Flag.CHANGED | Flag.PRIOR) for flag in flags[:BEGINS])
+    number, line = said[0]
+    assert line.startswith("the soil changed") and BEGINS < number <= BEGINS + 20
+    assert len([line for _, line in said if line.startswith("the soil changed")]) <= 4
+    assert watch.present is None
 
 
 def test_an_honest_run_is_never_said_to_disagree() -> None:

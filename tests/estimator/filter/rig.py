@@ -22,11 +22,11 @@ RIG = replace(
 TRUTH = (720.0, 0.62, 0.025)
 
 
-def run(settings, truth, schedule, seed=0, engine="plain"):
-    """The last state, and the ticks as dictionaries."""
+def run(settings, truth, schedule, seed=0, engine="plain", plant=None):
+    """The last state, and the ticks as dictionaries; plant: the true rig, where it is another."""
     pipeline = Pipeline(settings, engine)
     state, ticks = pipeline.start(), []
-    for t, batch in readings(settings, truth, schedule, seed=seed):
+    for t, batch in readings(plant or settings, truth, schedule, seed=seed):
         state, tick = pipeline.step(state, batch, t)
         ticks.append(dict(zip(TICK_NAMES, tick, strict=True)))
     return state.track, ticks

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.status import UPDATED, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from tests.estimator.filter.rig import RIG, SLOW, TRUTH, run
@@ -260,6 +260,23 @@ def test_a_channel_that_says_nothing_usable_is_stale_until_it_does(name):
     assert len({tick["cohesion"] for tick in lost}) == 1
     assert ticks[-1]["status"] == Status.TRACKING and ticks[-1]["resets"] == 0
     assert not any(tick["flags"] & Flag.GATED for tick in ticks[80:])
+
+
+@pytest.mark.parametrize("depth, used", [(0.99, True), (1.01, False)])
+def test_a_wheel_deeper_than_its_axle_has_no_entry_angle(depth, used):
+    pot = replace(SLOW["sinkage_pot"], high=10.0)
+    settings = replace(RIG, channels={**SLOW, "sinkage_pot": pot})
+    volts = (depth * RIG.wheel.radius + 0.002) / 0.01
+
+    def sunk(reading):
+        if reading.channel != "sinkage_pot":
+            return reading
+        # with a little of its noise: what does not move is stuck
+        return reading._replace(value=volts + reading.value % 1e-3)
+
+    deep = altered(settings, [(12.0, 100.0, 0.3)], sunk)[60:80]
+    expected = set(UPDATED) if used else {Status.UNCERTAIN}
+    assert {tick["status"] for tick in deep} <= expected
 
 
 def test_a_wrench_without_torque_is_stale_where_the_torque_is_its():

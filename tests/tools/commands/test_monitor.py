@@ -79,6 +79,12 @@ def test_the_monitor_shows_in_bold_where_model_and_measurement_disagree():
     )
 
 
+def test_the_monitor_says_in_bold_that_the_soil_shown_is_the_prior():
+    picture = list(monitor.lines({**HEALTHY, "status": "AT_BOUND", "flags": ["PRIOR"]}))
+    assert "AT_BOUND PRIOR" in picture[0] and len(picture) <= 24
+    assert picture[1] == "! c, tan φ and k are the prior: the filter's estimate is not believed"
+
+
 def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publisher):
     """On a pseudo-terminal of 40 columns and 10 lines: what is wider or longer is cut, never
     wrapped.

@@ -15,6 +15,7 @@ from gritd.estimator.config.configuration import load
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
+from gritd.estimator.recording import run_writer
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
@@ -94,6 +95,27 @@ def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
     writer.close()
     assert replay.main([str(changed), "--verify"]) == 1
     assert "ticks differ" in (said := capsys.readouterr().out) and "current: logged" in said
+
+
+def test_a_recording_of_another_revision_is_not_compared(recorded, tmp_path, monkeypatch, capsys):
+    """Made by gritd before the filter computed another /tick: one line says so."""
+    for written, found in (("7", "7"), ("", "1")):
+        monkeypatch.setattr(run_writer, "REVISION", written)
+        if not written:
+            monkeypatch.setattr(run_writer, "TICK_REVISION", "some_other_entry")
+        old = tmp_path / f"old{written}.mcap"
+        writer = RunWriter(old, TOPICS, read(recorded).config_yaml, RunInfo())
+        for topic, log_time, values in read(recorded).messages():
+            writer.message(topic, log_time, values)
+        writer.close()
+
+        with pytest.raises(CommandError) as refused:
+            replay.main([str(old), "--verify"])
+        words = f"{old}: its /tick was computed by revision {found} of the filter"
+        assert refused.value.code == 2 and str(refused.value).startswith(words)
+        assert "recompute without --verify" in str(refused.value)
+        assert replay.main([str(old)]) == 0, "and can be recomputed"
+    capsys.readouterr()
 
 
 def test_a_new_configuration_recomputes_from_the_raw_readings(recorded, tmp_path, capsys):

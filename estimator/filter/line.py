@@ -1,0 +1,68 @@
+"""A stretch of steady motion as one affine measurement of the soil."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gritd.estimator.filter.estimate import Estimate, Matrix, Update, Vector, dot
+from gritd.estimator.filter.measurement import Measurement
+from gritd.estimator.filter.tuning import CHANGE
+from gritd.estimator.wheel.wheel_state import WheelState
+
+
+class Line(NamedTuple):
+    """y = H x + G b + noise, of m = 1 or 2 components: torque, or torque and drawbar pull."""
+
+    y: Vector  # (m,) measured, less the tangent of the prediction at x = 0
+    H: Matrix  # (m, 3) with respect to the state
+    G: Matrix  # (m, q) with respect to the nuisances
+    R: Matrix  # (m, m) noise of a single window
+    D: Matrix  # (m, m) of what does not average out within a stretch
+
+    def innovation(self, x: Vector) -> Vector:
+        """What the state x (3,) leaves of it (m,)."""
+        return tuple([y - dot(h, x) for y, h in zip(self.y, self.H, strict=True)])
+
+    def update(self, x: Vector, windows: int) -> Update:
+        """The mean of so many windows as a measurement, about the state x (3,)."""
+        R = tuple([tuple([r / windows for r in row]) for row in self.R])
+        return Update(self.innovation(x), self.H, self.G, R)
+
+    def mixed(self, other: Line, weight: float) -> Line:
+        """The mean of two, `weight` on the other."""
+        keep = 1.0 - weight
+        y = tuple([keep * a + weight * b for a, b in zip(self.y, other.y, strict=True)])
+        H, G, R, D = (_mixed(a, b, weight) for a, b in zip(self[1:], other[1:], strict=True))
+        return Line(y, H, G, R, D)
+
+
+def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
+    """The mean state of a stretch, along the tangent at the state x (3,)."""
+    prediction = measurement.predict(Estimate(x, (), ()), mean)
+    update = measurement.linearise(mean, prediction)
+    y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
+
+    thrust = CHANGE.model_error * prediction.torque.value
+    own = (thrust, thrust / measurement.chain.wheel.radius)
+    slips = [quantity.by_slip * mean.slip.sigma for quantity in prediction[:2]]
+    return Line(y, update.H, update.G, update.R, _lasting(own[: len(y)], slips[: len(y)]))
+
+
+def _lasting(own: Vector, shared: list[float]) -> Matrix:
+    """Covariance (m, m) of errors of each component's own, and of one that all share."""
+    return tuple(
+        [
+            tuple([a * b + (own[i] ** 2 if i == j else 0.0) for j, b in enumerate(shared)])
+            for i, a in enumerate(shared)
+        ]
+    )
+
+
+def _mixed(one: Matrix, other: Matrix, weight: float) -> Matrix:
+    keep = 1.0 - weight
+    return tuple(
+        [
+            tuple([keep * a + weight * b for a, b in zip(p, q, strict=True)])
+            for p, q in zip(one, other, strict=True)
+        ]
+    )

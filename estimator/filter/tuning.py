@@ -1,0 +1,85 @@
+"""Tuned numbers of the filter: each with its reason and what it was learnt from.
+
+What follows when one is halved or doubled stands in docs/filter.md, measured by
+`python -m gritd.tools.dev.soil_changes --number NAME=VALUE`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ChangeTuning:
+    """When the soil is said to have changed, and how it is learnt anew."""
+
+    # [nats] of evidence for a change. A false alarm comes at most every e^11.2 stretches of half a
+    # second (Ville), 10 h; the inequality is exact for the noise that is stated.
+    alarm: float = 11.2
+
+    # Share of the torque by which the closed forms, shifted to the true stresses, may be off in a
+    # stretch: the shift is first-order in ln k and n. Judgement.
+    model_error: float = 0.001
+
+    # [prior σ/√s] random walk of the soil right after a change: a ramp goes on changing. Learnt
+    # from ramps of 20 s.
+    walk: float = 0.1
+
+    # [s] in which that walk dies down. Learnt from ramps of 20 s.
+    cooling: float = 10.0
+
+    # [s] for which a tick says that the soil changed: what the filter needs to see it at another
+    # slip. Judgement.
+    settled: float = 5.0
+
+
+@dataclass(frozen=True)
+class TrustTuning:
+    """When model and measurement disagree, and when the estimate is not to be believed."""
+
+    # [s] over which normalised innovations are averaged. Judgement: a few slips of the wheel.
+    memory: float = 2.0
+
+    # Mean square beyond which model and measurement disagree. A calibration three σ off keeps all
+    # innovations on one side, and is no disagreement: 3² of its own.
+    mismatch: float = 9.0
+
+    # Mean square beyond which σ is set back to the prior's.
+    inconsistent: float = 12.0
+
+    # Most that one window counts: a spike of any size resets nothing.
+    most: float = 25.0
+
+    # [s] before σ is set back once more: what it takes to learn anew.
+    patience: float = 5.0
+
+    # [s] in which a reset after a reset says that the prior is too sure.
+    relapse: float = 20.0
+
+    # Factor on the prior's σ with every reset in a row, and how often at most: a truth ten σ off
+    # the prior lies within the second.
+    doubt: float = 4.0
+    widest: int = 3
+
+    # Resets in a row after which the estimate is not believed.
+    diverged: int = 3
+
+    # Posterior over prior σ beyond which the estimate says less than the prior does.
+    wider: float = 1.5
+
+    # Changes of the soil within the memory of them beyond which they explain nothing any more. A
+    # ramp of 20 s is told as a few steps, four at most.
+    restless: float = 4.0
+
+    # [s] in which a change is forgotten.
+    restless_memory: float = 60.0
+
+    # [s] at a bound before it is said.
+    at_bound: float = 1.0
+
+    # [prior σ] from the prior's mean beyond which a bound is no answer.
+    improbable: float = 2.0
+
+
+CHANGE = ChangeTuning()
+TRUST = TrustTuning()

@@ -1,0 +1,23 @@
+"""What `gritd replay` prints of the last estimate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.tools.commands.replay_report import report
+
+
+@pytest.mark.parametrize("flags, told", [(Flag.NONE, False), (Flag.PRIOR | Flag.MISMATCH, True)])
+def test_a_soil_that_is_the_prior_is_said_to_be(flags, told):
+    rows = np.ones(3, dtype=[(name, "<f8") for name in TICK_NAMES])
+    rows["status"], rows["flags"] = Status.MISMATCH if told else Status.TRACKING, flags
+    rows["stamp"] = rows["evaluated"] = 1e9 * np.arange(3)
+    lines = report(Path("run.mcap"), rows, "ticks").splitlines()
+    said = "  soil       the prior: the filter's own estimate is not believed at the end"
+    assert (said in lines) == told
+    assert any("MISMATCH" in line for line in lines) == told

@@ -8,19 +8,8 @@ from math import inf
 from typing import Any
 
 from gritd.estimator.config.devices import NAME
-from gritd.estimator.config.schema import (
-    ABSENT,
-    NEEDED,
-    UNLIMITED,
-    Impossible,
-    Integer,
-    Interval,
-    Key,
-    Quantity,
-    Section,
-    Text,
-    uncertain,
-)
+from gritd.estimator.config.kinds import UNLIMITED, Integer, Interval, Quantity, Text
+from gritd.estimator.config.schema import ABSENT, NEEDED, Impossible, Key, Section, uncertain
 from gritd.estimator.config.settings import (
     Calibration,
     Channel,

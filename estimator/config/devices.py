@@ -8,21 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gritd.estimator.config.schema import (
-    ABSENT,
-    Choice,
-    FilePath,
-    Flag,
-    Impossible,
-    Integer,
-    Key,
-    Named,
-    Options,
-    Quantity,
-    Section,
-    Text,
-    Variant,
-)
+from gritd.estimator.config.kinds import Choice, FilePath, Flag, Integer, Quantity, Text
+from gritd.estimator.config.schema import ABSENT, Impossible, Key, Named, Options, Section, Variant
 from gritd.estimator.config.settings import Device
 
 NAME = Text("a name", r".*\S.*")

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gritd.estimator.config.schema import Quantity
+from gritd.estimator.config.kinds import Quantity
 from gritd.estimator.config.settings import ConfiguredEffect
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect

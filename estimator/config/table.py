@@ -16,21 +16,15 @@ from typing import Any
 
 from gritd.estimator.config.channels import channels
 from gritd.estimator.config.devices import NAME, device
+from gritd.estimator.config.kinds import UNLIMITED, Choice, Integer, Interval, Kind, Quantity, Text
 from gritd.estimator.config.names import EXPECTED, PATTERN
 from gritd.estimator.config.schema import (
     ABSENT,
     NEEDED,
-    UNLIMITED,
-    Choice,
     Impossible,
-    Integer,
-    Interval,
     Key,
-    Kind,
     Named,
-    Quantity,
     Section,
-    Text,
     UncertainQuantity,
     entries,
     uncertain,

@@ -17,7 +17,7 @@ from gritd.estimator import effects
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config import units
 from gritd.estimator.config.effects import quantities
-from gritd.estimator.config.schema import Quantity
+from gritd.estimator.config.kinds import Quantity
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.readings import NS

@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from gritd.estimator.config.schema import ABSENT, NEEDED, Key, Kind, Named, Section, Variant
+from gritd.estimator.config.kinds import Kind
+from gritd.estimator.config.schema import ABSENT, NEEDED, Key, Named, Section, Variant
 from gritd.estimator.config.table import table
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "configuration.md"

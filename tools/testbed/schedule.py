@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.config.configuration import read_text
-from gritd.estimator.config.schema import Key, Kind, Quantity, Section
+from gritd.estimator.config.kinds import Kind, Quantity
+from gritd.estimator.config.schema import Key, Section
 from gritd.estimator.config.yamltree import Node, Sequence, compose, describe
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
-from gritd.estimator.config.schema import Quantity
+from gritd.estimator.config.kinds import Quantity
 from gritd.estimator.config.settings import (
     Channel,
     ConfiguredEffect,

@@ -2,11 +2,10 @@
 as speed, and a wrong stamp costs one sample.
 
 Bytes arrive late by a delay that is never negative: USB adapters hold them for up to 16 ms,
-schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or
-one
+schedulers add more. `clock_line` finds the line under these delays. A frame from before it, or one
 whose time goes back, has a wrong time: it gets no stamp, and the line does not see it. Where
-frames agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's
-clock has stepped.
+frames agree for a tenth of a second that the line is elsewhere (`clock_step`), the device's clock
+has stepped.
 """
 
 from __future__ import annotations
@@ -188,8 +187,7 @@ class DeviceClock:
 
     def _squeezed(self, times: list[int], received: int) -> tuple[int, int] | None:
         """Device time and stamp of the chunk's newest sample where the line does not fit between
-        the
-        last stamp and the receive time: it was pushed down since, or has yet to be.
+        the last stamp and the receive time: it was pushed down since, or has yet to be.
         """
         last = self._last
         fresh = sorted(time for time in times if last is not None and time > last[0])

@@ -3,8 +3,8 @@ r"""Checksummed ASCII lines: `$key,sequence,device_us,value[,value…]*CCCC\r\n`
 CCCC is the CRC-16 (CCITT, initial value 0xFFFF) of everything between `$` and `*`, four hexadecimal
 digits: NMEA's one-byte exclusive or would miss one damaged line in 256. `device_us` may be empty. A
 value of digits only is an integer, any other a float. `$` never occurs inside a line, so the next
-`$` starts afresh, even where the line's end is
-missing: a fault costs the line it hits and no other.
+`$` starts afresh, even where the line's end is missing: a fault costs the line it hits and no
+other.
 """
 
 from __future__ import annotations

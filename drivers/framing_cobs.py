@@ -2,17 +2,16 @@
 
 Body before stuffing, little-endian:
 
-    u16 sequence | u8 kind of the values | u8 length of the key, bit 7 set if a time follows |
-    key | [u32 device_us]
-    | values, all of one kind | u16 CRC-16 (CCITT, initial value 0xFFFF) of all before it
+    u16 sequence | u8 kind of the values | u8 length of the key, bit 7 set if a time follows
+    | key | [u32 device_us] | values, all of one kind
+    | u16 CRC-16 (CCITT, initial value 0xFFFF) of all before it
 
 Kinds are the letters of Python's struct: i int32, I uint32, q int64, f float32, d float64. The
 body is at most 253 bytes, so one stuffing code, below 0xFF, covers any run. A damaged zero byte
-joins
-two frames: a fault costs the frame it hits and at most the next.
+joins two frames: a fault costs the frame it hits and at most the next.
 
 COBS: S. Cheshire, M. Baker, Consistent Overhead Byte Stuffing, IEEE/ACM Trans. Networking 7
-    (1999) 159–172.
+(1999) 159–172.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Recorded wires in the place of hardware: the chunks of wire logs, through the drivers again.
 
 `Playback` plays the wires of one run on the present clock, each chunk as long after the first of
-all
-as when it was recorded: for the daemon and its readers. `decoded` gives the readings at once, with
-their recorded times, so that an hour takes seconds.
+all as when it was recorded: for the daemon and its readers. `decoded` gives the readings at once,
+with their recorded times, so that an hour takes seconds.
 """
 
 from __future__ import annotations

@@ -51,8 +51,7 @@ EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 """Effect name → unit and bounds of each of its parameters; None for a name that is no effect."""
 
 
-# ---- wheel, soil, drive, load
-# --------------------------------------------------------------------------------------
+# ---- wheel, soil, drive, load --------------------------------------------------------------------
 
 WHEEL = {
     "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
@@ -142,8 +141,7 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
     return Load(nominal, minimum)
 
 
-# ---- rates, filter, logging, effects, run
-# --------------------------------------------------------------------------
+# ---- rates, filter, logging, effects, run --------------------------------------------------------
 
 RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
@@ -272,9 +270,7 @@ class Effects:
         return f"{own.centre!r} {own.unit}".strip()
 
 
-# ---- the whole file
-# -----------------------------------------------------------------------------------------------
-# -
+# ---- the whole file ------------------------------------------------------------------------------
 
 
 def table(folder: Path | None = None, effect_schema: EffectSchema | None = None) -> Section:

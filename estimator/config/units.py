@@ -1,11 +1,10 @@
-"""Quantities written as text, such as `72 mm` or `1523.4 kN/m^(n+2)`,, to SI: one small table.
+"""Quantities written as text, such as `72 mm` or `1523.4 kN/m^(n+2)`, to SI: one small table.
 
 A unit is a product of powers: symbols joined by `*`, `·` or `/` (read from the left), a whole
 power after `^`, `sqrt(s)` for random walks, and `1` to start a reciprocal. Symbols are those of
 SYMBOLS, most with an SI prefix. The exponent n of the pressure-sinkage law may stand in a power
-of the
-metre: `kN/m^(n+1)`. Angles and counts are dimensions of their own, so that mrad/count is not
-taken for mm/count.
+of the metre: `kN/m^(n+1)`. Angles and counts are dimensions of their own, so that mrad/count is
+not taken for mm/count.
 """
 
 from __future__ import annotations

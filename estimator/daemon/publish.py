@@ -3,8 +3,7 @@ whoever connects.
 
 A thread of its own asks for a report only while somebody listens, so the loop is never waited for
 nor waits. A client that does not read loses its connection. Nothing that a client sends is looked
-at. Who may connect is decided by the
-permissions of the socket file: the daemon's user and group.
+at. Who may connect is decided by the permissions of the socket file: the daemon's user and group.
 """
 
 from __future__ import annotations

@@ -38,8 +38,10 @@ class EmpiricalLaw(Effect):
 
     y + a₀ + a₁ i + a₂ i² + a₃ ζ + a₄ ν for y = T, DP (along the travel) and z
 
-    ζ = z/r,   ν = ln((r|ω| + v_f)/(v₀ + v_f)),   v₀ = 20 mm/s,   v_f = 1 mm/s Outside the domain i,
-    ζ and ν keep the value at its edge. Source: none; that is what the name says.
+    ζ = z/r,   ν = ln((r|ω| + v_f)/(v₀ + v_f)),   v₀ = 20 mm/s,   v_f = 1 mm/s
+
+    Outside the domain i, ζ and ν keep the value at its edge. Source: none; that is what the name
+    says.
     """
 
     torque_constant: float = _torque("1")

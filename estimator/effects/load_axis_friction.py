@@ -19,8 +19,8 @@ class LoadAxisFriction(Effect):
     """The vertical axis sticks: the soil feels less than the weights while the wheel sinks, more
     while it rises.
 
-    W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z,   s = 1 at the start: the wheel was
-    lowered on the soil
+    W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z
+    s = 1 at the start: the wheel was lowered on the soil
 
     The friction keeps its last direction when the axis stops. Source: presliding model of Dahl
     (1968), Aerospace Corp. TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),

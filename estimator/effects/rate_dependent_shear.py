@@ -21,8 +21,8 @@ from gritd.estimator.stages.situation import ContactLaw, Situation
 class RateDependentShear(Effect):
     """Soil is stronger when it is sheared faster.
 
-    (c, tan φ) · [1 + λ log₁₀((r|ω| + v_f)/(v₀ + v_f))],   v₀ = 20 mm/s,   v_f = 1 mm/s keeps a
-    standing wheel finite
+    (c, tan φ) · [1 + λ log₁₀((r|ω| + v_f)/(v₀ + v_f))]
+    v₀ = 20 mm/s;   v_f = 1 mm/s keeps a standing wheel finite
 
     Source: Mitchell and Soga (2005), Fundamentals of Soil Behavior, 3rd ed., ch. 12: a few to ten
     per cent a decade.

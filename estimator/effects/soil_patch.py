@@ -17,8 +17,8 @@ EDGE = 0.01  # [m] width over which one soil passes into the other
 class SoilPatch(Effect):
     """On one stretch of the bed the soil has another cohesion or friction angle.
 
-    c · (1 + a w),  tan φ · (1 + b w),   w(x) = ½ [tanh((x − x₀ + l/2)/δ) − tanh((x − x₀ − l/2)/δ)],
-    δ = 10 mm
+    c · (1 + a w),   tan φ · (1 + b w)
+    w(x) = ½ [tanh((x − x₀ + l/2)/δ) − tanh((x − x₀ − l/2)/δ)],   δ = 10 mm
 
     Source: a smooth window; Eq. (2) holds on either side with its own c and φ.
     """

@@ -11,8 +11,9 @@ from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apa
 class StressLinearisation(Effect):
     """The filter's triangular stresses stand for the true ones; this gives back what they miss.
 
-    A₁ + s ΔA₁ … C₃ + s ΔC₃ in (20)-(22),   Δ(θ₁, i, k, n) = the integral over the stresses of (3),
-    (4), (7) less that over the triangles of (11)-(14) with the exponent of (19)
+    A₁ + s ΔA₁ … C₃ + s ΔC₃ in (20)-(22)
+    Δ(θ₁, i, k, n) = the integral over the stresses of (3), (4), (7)
+                     less that over the triangles of (11)-(14) with the exponent of (19)
 
     Acts in the on-line filter alone, through estimator/filter/shift.py: simulator and diagnosis
     integrate (3), (4), (7) themselves. Source: (8)-(10) against (20)-(22), Shibly, Iagnemma,

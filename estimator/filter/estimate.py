@@ -1,11 +1,10 @@
 """What the extended Kalman filter knows of c, tan φ and ln k, and the algebra on it.
 
 Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance.
-They,
-and ln k while slip does not vary, are considered (Schmidt): their uncertainty and their correlation
-with the state take part in every innovation covariance, but their own value and variance never
-change. Without them a filter fed ten windows a second soon claims to know c far better than the
-calibration of the sensors allows.
+They, and ln k while slip does not vary, are considered (Schmidt): their uncertainty and their
+correlation with the state take part in every innovation covariance, but their own value and
+variance never change. Without them a filter fed ten windows a second soon claims to know c far
+better than the calibration of the sensors allows.
 """
 
 from __future__ import annotations

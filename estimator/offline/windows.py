@@ -30,8 +30,7 @@ CALM = 4.0  # [σ] within which the two slopes are the same
 NORMAL = 1.4826  # standard deviation of normal scatter over its median absolute deviation
 
 
-# --- windows that may overlap
-# ---------------------------------------------------------------------
+# ---- windows that may overlap --------------------------------------------------------------------
 
 
 class Members(NamedTuple):
@@ -94,8 +93,7 @@ def lines(members: Members, stamp: Ints, counts: Ints) -> Lines:
     return Lines(origin + mean, rate, np.sqrt(spread) / NS, moved)
 
 
-# --- blocks side by side
-# --------------------------------------------------------------------------
+# ---- blocks side by side -------------------------------------------------------------------------
 
 
 class Slopes(NamedTuple):
@@ -136,9 +134,8 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
 def block_slope(time: Array, values: Array, edges: Array) -> Slopes:
     """Value and slope of an encoder at the middle of each block (n,).
 
-    time [s], values (m,) in order of time; edges (n + 1,) [s]. By a line fitted over the block
-    and its neighbours, QUICK to either side; where the slope is steady within its own noise,
-    STEADY or
+    time [s], values (m,) in order of time; edges (n + 1,) [s]. By a line fitted over the block and
+    its neighbours, QUICK to either side; where the slope is steady within its own noise, STEADY or
     LONG to either side, if that line leaves no more than the short one: at creeping speed one
     count is much of the slip, and counts that beat with the sampling make slow waves of what was
     steady.

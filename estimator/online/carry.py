@@ -1,8 +1,7 @@
 """A new configuration for a run that goes on: what may change, and what the state becomes.
 
 Calibration, noise, soil, load, effects and filter may change between two ticks. Devices, signals
-and rates belong to
-threads and buffers that already run: they need a restart.
+and rates belong to threads and buffers that already run: they need a restart.
 """
 
 from __future__ import annotations

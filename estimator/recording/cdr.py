@@ -49,8 +49,8 @@ class Topic:
     """A topic of fixed fields. `schema_name` is the ROS name, package/msg/Name.
 
     Types: builtin_interfaces/Time (an int [ns] on our side), the ROS integers and floats, bool,
-        and string. A topic
-    without a string is flat: its messages all have one size, and its arrays can be read in bulk.
+    and string. A topic without a string is flat: its messages all have one size, and its arrays
+    can be read in bulk.
     """
 
     name: str

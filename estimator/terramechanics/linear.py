@@ -3,15 +3,18 @@
 The printed paper has misprints in (6), (18) and (22); the forms here are right
 (docs/physics.md). With
 
-    σ(θ) = σₘ·hat(θ), the triangle of (11), (12);     τ(θ) = (c + σ tan φ) g(θ),   g = 1 −
-    e^(−f(θ₁ − θ))
+    σ(θ) = σₘ·hat(θ), the triangle of (11), (12)
+    τ(θ) = (c + σ tan φ) g(θ),   g = 1 − e^(−f(θ₁ − θ))
 
 the integrals (15)-(17) are linear in c, σₘ and σₘ tan φ:
 
-    T  = r²b [c·A₁ + σₘ tan φ·A₂]                    (22)    A₁ = ∫ g dθ           A₂ = ∫ hat g
-    dθ W = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]              (21)    B₁ = ∫ hat cos θ dθ   B₂, B₃ = ∫
-    {1, hat} g sin θ dθ DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]              (20)    C₁, C₂ = ∫ {1,
-    hat} g cos θ dθ   C₃ = ∫ hat sin θ dθ
+    T  = r²b [c·A₁ + σₘ tan φ·A₂]           (22)
+    W  = r b [σₘ(B₁ + tan φ·B₃) + c·B₂]     (21)
+    DP = r b [c·C₁ + σₘ(tan φ·C₂ − C₃)]     (20)
+
+    A₁ = ∫ g dθ,                A₂ = ∫ hat g dθ
+    B₁ = ∫ hat cos θ dθ,        B₂, B₃ = ∫ {1, hat} g sin θ dθ
+    C₁, C₂ = ∫ {1, hat} g cos θ dθ,   C₃ = ∫ hat sin θ dθ
 
 `predict` eliminates σₘ through (21), so a wheel of known load needs neither n nor K. Where f < 0
 (braking) the shear stress is the odd extension, τ(−f) = −τ(f). Valid for 0 ≤ θ₁ ≤ π/2, −1 < i ≤

@@ -4,8 +4,8 @@ Along the contact let v = (θ₁ − θ)/θ₁ run from 0 at entry to 1 at botto
 stress of (11), (12) is σₘ·hat(v), a triangle with its peak at v = 1 − λ, λ = θₘ/θ₁. All
 integrals of the linear model are then of the form
 
-    ∫₀¹ {1, v, hat, v·hat} · kernel(v) dv,   kernel = e^(−ηv) or 1 − e^(−ηv), each with or
-    without e^(−iθ₁v),
+    ∫₀¹ {1, v, hat, v·hat} · kernel(v) dv
+    kernel = e^(−ηv) or 1 − e^(−ηv), each with or without e^(−iθ₁v),
 
 with η = |f|θ₁. On each side of the peak they reduce to moments over s ∈ [0, 1],
 

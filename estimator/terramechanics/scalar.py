@@ -5,8 +5,8 @@ With v = (θ₁ − θ)/θ₁ from 0 at entry to 1 at bottom dead centre, and ha
 (12) with its peak at v = α = 1 − λ, λ = θₘ/θ₁, the integrals of (20)-(22) are values of two Laplace
 transforms,
 
-    E(s) = ∫₀¹ e^(−sv) dv = (1 − e^(−s))/s       H(s) = ∫₀¹ hat(v) e^(−sv) dv = [1/α − e^(−αs)/(αλ)
-    + e^(−s)/λ]/s²
+    E(s) = ∫₀¹ e^(−sv) dv = (1 − e^(−s))/s
+    H(s) = ∫₀¹ hat(v) e^(−sv) dv = [1/α − e^(−αs)/(αλ) + e^(−s)/λ]/s²
 
 at s = η = fθ₁, iθ₁ and η + iθ₁, because cos θ + i sin θ = e^(iθ₁) e^(−iθ₁v). They lose digits as s
 → 0 and as θₘ nears an end of the contact, and f < 0 is braking: there `linear`, stable in every

@@ -2,10 +2,9 @@
 
 TABLE_1 is Table 1 of Shibly, Iagnemma and Dubowsky (2005). Dry sand, sandy loam and clayey soil
 were checked against a public simulation's transcript of that table; snow is given from memory and
-was not. Their Tables 2 and 3 could not
-be had: LOOSE_SAND and MARS_LIKE are stand-ins that have the cohesion (and for the latter the
-friction angle) of the low-cohesion soils of Table 3, with moduli, exponent and shear modulus of our
-choice.
+was not. Their Tables 2 and 3 could not be had: LOOSE_SAND and MARS_LIKE are stand-ins that have
+the cohesion (and for the latter the friction angle) of the low-cohesion soils of Table 3, with
+moduli, exponent and shear modulus of our choice.
 """
 
 from __future__ import annotations

@@ -168,7 +168,6 @@ def test_a_lost_half_of_the_wrench_is_counted_not_mixed(virtual):
 
 
 # ---- floods --------------------------------------------------------------------------------------
-# ------------------
 
 
 def unwanted(n):
@@ -215,8 +214,7 @@ def test_burst_loses_nothing_uncounted(multicast):
     print(f"burst: {stats.frames} received, {stats.lost} lost and counted")
 
 
-# ---- hostile input
-# -------------------------------------------------------------------------------------------------
+# ---- hostile input -------------------------------------------------------------------------------
 
 
 def hostile_datagrams(rng, count):
@@ -258,7 +256,6 @@ def test_hostile_datagrams_are_counted_and_ignored(multicast, count):
 
 
 # ---- slcan ---------------------------------------------------------------------------------------
-# ------------------
 
 
 @pytest.fixture
@@ -319,8 +316,7 @@ def test_slcan_unplugged_and_back_without_losing_a_descriptor(slcan):
     assert slcan.reader.stats().reopened == 10
 
 
-# ---- a failing bus
-# -------------------------------------------------------------------------------------------------
+# ---- a failing bus -------------------------------------------------------------------------------
 
 
 class FailingBus:

@@ -33,8 +33,7 @@ def inline(**signals):
     }
 
 
-# ---- the delivered database
-# ----------------------------------------------------------------------------------------
+# ---- the delivered database ----------------------------------------------------------------------
 
 
 def test_database_has_every_channel_with_counter_and_distinct_ids():
@@ -85,8 +84,7 @@ def test_the_clock_of_each_message_is_its_own_and_wraps_at_its_width():
     assert framing().clock_modulus("WheelEncoder.Count") == 1 << 24
 
 
-# ---- what is listened to
-# -------------------------------------------------------------------------------------------
+# ---- what is listened to -------------------------------------------------------------------------
 
 
 def test_filters_name_exactly_the_wanted_ids():
@@ -147,8 +145,7 @@ def test_a_cut_chunk_is_garbage():
     assert decoder.counts.garbage == 9
 
 
-# ---- inline definitions
-# --------------------------------------------------------------------------------------------
+# ---- inline definitions --------------------------------------------------------------------------
 
 
 def test_inline_definitions_decode_like_the_dbc():
@@ -234,8 +231,7 @@ def test_inline_keys_are_those_of_the_configuration():
     assert set(RULES) == set(SIGNAL)
 
 
-# ---- what is missing or broken
-# -------------------------------------------------------------------------------------
+# ---- what is missing or broken -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

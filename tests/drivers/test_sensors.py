@@ -28,7 +28,6 @@ def frame(*values, key="k", sequence=None):
 
 
 # ---- the folder ----------------------------------------------------------------------------------
-# ------------------
 
 
 def test_every_channel_has_its_sensor_and_every_sensor_its_channel():
@@ -70,7 +69,6 @@ def test_a_frame_with_the_wrong_number_of_values_is_quarantined(name):
 
 
 # ---- encoders ------------------------------------------------------------------------------------
-# ------------------
 
 
 @FUZZ
@@ -128,7 +126,6 @@ def test_a_count_that_the_counter_cannot_show_is_quarantined(count):
 
 
 # ---- analogue ------------------------------------------------------------------------------------
-# ------------------
 
 
 @FUZZ
@@ -142,7 +139,6 @@ def test_analog_passes_what_is_in_range_and_nothing_else(value):
 
 
 # ---- wrench --------------------------------------------------------------------------------------
-# ------------------
 
 
 def two_part():

@@ -200,8 +200,7 @@ def test_stop_ends_the_thread_in_a_fifth_of_a_second(tmp_path, plugged):
     rig.close()
 
 
-# ---- the reader without hardware
-# -----------------------------------------------------------------------------------
+# ---- the reader without hardware -----------------------------------------------------------------
 
 
 class FlakyLink:

@@ -221,8 +221,7 @@ def parts_asked(path):
     ]
 
 
-# --- the process dies
-# -------------------------------------------------------------------------------------------------
+# ---- the process dies ----------------------------------------------------------------------------
 
 
 def test_killed_while_logging(tmp_path, seed, figure):
@@ -356,8 +355,7 @@ def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
     assert verified(part)
 
 
-# --- SIGTERM --------------------------------------------------------------------------------------
-# --------------------
+# ---- SIGTERM -------------------------------------------------------------------------------------
 
 
 def test_sigterm_under_load(tmp_path, seed, figure):

@@ -28,9 +28,7 @@ STARVED = "CPU starvation"
 DIES = "a thread dies"
 
 
-# --- wall clock
-# -----------------------------------------------------------------------------------
-# -------------------
+# ---- wall clock ----------------------------------------------------------------------------------
 
 
 class SimulatedTime:
@@ -205,9 +203,7 @@ def test_a_message_that_cannot_be_written(tmp_path, seed, figure):
     figure(row, level, "messages lost for each", dropped / spoilt, "", 1)
 
 
-# --- queue
-# ----------------------------------------------------------------------------------------
-# -------------------
+# ---- queue ---------------------------------------------------------------------------------------
 
 
 class Stalled:
@@ -298,9 +294,7 @@ def test_a_stalled_loop_drops_the_oldest_and_says_so(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- starvation
-# -----------------------------------------------------------------------------------
-# -------------------
+# ---- starvation ----------------------------------------------------------------------------------
 
 
 def unreported(path):
@@ -358,9 +352,7 @@ def test_stopped_for_a_while(tmp_path, seed, figure):
     assert verified(daemon.path())
 
 
-# --- threads
-# --------------------------------------------------------------------------------------
-# -------------------
+# ---- threads -------------------------------------------------------------------------------------
 
 DYING = """
 import time
@@ -452,8 +444,7 @@ def test_a_thread_that_hangs_starves_the_watchdog(tmp_path, seed, figure):
         assert not daemon.status()["healthy"]
 
 
-# --- garbage collection
-# ----------------------------------------------------------------------------------------------
+# ---- garbage collection --------------------------------------------------------------------------
 
 COLLECTING = """
 import gc, threading, time

@@ -60,9 +60,7 @@ def ticks_of(readings, settings=SETTINGS, seconds=None, encoded=False):
     return {name: np.array([record[i] for record in records]) for i, name in enumerate(TICK_NAMES)}
 
 
-# --- encoder rollover
-# -----------------------------------------------------------------------------------------------
-# -
+# ---- encoder rollover ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bits", [16, 32])
@@ -107,8 +105,7 @@ def with_bits(bits):
     return replace(SETTINGS, channels=channels)
 
 
-# --- jumps, stuck, impossible values
-# ---------------------------------------------------------------------------------
+# ---- jumps, stuck, impossible values -------------------------------------------------------------
 
 
 def test_encoder_counter_jump(seed, figure):
@@ -254,9 +251,7 @@ def impossible():
     yield "wrench", (0.1, math.nan, 0.1, 0.1, 0.1, 0.1)
 
 
-# --- order
-# ----------------------------------------------------------------------------------------
-# -------------------
+# ---- order ---------------------------------------------------------------------------------------
 
 
 def test_duplicate_late_and_reordered_stamps(seed, figure):

@@ -37,8 +37,7 @@ def main(argv: Sequence[str]) -> int:
 
 def _run(arguments: Namespace, held: ExitStack) -> int:
     """Lock the log folder and serve. A folder that is there is locked before the rest of the
-    program is loaded, which
-    takes half a second: whoever is refused need not wait for it.
+    program is loaded, which takes half a second: whoever is refused need not wait for it.
     """
     named = _folder_named(arguments)
     early = named if named and named.is_dir() else None

@@ -1,12 +1,11 @@
 """Steady-state tables as recordings: every condition a segment of constant speed, a short silence
 between segments.
 
-A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of a
-normal
-distribution, a tenth of a second each, in an order that differs by channel, segment and run: the
-segment has mean and deviation exactly, and its mean is as uncertain as that of INDEPENDENT
-readings. Did they change faster, all scatter would average out, and a comparison would take the
-mean for exact.
+A table gives a mean and a standard deviation. Within a segment the readings take the quantiles of
+a normal distribution, a tenth of a second each, in an order that differs by channel, segment and
+run: the segment has mean and deviation exactly, and its mean is as uncertain as that of
+INDEPENDENT readings. Did they change faster, all scatter would average out, and a comparison would
+take the mean for exact.
 """
 
 from __future__ import annotations

@@ -40,9 +40,7 @@ def message(text: str) -> str:
     return line
 
 
-# ---- what is read
-# -----------------------------------------------------------------------------------------------
-# ---
+# ---- what is read --------------------------------------------------------------------------------
 
 
 def test_quantities_become_si() -> None:
@@ -154,8 +152,7 @@ def test_run_section() -> None:
     assert config.loads(MINIMAL, "rig.yaml").run == RunInfo()
 
 
-# ---- what is refused
-# -----------------------------------------------------------------------------------------------
+# ---- what is refused -----------------------------------------------------------------------------
 
 # (old, new, line, key path, words that must stand in the message)
 REFUSED = [

@@ -31,8 +31,7 @@ def is_subsequence(part: list, whole: list) -> bool:
     return all(any(item == other for other in rest) for item in part)
 
 
-# --- cut and flipped
-# --------------------------------------------------------------------------------------------------
+# ---- cut and flipped -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("compression", ["zstd", pytest.param("none", marks=pytest.mark.slow)])
@@ -141,8 +140,7 @@ def test_a_lying_message_index_changes_nothing(tmp_path: Path) -> None:
     assert list(read(tmp_path / "a.mcap").messages()) == written
 
 
-# --- other writers --------------------------------------------------------------------------------
-# --------------------
+# ---- other writers -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -235,8 +233,7 @@ def test_a_contradicting_definition_is_not_followed(tmp_path: Path) -> None:
     assert list(recording.messages()) == list(read(tmp_path / "b.mcap").messages())
 
 
-# --- hostile --------------------------------------------------------------------------------------
-# --------------------
+# ---- hostile -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", sorted(HOSTILE))

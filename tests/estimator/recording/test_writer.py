@@ -166,9 +166,7 @@ def test_a_writer_that_is_stopped_before_it_is_started_writes_what_it_has(tmp_pa
     assert thread.stop().state == "closed" and counts(tmp_path / "run.mcap") == [1]
 
 
-# --- a disk that fails
-# -----------------------------------------------------------------------------------------------
-# -
+# ---- a disk that fails ---------------------------------------------------------------------------
 
 
 class FailingDisk:
@@ -392,9 +390,7 @@ def test_a_folder_that_cannot_be_written_is_said_at_the_start(tmp_path: Path) ->
         WriterThread(tmp_path / "run.mcap", [], "", RunInfo())
 
 
-# --- kill -9
-# --------------------------------------------------------------------------------------
-# --------------------
+# ---- kill -9 -------------------------------------------------------------------------------------
 
 LOGGING = """
 import sys, time

@@ -3,8 +3,8 @@ noise's spectrum.
 
 A wave in time has a phase of its own in every stretch of a run: pauses between runs are of any
 length, and what shakes a testbed (a pump, a fan, footsteps, a controller that hunts) keeps its
-period, not its phase. A wave of the bed or of
-the rails stays where it is: one phase for all runs, or, where the bed was made anew, one for each.
+period, not its phase. A wave of the bed or of the rails stays where it is: one phase for all runs,
+or, where the bed was made anew, one for each.
 """
 
 from __future__ import annotations

@@ -3,12 +3,12 @@ the model.
 
 A cell is a set of values at nearly the same covariates. Means of cells belong to the saturated
 model, so that a misfit of any shape over the conditions does not count as noise. Runs that held
-the same condition on equal terms (same pass,
-same start) are replicates: what their means, their drifts and the phases of their waves differ
-by, beyond the noise inside a run, is pure error between runs. A bed that is not level, say, lets
-the sinkage of each trial drift its own way, and an encoder without a zero mark begins each run
-at another tooth of the gear. A drift that replicates share (a
-soil that dries, a motor that warms) is none: it stays in full, to be explained.
+the same condition on equal terms (same pass, same start) are replicates: what their means, their
+drifts and the phases of their waves differ by, beyond the noise inside a run, is pure error
+between runs. A bed that is not level, say, lets the sinkage of each trial drift its own way, and
+an encoder without a zero mark begins each run at another tooth of the gear. A drift that
+replicates share (a soil that dries, a motor that warms) is none: it stays in full, to be
+explained.
 """
 
 from __future__ import annotations

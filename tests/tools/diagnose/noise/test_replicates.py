@@ -142,8 +142,7 @@ def test_what_was_held_does_not_fall_on_an_edge() -> None:
     assert len(np.unique(replicates.cells(stack_of(0.7)))) == 1
 
 
-# ---- whole diagnoses of campaigns that repeat a condition
-# -----------------------------------------------------------
+# ---- whole diagnoses of campaigns that repeat a condition ----------------------------------------
 
 
 def repeated(slow: float = 0.0, seed: int = 1) -> Plan:

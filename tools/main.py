@@ -1,6 +1,4 @@
-"""`gritd`: one table of commands, each a module of tools with `main(argv)`, imported when it is
-asked for.
-"""
+"""`gritd`: one of the table of commands, imported when it is asked for."""
 
 from __future__ import annotations
 
@@ -12,57 +10,12 @@ import sys
 from collections.abc import Sequence
 
 from gritd import __version__
+from gritd.estimator.config.nearest import did_you_mean
 from gritd.tools.cli import memory
 from gritd.tools.cli.command import Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.terminal import shown
-
-# command -> (module, what it does)
-COMMANDS = {
-    "init": ("gritd.tools.commands.init", "a folder to work in: configuration and CAN messages"),
-    "demo": (
-        "gritd.tools.commands.demo",
-        "the daemon against the simulated testbed on real wires, with verdict and figure",
-    ),
-    "run": (
-        "gritd.tools.commands.run",
-        "the daemon: sensors in, c and tan φ out, everything logged",
-    ),
-    "status": (
-        "gritd.tools.commands.status",
-        "one report of the running daemon, for people or scripts",
-    ),
-    "monitor": ("gritd.tools.commands.monitor", "the running daemon in a terminal"),
-    "simulate": (
-        "gritd.tools.commands.simulate",
-        "the forward model alone: a schedule in, a recording out",
-    ),
-    "compare": (
-        "gritd.tools.commands.compare",
-        "the forward simulation drawn over recordings, with the residual",
-    ),
-    "replay": ("gritd.tools.commands.replay", "the on-line filter over recordings"),
-    "diagnose": (
-        "gritd.tools.commands.diagnose",
-        "where model and recordings differ, and which physics was left out",
-    ),
-    "check-config": (
-        "gritd.tools.commands.check_config",
-        "check a configuration and show what it implies",
-    ),
-    "recover": ("gritd.tools.commands.recover", "salvage an unclosed or damaged recording"),
-    "import": ("gritd.tools.commands.import_rig", "other rigs' public data to recordings"),
-    "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
-    "prove": (
-        "gritd.tools.commands.prove",
-        "blind trials of diagnose against an independent plant",
-    ),
-    "bench": (
-        "gritd.tools.commands.bench",
-        "what a tick, a replay, a force, an update and a message cost here",
-    ),
-}
-
+from gritd.tools.commands.table import COMMANDS
 
 WITHOUT_NUMPY = ("status", "monitor")
 WITHOUT_SCIPY = ("check-config", "recover")
@@ -122,11 +75,21 @@ def _parser() -> argparse.ArgumentParser:
 
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version")
     parser.add_argument(
-        "command", choices=COMMANDS, metavar="COMMAND", help="one of the commands below"
+        "command", type=_command, metavar="COMMAND", help="one of the commands below"
     )
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
 
     return parser
+
+
+def _command(text: str) -> str:
+    """An argparse type: the name of a command."""
+    if text not in COMMANDS:
+        raise argparse.ArgumentTypeError(
+            f"found no command {text[:40]!r}{did_you_mean(text, COMMANDS)}; "
+            f"expected one of {', '.join(COMMANDS)}"
+        )
+    return text
 
 
 class _Version(argparse.Action):

@@ -18,6 +18,7 @@ from gritd.estimator.config.channels import channels
 from gritd.estimator.config.devices import NAME, device
 from gritd.estimator.config.kinds import UNLIMITED, Choice, Integer, Interval, Kind, Quantity, Text
 from gritd.estimator.config.names import EXPECTED, PATTERN
+from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.config.schema import (
     ABSENT,
     NEEDED,
@@ -251,7 +252,9 @@ class Effects:
                 UncertainQuantity(Quantity(None)), lambda _, value: value, "a mapping of parameters"
             )
         if (known := self.schema(name)) is None:
-            raise item.place.error("an unknown effect", "the name of an effect")
+            raise item.place.error(
+                f"an unknown effect{did_you_mean(name, EFFECTS)}", "the name of an effect"
+            )
         if not entries(item, "a mapping of parameters"):
             raise item.place.error("no parameter", f"at least one of {', '.join(known)}")
 

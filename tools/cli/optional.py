@@ -6,7 +6,11 @@ from importlib.util import find_spec
 
 from gritd.tools.cli.command import USAGE, CommandError
 
-INSTALL = {"matplotlib": "matplotlib", "distributed": "'gritd[cluster]'"}
+INSTALL = {
+    "matplotlib": "matplotlib",
+    "distributed": "'gritd[cluster]'",
+    "pyarrow": "'gritd[parquet]'",
+}
 
 
 def missing(package: str) -> str:

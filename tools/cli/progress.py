@@ -40,9 +40,11 @@ class Progress:
         self._done += steps
         self._show(self._counted)
 
-    def at(self, step: str) -> None:
-        """This step begins. A terminal shows it at once: the next one may be long in coming."""
-        self._show(lambda elapsed: f"{step}, {elapsed:.0f} s", at_once=self._line.terminal)
+    def at(self, step: str, share: float = 0.0) -> None:
+        """This step begins, with about that share of the work done; 0 where nobody knows. A
+        terminal shows it at once: the next one may be long in coming.
+        """
+        self._show(lambda elapsed: _named(step, share, elapsed), at_once=self._line.terminal)
 
     def _show(self, words: Callable[[float], str], at_once: bool = False) -> None:
         now = time.monotonic()
@@ -57,3 +59,11 @@ class Progress:
             return f"{self._done}"
         left = elapsed * (self._total - self._done) / max(self._done, 1)
         return f"{self._done} of {self._total} ({self._done / self._total:.0%}), {left:.0f} s left"
+
+
+def _named(step: str, share: float, elapsed: float) -> str:
+    """A step, what is done and what is left by the time that the steps before it took."""
+    if share <= 0.0:
+        return f"{step}, {elapsed:.0f} s"
+    left = elapsed * (1.0 - share) / share
+    return f"{step} (about {share:.0%}), {elapsed:.0f} s, about {left:.0f} s left"

@@ -17,6 +17,7 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.optional import require
+from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
@@ -39,9 +40,14 @@ def main(argv: Sequence[str]) -> int:
         require("matplotlib", "--png")
 
     configuration = config.load(arguments.config)
-    fitted = compare(
-        arguments.files, configuration, fitted=arguments.fit, command=["gritd", "compare", *argv]
-    )
+    with Progress("compare") as progress:
+        progress.at(f"{len(arguments.files)} recordings")
+        fitted = compare(
+            arguments.files,
+            configuration,
+            fitted=arguments.fit,
+            command=["gritd", "compare", *argv],
+        )
 
     try:
         if arguments.report:

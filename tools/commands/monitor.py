@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import select
 import sys
+import termios
 import time
+import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import degrees
@@ -22,6 +25,7 @@ OPEN, CLOSE = (
 )  # a screen of its own without a cursor, and back
 HOME, CLEAR_BELOW, CLEAR_LINE = "\033[H", "\033[J", "\033[K"
 BOLD, PLAIN = "\033[1m", "\033[m"
+LEAVE = "q"
 TROUBLE = "!"  # begins a line that is shown in bold
 INDENT = " " * 14
 
@@ -40,8 +44,8 @@ SHOWN = (
 
 
 def main(argv: Sequence[str]) -> int:
-    """Show the daemon until Ctrl-C, or once; raises CommandError where none answers."""
-    parser = Parser(prog="gritd monitor", description="Watch the running daemon; Ctrl-C ends it.")
+    """Show the daemon until q or Ctrl-C, or once; raises CommandError where none answers."""
+    parser = Parser(prog="gritd monitor", description="Watch the running daemon; q ends it.")
     add_socket(parser)
     parser.add_argument(
         "--once", action="store_true", help="one picture, without control characters"
@@ -54,9 +58,11 @@ def main(argv: Sequence[str]) -> int:
             print("\n".join(told(lines, next(reports(connection)))))
             return DONE
 
-        with screen() as show:
+        with screen() as show, keys() as pressed:
             shown = 0.0
             for report in reports(connection):
+                if pressed() == LEAVE:
+                    break
                 if time.monotonic() - shown >= EVERY:
                     shown = time.monotonic()
                     show(report)
@@ -70,6 +76,28 @@ def main(argv: Sequence[str]) -> int:
 def redrawable() -> bool:
     """Whether standard output is a terminal that knows control characters."""
     return sys.stdout.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+@contextmanager
+def keys() -> Iterator[Callable[[], str]]:
+    """What gives the key that was pressed last, '' for none. Where standard input is no terminal
+    there is none.
+    """
+    if sys.stdin is None or not sys.stdin.isatty():
+        yield lambda: ""
+        return
+
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)  # keys come at once and are not shown; Ctrl-C stays what it is
+    try:
+        yield _pressed
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _pressed() -> str:
+    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
+    return os.read(sys.stdin.fileno(), 64).decode(errors="replace")[-1:] if ready else ""
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
 from gritd.estimator.daemon.lock import LockError, locked
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name, number, whole
-from gritd.tools.service.client import SOCKET
+from gritd.tools.service.client import LONGEST, SOCKET
 
 if TYPE_CHECKING:
     from gritd.estimator.config.configuration import Configuration
@@ -95,8 +95,13 @@ def _folder_named(arguments: Namespace) -> Path | None:
 
 
 def _socket_path(folder: Path, given: str | None) -> Path:
-    """The given path; under a service manager its runtime directory, otherwise beside the logs."""
-    return Path(given) if given else Path(os.environ.get("RUNTIME_DIRECTORY", folder)) / SOCKET
+    """The given path; under a service manager its runtime directory, otherwise beside the logs,
+    with the whole path if a socket can have it: `gritd status` finds it from anywhere.
+    """
+    if given:
+        return Path(given)
+    path = Path(os.environ.get("RUNTIME_DIRECTORY", folder)) / SOCKET
+    return path.absolute() if len(os.fsencode(path.absolute())) <= LONGEST else path
 
 
 def _run_info(run: RunInfo, arguments: object) -> RunInfo:

@@ -14,6 +14,8 @@ from gritd.tools.cli.command import CommandError, Parser
 
 SOCKET = "gritd.sock"
 PLACES = (Path("/run/gritd") / SOCKET, Path("runs") / SOCKET)
+LONGEST = 107  # [bytes] of the path of a Unix socket
+KERNEL_TABLE = Path("/proc/net/unix")
 PATIENCE = 10.0  # [s] with a daemon, or a computer, that is held up
 MAX_LINE = 1 << 20  # [bytes] of a report
 NO_GRITD = "what answers on this socket is no gritd"
@@ -23,15 +25,61 @@ Report = dict[str, Any]
 
 def add_socket(parser: Parser) -> None:
     """The option that says where the daemon is."""
-    places = ", then ".join(map(str, PLACES))
     parser.add_argument(
-        "--socket", metavar="PATH", help=f"the daemon's status socket (default: {places})"
+        "--socket",
+        metavar="PATH",
+        help="the daemon's status socket (default: that of the daemon or demo that runs here)",
     )
 
 
 def connected(given: str | None) -> socket.socket:
-    """A connection to the daemon. Raises CommandError."""
-    path = Path(given) if given else next((place for place in PLACES if place.exists()), PLACES[-1])
+    """A connection to the daemon: the given one, else the one that runs on this computer. Raises
+    CommandError.
+    """
+    if given:
+        return _connected(Path(given))
+
+    answering = [(path, connection) for path, connection in map(_tried, places()) if connection]
+    if not answering:
+        looked = ", ".join(map(str, PLACES))
+        raise CommandError(f"no daemon answers: found none that listens, and no socket at {looked}")
+    if len(answering) > 1:
+        for _, connection in answering:
+            connection.close()
+        found = ", ".join(str(path) for path, _ in answering)
+        raise CommandError(f"found {len(answering)} daemons; expected --socket with one of {found}")
+    return answering[0][1]
+
+
+def places() -> list[Path]:
+    """Where a daemon may listen: the usual places, and every socket of that name that some process
+    of this computer has open.
+    """
+    found = {path.resolve(): path for path in (*PLACES, *_listening()) if path.exists()}
+    return list(found.values())
+
+
+def _listening() -> list[Path]:
+    """Sockets of the daemon's name in the kernel's table. A path there is as it was bound; one
+    that was bound relative to another folder than ours leads nowhere.
+    """
+    try:
+        lines = KERNEL_TABLE.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return []
+    return [Path(path) for line in lines if (path := line.split(" ")[-1]).endswith(f"/{SOCKET}")]
+
+
+def _tried(path: Path) -> tuple[Path, socket.socket | None]:
+    """A place with a connection to the daemon there; None where none answers."""
+    try:
+        return path, _connected(path)
+    except CommandError:
+        return path, None
+
+
+def _connected(path: Path) -> socket.socket:
+    """Raises CommandError."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     connection.settimeout(PATIENCE)
     try:

@@ -103,7 +103,7 @@ def test_effective_text_checks_too(tmp_path: Path) -> None:
     ("arguments", "words"),
     [
         ((), "gritd: expected a command"),
-        (("dance",), "gritd: argument COMMAND: invalid choice"),
+        (("dance",), "gritd: argument COMMAND: found no command 'dance'; expected"),
         (("check-config", "--dance"), "gritd: unrecognized arguments: --dance"),
         (
             ("check-config", "/nowhere.yaml"),

@@ -112,3 +112,20 @@ def test_the_monitor_redraws_in_place_and_leaves_the_terminal_as_it_was(publishe
         and max(map(len, picture)) <= 40
         and picture[1] == '! a"b WAITING cannot open'
     )
+
+
+def test_q_leaves_the_monitor_and_the_terminal_as_it_was(publisher):
+    master, slave = pty.openpty()
+    before = termios.tcgetattr(slave)
+    command = [sys.executable, "-m", "gritd", "monitor", "--socket", str(publisher.path)]
+    child = subprocess.Popen(
+        command, stdin=slave, stdout=slave, cwd=ROOT, env={**os.environ, "TERM": "xterm"}
+    )
+    seen = b""
+    while monitor.HOME.encode() not in seen:
+        seen += os.read(master, 4096)
+    os.write(master, b"q")
+    assert child.wait(120) == 0
+    assert termios.tcgetattr(slave) == before
+    os.close(slave)
+    os.close(master)

@@ -1,0 +1,114 @@
+"""`gritd export FILE --csv|--parquet`: the topics of a recording as tables for other programs."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from gritd.estimator.config.nearest import did_you_mean
+from gritd.estimator.recording.parts import parts
+from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.visible import visible
+from gritd.tools.cli import files
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.optional import require
+from gritd.tools.cli.progress import Progress
+from gritd.tools.recordings import tables
+
+FORMS = {"csv": tables.write_csv, "parquet": tables.write_parquet}
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0; 3 where the recording is damaged: then the tables hold what is whole. Raises
+    CommandError.
+    """
+    arguments = _parser().parse_args(argv)
+    if arguments.form == "parquet":
+        require("pyarrow", "--parquet")
+
+    recordings = [files.recording(part) for part in parts(arguments.file)]
+    topics = _chosen(recordings, arguments.topic)
+    folder = _folder(arguments)
+
+    try:
+        for path in _written(recordings, topics, folder, arguments.form):
+            print(path)
+    except OSError as error:
+        raise CommandError(f"{error.filename}: {error.strerror}", USAGE) from None
+
+    damage = [f"{r.path}: {visible(line)}" for r in recordings for line in r.damage]
+    if damage:
+        raise CommandError("; ".join(damage), DAMAGED)
+    return DONE
+
+
+def _chosen(recordings: Sequence[Recording], wanted: Sequence[str]) -> list[str]:
+    """The topics that are asked for, or all. Raises CommandError."""
+    known = list(tables.exportable(recordings))
+    for name in wanted:
+        if name not in known:
+            raise CommandError(
+                f"--topic {name}: found no such topic{did_you_mean(name, known)}; "
+                f"expected one of {', '.join(known)}",
+                USAGE,
+            )
+    return [name for name in known if not wanted or name in wanted]
+
+
+def _folder(arguments: Namespace) -> Path:
+    """A new or empty folder for the tables. Raises CommandError."""
+    folder: Path = arguments.output or arguments.file.with_suffix("")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CommandError(f"{folder}: {(error.strerror or '').lower()}", USAGE) from None
+    if any(folder.iterdir()):
+        raise CommandError(f"{folder}: holds files already; expected a new folder", USAGE)
+    return folder
+
+
+def _written(
+    recordings: Sequence[Recording], names: Sequence[str], folder: Path, form: str
+) -> list[Path]:
+    """The files, one a topic and one that says what the columns are."""
+    topics, start = tables.exportable(recordings), tables.start_of(recordings)
+    total = sum(recording.counts[name] for recording in recordings for name in names)
+    paths = []
+
+    with Progress("exporting", total) as progress:
+        for name in names:
+            paths.append(folder / tables.file_of(name, form))
+            FORMS[form](paths[-1], topics[name], recordings, start, progress.advance)
+
+    tables.write_columns(folder / tables.COLUMNS, [topics[name] for name in names], form)
+    return [*paths, folder / tables.COLUMNS]
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="gritd export", description="Write the topics of a recording as tables, one a topic."
+    )
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="recording (.mcap); its parts are found"
+    )
+    form = parser.add_mutually_exclusive_group(required=True)
+    form.add_argument("--csv", dest="form", action="store_const", const="csv", help="CSV, UTF-8")
+    form.add_argument(
+        "--parquet",
+        dest="form",
+        action="store_const",
+        const="parquet",
+        help="Parquet; needs pyarrow",
+    )
+    parser.add_argument(
+        "--topic", action="append", default=[], metavar="T", help="only this topic; may be repeated"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="new folder for the tables; default: FILE without its ending",
+    )
+    return parser

@@ -1,0 +1,56 @@
+"""The commands of `gritd`: each a module with `main(argv)` that gives the exit code."""
+
+from __future__ import annotations
+
+# command -> (module, what it does)
+COMMANDS = {
+    "init": ("gritd.tools.commands.init", "a folder to work in: configuration and CAN messages"),
+    "demo": (
+        "gritd.tools.commands.demo",
+        "the daemon against the simulated testbed on real wires, with verdict and figure",
+    ),
+    "run": (
+        "gritd.tools.commands.run",
+        "the daemon: sensors in, c and tan φ out, everything logged",
+    ),
+    "status": (
+        "gritd.tools.commands.status",
+        "one report of the running daemon, for people or scripts",
+    ),
+    "monitor": ("gritd.tools.commands.monitor", "the running daemon in a terminal"),
+    "simulate": (
+        "gritd.tools.commands.simulate",
+        "the forward model alone: a schedule in, a recording out",
+    ),
+    "compare": (
+        "gritd.tools.commands.compare",
+        "the forward simulation drawn over recordings, with the residual",
+    ),
+    "replay": ("gritd.tools.commands.replay", "the on-line filter over recordings"),
+    "diagnose": (
+        "gritd.tools.commands.diagnose",
+        "where model and recordings differ, and which physics was left out",
+    ),
+    "info": ("gritd.tools.commands.info", "what a recording is and holds: rates, gaps, health"),
+    "export": ("gritd.tools.commands.export", "a recording as tables, CSV or Parquet"),
+    "effects": (
+        "gritd.tools.commands.effects",
+        "the physics known beyond the paper: formula, fingerprint, what looks alike",
+    ),
+    "check-config": (
+        "gritd.tools.commands.check_config",
+        "check a configuration and show what it implies",
+    ),
+    "recover": ("gritd.tools.commands.recover", "salvage an unclosed or damaged recording"),
+    "import": ("gritd.tools.commands.import_rig", "other rigs' public data to recordings"),
+    "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
+    "prove": (
+        "gritd.tools.commands.prove",
+        "blind trials of diagnose against an independent plant",
+    ),
+    "bench": (
+        "gritd.tools.commands.bench",
+        "what a tick, a replay, a force, an update and a message cost here",
+    ),
+    "completion": ("gritd.tools.commands.completion", "the shell completes commands and options"),
+}

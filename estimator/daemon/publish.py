@@ -28,8 +28,12 @@ MAX_CLIENTS = 16
 STOP = 0.5  # [s] the longest a stop waits
 MODE = 0o660
 LONGEST = 107  # [bytes] of the path of a Unix socket
+REFUSED = "refused"  # key of the only line that is no report
 
 Report = Callable[[], Mapping[str, Any]]
+
+
+FULL = b'{"%s":"%d readers are connected, which is the most"}\n' % (REFUSED.encode(), MAX_CLIENTS)
 
 
 class PublishError(Exception):
@@ -81,6 +85,7 @@ class Publisher:
                     client.setblocking(False)
                     self._clients.append(client)
                 else:
+                    client.send(FULL, socket.MSG_NOSIGNAL)
                     client.close()
 
     def _send(self, line: bytes) -> None:

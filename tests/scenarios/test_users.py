@@ -33,6 +33,8 @@ from tests.scenarios.rig import (
 )
 from tests.scenarios.users import as_root, hand_over
 
+SOCKET = "second daemon on a socket, too many readers"
+
 
 def test_second_instance(tmp_path, seed, figure):
     with service(tmp_path, driven(40.0, seed, skip=1.0)) as (wires, daemon):
@@ -51,6 +53,35 @@ def test_second_instance(tmp_path, seed, figure):
     row, level = "second instance", "two daemon processes"
     figure(row, level, "refused, from the start of its process", took, "s", 0.5, real=True)
     figure(row, level, "processor time until then", own, "s", 0.5, real=True)
+
+
+def test_a_socket_is_never_taken_from_another_daemon(tmp_path, figure):
+    """Another log folder, the same socket: the second is refused, the first goes on publishing."""
+    other = tmp_path / "other"
+    with service(tmp_path, driven(40.0, 1, skip=1.0)) as (wires, daemon):
+        second = subprocess.run(
+            [
+                *(sys.executable, "-m", "gritd", "run", "--config", str(wires.config)),
+                *("--directory", str(other), "--socket", daemon.socket),
+            ],
+            cwd=ROOT, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert second.returncode == 1
+        reason = f"gritd: {daemon.socket}: another gritd publishes its status here\n"
+        assert second.stderr == reason and not list(other.glob("*.mcap"))
+
+        with ExitStack() as readers:
+            for _ in range(MAX_CLIENTS):
+                connection = readers.enter_context(connected(daemon.socket))
+                assert next(reports(connection))["pid"] == daemon.pid
+            late = subprocess.run(
+                [sys.executable, "-m", "gritd", "status", "--socket", daemon.socket],
+                cwd=ROOT, capture_output=True, text=True, check=False,
+            )  # fmt: skip
+        assert (late.returncode, late.stdout) == (1, "")
+        words = "gritd: the daemon is busy: 16 readers are connected, which is the most\n"
+        figure(SOCKET, WIRES, "wrong answers", (late.stderr != words) + 0.0, "", 0)
+        daemon.stop()
 
 
 def test_nobody_listens_any_more(tmp_path, figure):

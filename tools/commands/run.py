@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
-from gritd.estimator.daemon.lock import LockError, locked
+from gritd.estimator.daemon.lock import LockError, alone_at, locked
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name, number, whole
 from gritd.tools.service.client import LONGEST, SOCKET
 
@@ -54,10 +54,12 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
     run = _run_info(configuration.run, arguments)
     if arguments.fast:
         return _played(configuration, folder, run, arguments.from_tap)
+    place = _socket_path(folder, arguments.socket)
+    held.enter_context(alone_at(place))
     service = Service(
         folder,
         run,
-        _socket_path(folder, arguments.socket),
+        place,
         arguments.status,
         arguments.tap,
         arguments.from_tap,

@@ -75,6 +75,7 @@ ROWS = (
     "YAML cut at every byte",
     "step, ramp or patch of the soil",
     "a filter out of its depth",
+    "second daemon on a socket, too many readers",
 )
 
 Figure = dict[str, Any]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from gritd.estimator.daemon.publish import REFUSED
 from gritd.estimator.visible import visible
 from gritd.tools.cli.command import CommandError, Parser
 
@@ -119,6 +120,8 @@ def _parsed(line: bytes) -> Report:
         report = json.loads(line)
     except (ValueError, RecursionError):
         report = None
+    if isinstance(report, dict) and isinstance(reason := report.get(REFUSED), str):
+        raise CommandError(f"the daemon is busy: {visible(reason):.100}")
     if (
         not isinstance(report, dict)
         or not {"healthy", "status", "tick", "loop", "log", "devices"} <= report.keys()

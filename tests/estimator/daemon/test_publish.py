@@ -51,7 +51,10 @@ def test_more_clients_than_there_is_room_for_are_turned_away(publisher):
     for _ in range(MAX_CLIENTS):
         connections.append(client.connected(str(publisher.path)))
         assert next(client.reports(connections[-1]))["pid"] == 1
-    with client.connected(str(publisher.path)) as late, pytest.raises(CommandError):
+    with (
+        client.connected(str(publisher.path)) as late,
+        pytest.raises(CommandError, match="the daemon is busy: 16 readers are connected"),
+    ):
         next(client.reports(late))
     assert next(client.reports(connections[0]))["pid"] == 1
     for connection in connections:

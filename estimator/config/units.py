@@ -47,6 +47,7 @@ SYMBOLS: dict[str, tuple[Fraction, dict[str, int], bool]] = {
     "rad": (Fraction(1), {"rad": 1}, True),
     "deg": (Fraction(math.pi) / 180, {"rad": 1}, False),
     "turn": (Fraction(math.pi) * 2, {"rad": 1}, False),
+    "rpm": (Fraction(math.pi) / 30, {"rad": 1, "s": -1}, False),
     "count": (Fraction(1), {"count": 1}, False),
     "B": (Fraction(1), {"B": 1}, True),  # byte
     "%": (Fraction(1, 100), {}, False),

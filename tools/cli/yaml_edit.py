@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import CommentMark
+from ruamel.yaml.tokens import CommentToken
 
 from gritd.estimator.config import units
 from gritd.estimator.config.yamltree import compose
@@ -76,12 +78,18 @@ class EditedYaml:
         _put(node, path[-1], self._yaml.load(fragment))
 
     def remove(self, *path: str) -> None:
-        """Take a key away, if it is there."""
-        if self.has(*path):
-            node = self._document
-            for key in path[:-1]:
-                node = node[key]
-            del node[path[-1]]
+        """Take a key away, if it is there; the empty lines below it stay."""
+        if not self.has(*path):
+            return
+        node = self._document
+        for key in path[:-1]:
+            node = node[key]
+
+        comment = _below(node, path[-1])
+        keys = list(node)
+        del node[path[-1]]
+        if comment and len(keys) > 1 and keys[-1] == path[-1] and not _is_followed(node):
+            _follow(node, keys[-2], comment)
 
     def text(self) -> str:
         """The whole text as it is now."""
@@ -168,6 +176,20 @@ def _is_followed(node: Any) -> bool:
     if not isinstance(node, CommentedMap) or not node:
         return False
     last = next(reversed(node))
-    comment = (node.ca.items.get(last) or [None] * 3)[2]
-    below = comment is not None and "\n" in comment.value.rstrip(" ")[:-1]
-    return below or _is_followed(node[last])
+    return bool(_below(node, last)) or _is_followed(node[last])
+
+
+def _below(node: Any, key: str) -> str:
+    """The lines without a key that stand below a scalar; empty where there are none."""
+    comment = (node.ca.items.get(key) or [None] * 3)[2]
+    return "" if comment is None else str(comment.value).partition("\n")[2]
+
+
+def _follow(node: Any, key: str, below: str) -> None:
+    """Put such lines below another scalar."""
+    comment = (node.ca.items.get(key) or [None] * 4)[2]
+    if comment is not None:
+        comment.value = comment.value.rstrip("\n") + "\n" + below
+    elif not isinstance(node[key], Mapping):
+        token = CommentToken("\n" + below, CommentMark(0), None)
+        node.ca.items[key] = [None, None, token, None]

@@ -1,5 +1,5 @@
-"""`gritd import RIG PATH… -o OUTDIR`: other rigs' public data to recordings and the configuration
-that fits them.
+"""`gritd import RIG PATH… -o OUTDIR`: time series and other rigs' public data to recordings and the
+configuration that fits them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd import",
-        description="Other rigs' public data to recordings; see docs/importing.md.",
+        description="Time series and other rigs' data to recordings; see docs/importing.md.",
     )
 
     commands = parser.add_subparsers(dest="rig", metavar="RIG", required=True)
@@ -46,7 +46,7 @@ def _parser() -> argparse.ArgumentParser:
             "-o",
             "--output",
             type=Path,
-            required=True,
+            required=name != "csv",  # which may only guess
             metavar="OUTDIR",
             help="folder to write into",
         )

@@ -42,7 +42,7 @@ COMMANDS = {
         "check a configuration and show what it implies",
     ),
     "recover": ("gritd.tools.commands.recover", "salvage an unclosed or damaged recording"),
-    "import": ("gritd.tools.commands.import_rig", "other rigs' public data to recordings"),
+    "import": ("gritd.tools.commands.import_rig", "time series and other rigs' data to recordings"),
     "reproduce": ("gritd.tools.commands.reproduce", "the paper's numbers beside ours"),
     "prove": (
         "gritd.tools.commands.prove",

@@ -88,6 +88,20 @@ def test_a_key_can_go() -> None:
     assert document.has("effects") and not document.has("effects", "stress_linearisation")
 
 
+def test_the_empty_line_below_a_key_stays_when_it_goes() -> None:
+    document = EditedYaml(TESTBED, "x")
+    for key in ("date", "serial"):
+        document.remove("channels", "sinkage_pot", key)
+    assert changed(TESTBED, document.text()) == [
+        "-     date: 2026-11-02",
+        "-     serial: LP-100-31",
+    ]
+
+    document = EditedYaml("a:\n  b: 1 # one\n  c: 2\n\n# of d\nd: 3\n", "x")
+    document.remove("a", "c")
+    assert document.text() == "a:\n  b: 1 # one\n\n# of d\nd: 3\n"
+
+
 def test_what_is_no_configuration_is_told_with_its_line() -> None:
     with pytest.raises(ConfigError, match=r"^bad\.yaml:2: "):
         EditedYaml("a: 1\n b: 2\n", "bad.yaml")

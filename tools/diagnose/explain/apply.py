@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf
+from math import atan, cos, inf
 
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings
@@ -74,9 +74,18 @@ def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:
         found, before = soil.after[name], document.written("soil", key)
         low, high = getattr(settings.filter, f"{key}_bounds", (0.0, inf))
         value = min(max(found.value, low), high)
-        document.set(("soil", key), quantity(value, found.sigma, SOIL_UNITS[name], before))
+        if name == "tan_phi" and document.has("soil", "phi"):
+            _set_phi(document, value, found.sigma)
+        else:
+            document.set(("soil", key), quantity(value, found.sigma, SOIL_UNITS[name], before))
 
     _set_moduli(document, settings, soil.after["n"].value, soil.after["K"])
+
+
+def _set_phi(document: EditedYaml, tangent: float, sigma: float) -> None:
+    """The friction angle where the file states it as an angle: dφ = cos² φ d tan φ."""
+    phi, before = atan(tangent), document.written("soil", "phi")
+    document.set(("soil", "phi"), quantity(phi, sigma * cos(phi) ** 2, "rad", before))
 
 
 def _set_moduli(

@@ -62,6 +62,17 @@ def test_the_modulus_is_right_in_reeces_form_too(rig: Path) -> None:
     assert settings.soil.pressure_sinkage.modulus(settings.wheel.width) == pytest.approx(1.55e6)
 
 
+def test_a_friction_angle_stays_an_angle(rig: Path) -> None:
+    text = rig.read_text().replace(
+        "tan_phi: {value: 0.577, sigma: 0.06}", "phi: {value: 30 deg, sigma: 3 deg}"
+    )
+    after = rewritten(text, config.loads(text, "x", rig.parent), found())
+    friction = config.loads(after, "new.yaml", rig.parent).settings.soil.tan_phi
+    assert friction.value == pytest.approx(0.571, abs=1e-4)
+    assert friction.sigma == pytest.approx(0.008, rel=0.01)
+    assert "phi: {value: 29.7" in after and "tan_phi:" not in after
+
+
 def test_a_soil_that_is_not_believed_stays_out(rig: Path) -> None:
     """Where something without a name remains, the soil has taken a part of it."""
     before = config.load(rig)

@@ -1,0 +1,216 @@
+"""Tables as laboratories write them, and what a user is told of those that cannot be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.estimator.config import configuration as config
+from gritd.estimator.recording.salvage import read
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.commands.import_rig import main
+from gritd.tools.importers.series import csv_text
+from gritd.tools.importers.series.guess import guessed
+from gritd.tools.importers.series.mapping import loads
+from gritd.tools.importers.series.noise import scatter
+
+MAP = """
+columns:
+  t: {channel: time, unit: s}
+  rpm: {channel: wheel_speed, unit: rpm}
+  v: {channel: carriage_speed, unit: mm/s}
+  M: {channel: torque, unit: N*m}
+wheel: {radius: 72 mm, width: 71 mm}
+load: 50 N
+"""
+
+
+def table(folder: Path, name: str = "run.csv", seconds: float = 5.0) -> Path:
+    """A wheel at 10 rpm and a carriage at 60 mm/s, at 50 Hz, and a torque that scatters."""
+    rng, t = np.random.default_rng(1), np.arange(0.0, seconds, 0.02)
+    rows = [f"{x:.2f},10.0,60.0,{3.0 + 0.1 * rng.standard_normal():.4f}" for x in t]
+    (folder / name).write_text("\n".join(["t,rpm,v,M", *rows]) + "\n")
+    return folder / name
+
+
+def imported(folder: Path, *files: Path, text: str = MAP) -> Path:
+    (folder / "map.yaml").write_text(text)
+    output = folder / "out"
+    named = [*map(str, files), "--map", str(folder / "map.yaml"), "-o", str(output)]
+    assert main(["csv", *named]) == 0
+    return output
+
+
+def complaint(code: int, *arguments: object) -> str:
+    with pytest.raises(CommandError) as error:
+        main(["csv", *map(str, arguments)])
+    assert error.value.code == code and "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_speeds_become_counts_that_give_them_back(tmp_path: Path) -> None:
+    output = imported(tmp_path, table(tmp_path))
+    settings = config.load(output / "csv.yaml").settings
+    recording = read(output / "run.mcap")
+    for name, rate in (("wheel_encoder", 10 * np.pi / 30), ("carriage_encoder", 0.06)):
+        rows, scale = recording.arrays(f"/raw/{name}"), settings.channels[name].calibration.scale
+        time = (rows["stamp"] - rows["stamp"][0]) * 1e-9
+        assert np.polyfit(time, rows["count"] * scale.value, 1)[0] == pytest.approx(rate, rel=1e-6)
+    assert settings.drive.torque_source == "wrench"
+    assert recording.arrays("/raw/wrench")["fz"] == pytest.approx(50.0)
+    assert settings.wrench is not None and settings.wrench.torque_noise == pytest.approx(0.1, 0.2)
+    assert not recording.counts["/raw/motor_shunt"]
+
+
+def test_a_run_column_parts_one_file(tmp_path: Path) -> None:
+    table(tmp_path)
+    lines = (tmp_path / "run.csv").read_text().splitlines()
+    rows = [
+        f"{line},{'A' if n < 100 else 'B'},{40 + (n >= 100) * 30}"
+        for n, line in enumerate(lines[1:])
+    ]
+    (tmp_path / "all.csv").write_text("\n".join([f"{lines[0]},trial,W0", *rows]))
+    text = MAP.replace(
+        "wheel:", "  trial: {channel: run}\n  W0: {channel: nominal_load, unit: N}\nwheel:"
+    )
+    output = imported(tmp_path, tmp_path / "all.csv", text=text)
+    loads_of = {p.stem: read(p).run.nominal_load for p in output.glob("*.mcap")}
+    assert loads_of == {"A": 40.0, "B": 70.0}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t;rpm;v\n0,0;10,5;60\n0,1;10,5;60\n0,2;10,5;61\n",
+        "# a rig\n# of 2026\nt,rpm,v\n0.0,10.5,60\n0.1,10.5,60\n0.2,10.5,61\n",
+        "\ufefft\trpm\tv\n[s]\t(1/min)\t[mm/s]\n0.0\t10.5\t60\n0.1\t10.5\t60\n0.2\t10.5\t61\n",
+        "t,rpm,v,\r\n0.0,10.5,60,\r\n0.1,10.5,60,\r\n0.2,10.5,61,\r\n",
+        '"t","rpm","v"\n0.0,10.5,60\n\n0.1,10.5,60\n0.2,10.5,61\n',
+    ],
+)
+def test_the_ways_to_write_a_table(tmp_path: Path, text: str) -> None:
+    (tmp_path / "x.csv").write_text(text, encoding="utf-8", newline="")
+    found = csv_text.read(tmp_path / "x.csv")
+    assert list(found.columns) == ["t", "rpm", "v"]
+    np.testing.assert_allclose(found.columns["t"].numbers, [0.0, 0.1, 0.2])
+    np.testing.assert_allclose(found.columns["rpm"].numbers, 10.5)
+    assert found.columns["t"].resolution == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds"),
+    [
+        (("2026-11-22T10:00:00.5", "2026-11-22 10:00:01.5+00:00"), 1.0),
+        (("23:59:59.5", "00:00:00.25"), 0.75),
+    ],
+)
+def test_dates_and_times_of_day(tmp_path: Path, words: tuple[str, str], seconds: float) -> None:
+    from gritd.tools.importers.series.runs import _seconds
+
+    (tmp_path / "x.csv").write_text("t,v\n" + "".join(f"{word},1\n" for word in words))
+    mapped = loads("columns: {t: {channel: time, unit: clock}}", "m")
+    found = _seconds(csv_text.read(tmp_path / "x.csv"), mapped)
+    assert np.diff(found) == pytest.approx(seconds)
+
+
+def test_slow_data_slow_the_filter_and_its_patience(tmp_path: Path) -> None:
+    rows = [f"{x / 10:.1f},10,60,{3 + x % 3 / 10}" for x in range(100)]
+    (tmp_path / "slow.csv").write_text("\n".join(["t,rpm,v,M", *rows]))
+    settings = config.load(imported(tmp_path, tmp_path / "slow.csv") / "csv.yaml").settings
+    assert settings.rates.update == 2.0
+    assert settings.channels["wheel_encoder"].stale_after == pytest.approx(0.5)
+
+
+def test_what_cannot_be_imported_is_one_line(tmp_path: Path) -> None:
+    run = table(tmp_path)
+    (tmp_path / "map.yaml").write_text(MAP)
+    options = ("--map", tmp_path / "map.yaml", "-o", tmp_path / "out")
+
+    def changed(old: str, new: str) -> str:
+        (tmp_path / "bad.csv").write_text(run.read_text().replace(old, new, 1))
+        return complaint(DAMAGED, tmp_path / "bad.csv", *options)
+
+    assert "row 5: M: found 'broken" in changed("\n0.06,10.0,60.0,", "\n0.06,10.0,60.0,broken")
+    assert "expected times that rise" in changed("\n0.10,", "\n0.06,")
+    assert "found no column 'rpm'; expected one of t, w, v, M" in changed("rpm", "w")
+    assert "found nothing there" in complaint(USAGE, tmp_path / "none.csv", *options)
+    assert "expected --map" in complaint(USAGE, run, "-o", tmp_path / "out")
+    assert "expected -o" in complaint(USAGE, run, "--map", tmp_path / "map.yaml")
+
+    (tmp_path / "map.yaml").write_text(MAP.replace("load: 50 N", "runs: {other: {load: 3 N}}"))
+    assert "'other', which is no run" in complaint(USAGE, run, *options)
+    (tmp_path / "map.yaml").write_text(MAP.replace("wheel: {radius: 72 mm, width: 71 mm}", ""))
+    assert "expected its radius and width, or --config" in complaint(USAGE, run, *options)
+    (tmp_path / "map.yaml").write_text(MAP.replace("  v:", "  # v:"))
+    assert "for the carriage_encoder" in complaint(USAGE, run, *options)
+
+
+def test_noise_that_cannot_be_estimated_is_asked_for(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    t = np.arange(0.0, 5.0, 0.02)
+    savemat(tmp_path / "run.mat", {"t": t, "rpm": 10 + t, "v": 60 + t, "M": np.full(t.size, 3.1)})
+    (tmp_path / "map.yaml").write_text(MAP)
+    line = complaint(
+        USAGE, tmp_path / "run.mat", "--map", tmp_path / "map.yaml", "-o", tmp_path / "out"
+    )
+    assert "M: never changes" in line and "noise: in the map" in line
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.3])
+def test_the_scatter_of_a_column_is_its_noise(sigma: float) -> None:
+    """Whatever the signal does slowly, and whatever steps it makes."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.005, 0.015, 4000))
+    signal = 3.0 * np.sin(t) + 5.0 * (t > 20.0)
+    values = signal + sigma * rng.standard_normal(t.size)
+    values[rng.random(t.size) < 0.1] = np.nan
+    assert scatter(t, values, 1e-6) == pytest.approx(sigma, rel=0.06)
+    assert scatter(t, np.full(t.size, 2.0), 0.1) == pytest.approx(0.1 / 12**0.5)
+
+
+# --- the proposal ---
+
+HEADERS = {
+    "Time [s]": "time",
+    "wheel_rpm": "wheel_speed",
+    "Rim speed (mm/s)": "rim_speed",
+    "theta_wheel_deg": "wheel_angle",
+    "carriage_pos_mm": "carriage_position",
+    "CartSpeed_mm/s": "carriage_speed",
+    "Drawbar Pull [N]": "drawbar_pull",
+    "Fz_N": "load",
+    "sinkage(mm)": "sinkage",
+    "motor current [mA]": "current",
+    "wheel_torque_Nm": "torque",
+    "trial": "run",
+    "humidity": None,
+}
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_the_name_of_a_column_proposes_its_channel(tmp_path: Path, header: str) -> None:
+    rows = "".join(f"{1 + 0.1 * at:.1f},7\n" for at in range(20))
+    (tmp_path / "x.csv").write_text(f"{header},other\n{rows}")
+    text = guessed([csv_text.read(tmp_path / "x.csv")])
+    line = next(line for line in text.splitlines() if header in line)
+    expected = HEADERS[header]
+    assert f"channel: {expected}" in line if expected else line.strip().startswith("#")
+
+
+def test_a_proposal_is_a_map_that_imports(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{x / 50:.2f},{10 + x % 2},{60 + x % 3},{-3 - x % 5 / 10},50" for x in range(200)]
+    header = "time_s,wheel speed [rpm],carriage_v_mm/s,torque (Nm),load_N"
+    (tmp_path / "run.csv").write_text("\n".join([header, *rows]))
+    assert main(["csv", str(tmp_path / "run.csv"), "--guess"]) == 0
+    text = capsys.readouterr().out
+    assert "torque, unit: N*m, factor: -1" in text and "nominal_load, unit: N" in text
+
+    output = imported(
+        tmp_path, tmp_path / "run.csv", text=f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n"
+    )
+    assert read(output / "run.mcap").run.nominal_load == 50.0

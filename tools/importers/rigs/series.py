@@ -1,0 +1,140 @@
+"""Any table of time series, with a map that says which column is which channel."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gritd.estimator.config import configuration as config
+from gritd.tools.cli import configuration_file
+from gritd.tools.cli.command import USAGE
+from gritd.tools.importers.files import RigFileError
+from gritd.tools.importers.recording import write
+from gritd.tools.importers.registry import Tell
+from gritd.tools.importers.segments import START
+from gritd.tools.importers.series import binary, csv_text, written
+from gritd.tools.importers.series.columns import SeriesTable
+from gritd.tools.importers.series.convert import AXES, converted
+from gritd.tools.importers.series.guess import guessed
+from gritd.tools.importers.series.mapping import SeriesMap, load
+from gritd.tools.importers.series.runs import SeriesRun, runs_of
+
+NAME = "csv"
+SUMMARY = "time series of any rig, CSV, Parquet or MATLAB, by a map of columns to channels"
+GAP = 3.0  # usual intervals without a row are a gap
+
+READERS: dict[str, Callable[[Path], SeriesTable]] = {
+    ".parquet": binary.read_parquet,
+    ".mat": binary.read_mat,
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The map, or a proposal for one; the testbed."""
+    parser.add_argument("--map", type=Path, metavar="MAP.yaml", help="which column is which")
+    parser.add_argument(
+        "--guess", action="store_true", help="print a proposal for the map, and import nothing"
+    )
+    parser.add_argument(
+        "--config", type=Path, metavar="F", help="the testbed: wheel, soil, drive; else the map's"
+    )
+
+
+def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
+    """One recording a run, one configuration. Raises RigFileError, ConfigError, RecordingError."""
+    tables = [read(path) for path in args.paths]
+    if args.guess:
+        tell(guessed(tables).rstrip("\n"))
+        return []
+    if args.map is None:
+        raise RigFileError("expected --map MAP.yaml, or --guess to propose one", USAGE)
+    if args.output is None:
+        raise RigFileError("expected -o OUTDIR", USAGE)
+
+    mapped = load(args.map)
+    runs = runs_of(tables, mapped)
+    return _import(runs, mapped, args.config, args.output, tell)
+
+
+def read(path: Path) -> SeriesTable:
+    """One file, by its name. Raises RigFileError."""
+    if not path.exists():
+        raise RigFileError(f"{path}: found nothing there; expected a file", USAGE)
+    return READERS.get(path.suffix.lower(), csv_text.read)(path)
+
+
+def _import(
+    runs: Sequence[SeriesRun],
+    mapped: SeriesMap,
+    given: Path | None,
+    output: Path,
+    tell: Tell,
+) -> list[Path]:
+    """Write the configuration, then a recording a run."""
+    interval = max(run.interval for run in runs)
+    text, configured = written.base(mapped, given)
+    text = written.slow(text, configured, interval)
+    folder = given.resolve().parent if given else None
+    settings = config.loads(text, configured.source, folder).settings
+
+    imported = converted(runs, mapped, settings, START)
+    text = written.written(text, configured.source, imported, interval)
+    configured = _configuration(text, given, output / "csv.yaml")
+
+    paths = [output / "csv.yaml"]
+    tell(_heading(runs))
+    for run, streams in zip(runs, imported.streams, strict=True):
+        tell(_row(run))
+        path = output / f"{run.info.name}.mcap"
+        paths.append(write(path, streams, configured, run.info))
+    for note in _notes(mapped, runs, settings.load.nominal.value):
+        tell(note)
+    return paths
+
+
+def _configuration(text: str, given: Path | None, path: Path) -> config.Configuration:
+    """Write the configuration beside the recordings. Raises RigFileError, ConfigError."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigFileError(
+            f"{path.parent}: cannot be made: {error.strerror}; expected a folder", USAGE
+        ) from None
+    configuration_file.save(text, given or path.with_name("rig_csv.yaml"), path)
+    return config.load(path)
+
+
+# --- what is told ---
+
+
+def _heading(runs: Sequence[SeriesRun]) -> str:
+    behind = runs[0].resampled
+    how = "every row is a reading" if behind == 1.0 else f"means over {behind:.1f} rows"
+    return f"{how}\n{'run':<20} {'rows':>8} {'seconds':>8} {'Hz':>6} {'gaps':>5} {'load [N]':>8}"
+
+
+def _row(run: SeriesRun) -> str:
+    """A run in one line."""
+    steps = np.diff(run.seconds)
+    gaps = int(np.sum(steps > GAP * run.interval))
+    load = "" if run.info.nominal_load is None else f"{run.info.nominal_load:.1f}"
+    return (
+        f"{run.info.name:<20} {run.seconds.size:>8} {run.seconds[-1] - run.seconds[0]:>8.1f} "
+        f"{1.0 / run.interval:>6.1f} {gaps:>5} {load:>8}"
+    )
+
+
+def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[str]:
+    """What the user should know of what was not given."""
+    notes = []
+    unstated = [run.info.name for run in runs if run.info.nominal_load is None]
+    if unstated and mapped.named("load") is None:
+        notes.append(
+            f"note: {unstated[0]} states no load; taken is {usual:g} N, load.nominal of csv.yaml"
+        )
+    if not any(mapped.named(axis) for axis in AXES):
+        notes.append("note: no force is measured; only the torque can tell of the soil")
+    return notes

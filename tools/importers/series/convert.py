@@ -1,0 +1,220 @@
+"""Rows to readings: every column becomes the raw values of a channel, and the calibration that
+turns them into physics again.
+
+A number of the file stands as one volt, one newton or one newton metre, so that the raw topic holds
+what the file held. Angles, positions and speeds become counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.config.settings import Settings, Uncertain
+from gritd.estimator.messages.readings import WRENCH_FIELDS
+from gritd.tools.cli.command import USAGE
+from gritd.tools.importers.files import RigFileError
+from gritd.tools.importers.recording import UNKNOWN, Stream, stamps
+from gritd.tools.importers.series import encoders
+from gritd.tools.importers.series.calibrated import Calibrated
+from gritd.tools.importers.series.mapping import AS_CONFIGURED, Mapped, SeriesMap
+from gritd.tools.importers.series.noise import scatter
+from gritd.tools.importers.series.runs import EPOCH, SeriesRun
+
+ANALOGUE = {
+    "sinkage_pot": ("sinkage", "sinkage_volts"),
+    "motor_shunt": ("current", "motor_torque", "shunt_volts"),
+    "motor_temperature": ("motor_temperature",),
+}
+AXES = {"drawbar_pull": "fx", "lateral_force": "fy", "load": "fz", "torque": "ty"}
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Every run as streams, with one calibration for all.
+
+    configured: noise [raw] of the channels that keep the calibration of the configuration.
+    axes: those of the wrench; none where no force was measured.
+    """
+
+    streams: tuple[tuple[Stream, ...], ...]
+    channels: dict[str, Calibrated]
+    configured: dict[str, float]
+    axes: dict[str, Calibrated]
+
+
+def converted(
+    runs: Sequence[SeriesRun], mapped: SeriesMap, settings: Settings, start: int
+) -> Imported:
+    """All runs as readings. `settings` gives radii, weights and torque constant; `start` [ns] is
+    when the first begins where the files do not say. Raises RigFileError.
+    """
+    used = _used(mapped)
+    noise = {name: _noise(runs, mapped, name) for name in used.values()}
+    quanta = {
+        channel: encoders.quantum(runs, name, mapped.columns[name])
+        for channel, name in used.items()
+        if channel in encoders.CHANNELS
+    }
+    every = {
+        channel: _calibrated(mapped.columns[name], quanta.get(channel), noise[name], runs, settings)
+        for channel, name in used.items()
+    }
+    channels = {
+        channel: made
+        for channel, made in every.items()
+        if mapped.columns[used[channel]].channel not in AS_CONFIGURED
+    }
+    configured = {channel: made.noise for channel, made in every.items() if channel not in channels}
+
+    streams = tuple(
+        tuple(_streams(run, first, mapped, used, quanta, settings))
+        for run, first in zip(runs, _starts(runs, start), strict=True)
+    )
+    return Imported(streams, channels, configured, _axes(runs, mapped, settings))
+
+
+def _used(mapped: SeriesMap) -> dict[str, str]:
+    """Channel of the recording -> column. Raises RigFileError without both encoders."""
+    used = {}
+    for channel, choices in (encoders.CHANNELS | ANALOGUE).items():
+        names = [name for name in map(mapped.named, choices) if name is not None]
+        if len(names) > 1:
+            raise RigFileError(
+                f"columns: found {names[0]!r} and {names[1]!r} for {channel}; expected one", USAGE
+            )
+        if names:
+            used[channel] = names[0]
+        elif channel in encoders.CHANNELS:
+            raise RigFileError(
+                f"columns: found none for the {channel}; expected one with channel: "
+                f"{' or '.join(choices)}",
+                USAGE,
+            )
+    return used
+
+
+def _starts(runs: Sequence[SeriesRun], start: int) -> list[int]:
+    """When each run begins [ns since the epoch]; a minute after the end of the last, where the
+    files do not say.
+    """
+    starts = []
+    for run in runs:
+        told = run.seconds[0] > EPOCH
+        starts.append(round(run.seconds[0] * 1e6) * 1000 if told else start)
+        start += round((run.seconds[-1] - run.seconds[0] + 60.0) * 1e9)
+    return starts
+
+
+# --- calibration ---
+
+
+def _noise(runs: Sequence[SeriesRun], mapped: SeriesMap, name: str) -> float:
+    """Standard deviation of one number of a column, in its unit: as stated, or the median of the
+    runs' own. Raises RigFileError where it cannot be estimated.
+    """
+    column = mapped.columns[name]
+    if column.noise is not None:
+        return column.noise / column.per_unit
+
+    each = [
+        scatter(run.seconds, run.table.column(name).numbers, run.table.column(name).resolution)
+        for run in runs
+    ]
+    known = [sigma for sigma in each if sigma > 0.0]
+    if not known:
+        raise RigFileError(
+            f"{runs[0].table.path}: {name}: never changes, so that its noise cannot be estimated; "
+            "expected noise: in the map",
+            USAGE,
+        )
+    return float(np.median(known))
+
+
+def _calibrated(
+    column: Mapped,
+    quantum: float | None,
+    noise: float,
+    runs: Sequence[SeriesRun],
+    settings: Settings,
+) -> Calibrated:
+    """Of one channel: an encoder's counts, or a column's numbers as volts."""
+    if quantum is not None:
+        interval = float(np.median([run.interval for run in runs]))
+        return encoders.calibrated(column, quantum, noise, interval, settings)
+
+    torque = column.channel == "motor_torque"
+    constant = settings.drive.torque_constant.value if torque else 1.0
+    scale, factor, offset = column.per_unit / constant, column.factor, column.offset
+    return Calibrated(
+        Uncertain(scale * factor.value, scale * factor.sigma),
+        Uncertain(offset.value / constant, offset.sigma / constant),
+        noise,
+    )
+
+
+def _axes(
+    runs: Sequence[SeriesRun], mapped: SeriesMap, settings: Settings
+) -> dict[str, Calibrated]:
+    """The wrench's axes, where any is measured. A load that is not is the weights of the run; any
+    other that is not carries no information.
+    """
+    named = {axis: name for axis in AXES if (name := mapped.named(axis)) is not None}
+    if not named:
+        return {}
+
+    weights = Uncertain(0.0, settings.load.nominal.sigma)
+    absent = {axis: weights if axis == "load" else Uncertain(0.0, UNKNOWN) for axis in AXES}
+    found = {axis: Calibrated(Uncertain(1.0), offset, 0.0) for axis, offset in absent.items()}
+    for axis, name in named.items():
+        column = mapped.columns[name]
+        noise = _noise(runs, mapped, name) * column.per_unit
+        found[axis] = Calibrated(column.factor, column.offset, noise)
+    return found
+
+
+# --- streams ---
+
+
+def _streams(
+    run: SeriesRun,
+    start: int,
+    mapped: SeriesMap,
+    used: dict[str, str],
+    quanta: dict[str, float],
+    settings: Settings,
+) -> list[Stream]:
+    """The readings of one run; where a cell is empty there is none."""
+    at = stamps(start, run.seconds - run.seconds[0])
+    found = []
+    for channel, name in used.items():
+        column, numbers = mapped.columns[name], run.table.column(name).numbers
+        known = np.isfinite(numbers)
+        if channel in quanta:
+            seconds = run.seconds[known]
+            whole = encoders.counted(seconds, numbers[known], column, quanta[channel])
+            found.append(Stream(channel, at[known], whole))
+        else:
+            found.append(Stream(channel, at[known], numbers[known]))
+
+    if any(mapped.named(axis) for axis in AXES):
+        weights = run.info.nominal_load or settings.load.nominal.value
+        found.append(_wrench(run, at, mapped, weights))
+    return [stream for stream in found if stream.stamps.size]
+
+
+def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float) -> Stream:
+    """Rows in which every measured axis has a number; N and N·m as the file's units say."""
+    six = np.zeros((at.size, len(WRENCH_FIELDS)))
+    six[:, WRENCH_FIELDS.index("fz")] = weights
+
+    for axis, field in AXES.items():
+        if (name := mapped.named(axis)) is not None:
+            numbers = run.table.column(name).numbers * mapped.columns[name].per_unit
+            six[:, WRENCH_FIELDS.index(field)] = numbers
+
+    known = np.all(np.isfinite(six), axis=1)
+    return Stream("wrench", at[known], six[known])

@@ -1,0 +1,157 @@
+"""CSV as laboratories write it: any of three separators, decimal commas, a preamble, a row of
+units, empty cells.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gritd.estimator.limits import limits, raised
+from gritd.tools.importers.files import LARGEST, RigFileError, lines
+from gritd.tools.importers.series.columns import Column, SeriesTable
+
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+SEPARATORS = (",", ";", "\t")
+PREAMBLE = 50  # lines among which the header is looked for
+
+Rows = list[list[str]]
+
+
+def read(path: Path) -> SeriesTable:
+    """The columns of a CSV file, plain or gzipped. Raises RigFileError."""
+    text = list(lines(path))
+    separator, start = _layout(path, text)
+    decimal = "," if separator == ";" and _has_decimal_commas(text[start + 1 :]) else "."
+
+    rows = _split(path, text[start:], separator)
+    header = _names(path, next(rows))
+    body = list(rows)
+
+    units = _units(header, body, decimal)
+    body = body[1:] if units else body
+    first = start + 2 + bool(units)
+    _check(path, header, body, first)
+
+    columns = {
+        name: _column(path, name, [row[at].strip() for row in body], decimal, first)
+        for at, name in enumerate(header)
+    }
+    return SeriesTable(path, columns, first, units)
+
+
+def _layout(path: Path, text: Sequence[str]) -> tuple[str, int]:
+    """Separator and the line of the header: the first line with as many fields as the lines below
+    it, two or more. Raises RigFileError.
+    """
+    for at in range(min(len(text) - 1, PREAMBLE)):
+        for separator in SEPARATORS:
+            fields = text[at].count(separator)
+            if fields and fields == text[at + 1].count(separator) and _is_header(text[at]):
+                return separator, at
+    raise RigFileError(
+        f"{path}: found no header; expected names of columns, separated by ',', ';' or tabs"
+    )
+
+
+def _is_header(line: str) -> bool:
+    """A line whose first field is no number."""
+    first = re.split(r"[,;\t]", line)[0].strip().strip('"')
+    return not line.startswith("#") and not NUMBER.fullmatch(first)
+
+
+def _has_decimal_commas(text: Sequence[str]) -> bool:
+    return any(re.search(r"\d,\d", line) for line in text[:20])
+
+
+def _split(path: Path, text: Sequence[str], separator: str) -> Iterator[list[str]]:
+    try:
+        yield from csv.reader(text, delimiter=separator)
+    except csv.Error as error:
+        raise RigFileError(f"{path}: found no CSV: {error}; expected a table") from None
+
+
+def _names(path: Path, header: Sequence[str]) -> list[str]:
+    names = [name.strip() for name in header]
+    if names and not names[-1]:
+        names = names[:-1]  # a separator at the end of every line
+
+    for name in names:
+        if not name or names.count(name) > 1:
+            what = f"the column {name!r} twice" if name else "a column without a name"
+            raise RigFileError(f"{path}: found {what}; expected each column with its own name")
+    return names
+
+
+def _units(header: Sequence[str], body: Rows, decimal: str) -> dict[str, str] | None:
+    """The row of units below the header, if there is one: words where the next row has numbers."""
+    if len(body) < 2:
+        return None
+    named, below = ([bool(_number(cell, decimal)) for cell in row] for row in body[:2])
+    if any(named) or not any(below):
+        return None
+    return {n: cell.strip(" []()") for n, cell in zip(header, body[0], strict=False)}
+
+
+def _check(path: Path, header: Sequence[str], body: Rows, first: int) -> None:
+    """Every row has all fields, and the whole is no more than a log has. Raises RigFileError."""
+    if not body:
+        raise RigFileError(f"{path}: found no rows; expected data under {', '.join(header)}")
+    if len(body) * len(header) > (most := limits().values):
+        raise RigFileError(f"{path}: found more than {most:g} values; {raised('values')}")
+
+    for number, row in enumerate(body, start=first):
+        if len(row) < len(header):
+            raise RigFileError(
+                f"{path}: row {number}: found {len(row)} fields; expected {len(header)}"
+            )
+
+
+def _column(path: Path, name: str, cells: list[str], decimal: str, first: int) -> Column:
+    """Numbers where every cell is one or empty; words where none is a number. Raises RigFileError
+    where both stand in one column.
+    """
+    matches = [_number(cell, decimal) for cell in cells]
+    odd = [
+        at
+        for at, (cell, match) in enumerate(zip(cells, matches, strict=True))
+        if match is None and cell.lower() not in MISSING
+    ]
+    if odd and not any(matches):
+        return Column(np.full(len(cells), math.nan), cells)
+    if odd:
+        raise RigFileError(
+            f"{path}: row {first + odd[0]}: {name}: found {cells[odd[0]][:40]!r}; "
+            "expected a number, or nothing where there is a gap"
+        )
+
+    values = np.array([math.nan if m is None else float(m) for m in matches])
+    if np.any(np.abs(values) > LARGEST):
+        row = first + int(np.argmax(np.abs(values) > LARGEST))
+        raise RigFileError(f"{path}: row {row}: {name}: expected a number up to {LARGEST:g}")
+    return Column(values, resolution=_last_digit([m for m in matches[:2000] if m]))
+
+
+def _number(cell: str, decimal: str) -> str | None:
+    """The text of a number with a decimal point, or None."""
+    text = cell.strip()
+    if decimal == ",":
+        text = text.replace(",", ".")
+    return text if NUMBER.fullmatch(text) else None
+
+
+def _last_digit(texts: Sequence[str]) -> float:
+    """The finest digit that any of the numbers writes; 0 where there is none."""
+    places = [_place(text) for text in texts]
+    return 10.0 ** min(places) if places else 0.0
+
+
+def _place(text: str) -> int:
+    mantissa, _, exponent = text.lower().partition("e")
+    return int(exponent or 0) - len(mantissa.partition(".")[2])

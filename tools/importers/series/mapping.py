@@ -1,0 +1,243 @@
+"""The map of `gritd import csv`: which column is which channel, in which unit; strict YAML with one
+line for a mistake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gritd.estimator.config import units
+from gritd.estimator.config.kinds import Choice, Integer, Quantity, Text
+from gritd.estimator.config.schema import (
+    ABSENT,
+    NEEDED,
+    Impossible,
+    Key,
+    Section,
+    Variant,
+    entries,
+    uncertain,
+)
+from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.config.yamltree import Mapping as Tree
+from gritd.estimator.config.yamltree import Node, compose, read_text
+from gritd.estimator.messages.run_info import RunInfo
+
+# channel of the map -> SI unit and meaning
+MEASURED = {
+    "wheel_angle": ("rad", "angle of the wheel"),
+    "wheel_speed": ("rad/s", "speed of the wheel"),
+    "rim_speed": ("m/s", "speed of the rim, rω"),
+    "wheel_count": ("count", "counts of the wheel encoder, as the configuration scales them"),
+    "carriage_position": ("m", "travel of the carriage"),
+    "carriage_speed": ("m/s", "speed of the carriage"),
+    "carriage_count": ("count", "counts of the carriage encoder, as the configuration scales them"),
+    "sinkage": ("m", "sinkage z, positive downward"),
+    "sinkage_volts": ("V", "volts of the potentiometer, as the configuration scales them"),
+    "current": ("A", "motor current"),
+    "shunt_volts": ("V", "volts of the motor shunt, as the configuration scales them"),
+    "motor_torque": ("N*m", "torque at the axle as the motor's current tells it"),
+    "torque": ("N*m", "torque at the axle, of a torque sensor"),
+    "drawbar_pull": ("N", "drawbar pull, positive where the wheel pulls"),
+    "load": ("N", "vertical load W as measured"),
+    "lateral_force": ("N", "lateral force"),
+    "motor_temperature": ("degC", "temperature of the winding"),
+}
+AS_CONFIGURED = ("wheel_count", "carriage_count", "sinkage_volts", "shunt_volts")
+OF_THE_RUN = {
+    "nominal_load": ("N", "weights of the run"),
+    "start": ("m", "starting position on the bed"),
+    "pass": ("", "number of the pass over the bed"),
+}
+CLOCK = "clock"  # the unit of a time that is written as a date or as a time of day
+SPELLINGS = {"Nm": "N*m", "N.m": "N*m", "N-m": "N*m", "°": "deg", "°C": "degC", "sec": "s"}
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """One column: physical = column · unit · factor + offset.
+
+    noise: standard deviation of one reading, SI; None where it is to be estimated.
+    """
+
+    channel: str
+    unit: str = ""
+    factor: Uncertain = field(default_factory=lambda: Uncertain(1.0))
+    offset: Uncertain = field(default_factory=lambda: Uncertain(0.0))
+    noise: float | None = None
+
+    @property
+    def per_unit(self) -> float:
+        """SI value of one of the column's unit."""
+        return float(units.unit(self.unit).factor)
+
+
+@dataclass(frozen=True)
+class SeriesMap:
+    """What a map says; the columns by name."""
+
+    columns: Mapping[str, Mapped]
+    runs: Mapping[str, RunInfo]
+    rate: float | None  # [Hz] of the rows, where there is no column of time
+    resample: float | None  # [Hz] of the readings, where not every row is to be one
+    radius: float | None  # [m]
+    width: float | None  # [m]
+    torque_constant: Uncertain | None  # [N·m/A]
+    load: float | None  # [N] of every run that states no other
+
+    def named(self, channel: str) -> str | None:
+        """The column of a channel."""
+        return next((n for n, mapped in self.columns.items() if mapped.channel == channel), None)
+
+
+@dataclass(frozen=True)
+class UnitOf:
+    """The name of a unit of the same kind as `si`; CLOCK for a time too."""
+
+    si: str
+
+    @property
+    def expected(self) -> str:
+        clock = f", or {CLOCK} for dates and times of day" if self.si == "s" else ""
+        return f"a unit of the same kind as {self.si or 'a plain number'}{clock}"
+
+    def read(self, node: Node) -> tuple[str, Node]:
+        text, _ = Text("a unit").read(node)
+        if self.si == "s" and text == CLOCK:
+            return text, node
+        try:
+            unit = spelled(text)
+            if units.unit(unit).dimension == units.unit(self.si).dimension:
+                return unit, node
+            raise node.place.error(text, self.expected)
+        except units.UnitError as error:
+            raise node.place.error(str(error), self.expected) from None
+
+
+def spelled(text: str) -> str:
+    """A unit as gritd writes it: `Nm` is N*m."""
+    return SPELLINGS.get(text, text)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A mapping of columns, by any names."""
+
+    expected: str = "a mapping of columns"
+
+    def read(self, node: Node) -> tuple[dict[str, Mapped], Node]:
+        kind = Variant("channel", _channels())
+        given = entries(node, self.expected)
+        read = {name: kind.read(item)[0] for name, item in given.items()}
+
+        seen: dict[str, str] = {}
+        for name, mapped in read.items():
+            if mapped.channel in seen:
+                raise given[name].place.error(
+                    f"{mapped.channel} again, which is {seen[mapped.channel]} already",
+                    "each channel once",
+                )
+            seen[mapped.channel] = name
+        return read, Tree(node.place, dict(given))
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What is said of each run, by its file's name or by what the column of runs holds."""
+
+    expected: str = "a mapping of runs"
+
+    def read(self, node: Node) -> tuple[dict[str, RunInfo], Node]:
+        kind = Section(RUN, _run)
+        given = entries(node, self.expected)
+        return {name: kind.read(item)[0] for name, item in given.items()}, node
+
+
+RUN = {
+    "load": Key(Quantity("N", above=0), "weights", ABSENT),
+    "pass": Key(Integer(1, 1000), "number of the pass", "1"),
+    "start": Key(Quantity("m"), "starting position", "0 m"),
+    "notes": Key(Text(), "one line", "''"),
+}
+WHEEL = {
+    "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
+    "width": Key(Quantity("m", above=0, high=5), "wheel width b"),
+}
+
+
+def _run(load: float | None, start: float, notes: str, **values: Any) -> RunInfo:
+    return RunInfo("", load, values["pass"], start, notes)
+
+
+def _channels() -> dict[str, Section]:
+    """The keys of a column, by its channel."""
+    plain = {name: _plain(name, si) for name, (si, _) in OF_THE_RUN.items()}
+    measured = {
+        name: _plain(name, si) if name in AS_CONFIGURED else _measured(name, si)
+        for name, (si, _) in MEASURED.items()
+    }
+    run = Section(_choice("run"), Mapped)
+    return {"time": _plain("time", "s"), "run": run, **plain, **measured}
+
+
+def _choice(channel: str) -> dict[str, Key]:
+    return {"channel": Key(Choice((channel,)), "what the column holds")}
+
+
+def _plain(name: str, si: str) -> Section:
+    unit = Key(UnitOf(si), "unit of the column", NEEDED if si else ABSENT)
+    return Section(_choice(name) | {"unit": unit}, _mapped)
+
+
+def _measured(name: str, si: str) -> Section:
+    difference = "K" if si == "degC" else si
+    keys = {
+        "unit": Key(UnitOf(si), "unit of the column"),
+        "factor": Key(uncertain(""), "multiplies the column; -1 turns its sign", "1.0"),
+        "offset": Key(uncertain(difference), "is added", f"0 {difference}"),
+        "noise": Key(Quantity(difference, above=0), "of one reading; else estimated", ABSENT),
+    }
+    return Section(_choice(name) | keys, _mapped)
+
+
+def _mapped(unit: str | None = None, **values: Any) -> Mapped:
+    if "factor" in values and values["factor"].value == 0.0:
+        raise Impossible("factor", "a factor other than 0", "0")
+    return Mapped(unit=unit or "", **values)
+
+
+def _whole(wheel: dict[str, float] | None, **values: Any) -> SeriesMap:
+    if values["rate"] is None and not any(
+        mapped.channel == "time" for mapped in values["columns"].values()
+    ):
+        raise Impossible("rate", "a column with channel: time, or the rate of the rows in Hz")
+    known = wheel or {}
+    return SeriesMap(radius=known.get("radius"), width=known.get("width"), **values)
+
+
+TABLE = Section(
+    {
+        "columns": Key(Columns(), "the columns that are used"),
+        "rate": Key(Quantity("Hz", above=0), "of the rows, without a column of time", ABSENT),
+        "resample": Key(Quantity("Hz", above=0), "means over as many rows", ABSENT),
+        "wheel": Key(Section(WHEEL, dict), "the wheel, without --config", ABSENT),
+        "torque_constant": Key(uncertain("N*m/A", above=0), "of the drive", ABSENT),
+        "load": Key(Quantity("N", above=0), "weights of every run", ABSENT),
+        "runs": Key(Runs(), "what is known of each run", "{}"),
+    },
+    _whole,
+)
+
+
+def load(path: Path) -> SeriesMap:
+    """Read a map. Raises ConfigError."""
+    return loads(read_text(path, "a map of columns"), str(path))
+
+
+def loads(text: str, name: str) -> SeriesMap:
+    """Read the text of a map; `name` stands in messages. Raises ConfigError."""
+    made: SeriesMap = TABLE.read(compose(text, name))[0]
+    return made

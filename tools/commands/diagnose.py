@@ -293,7 +293,8 @@ def _parser() -> argparse.ArgumentParser:
         "--bed",
         choices=("same", "prepared"),
         default="prepared",
-        help="with --reference: the soil is the same, or was prepared anew; default: prepared",
+        help="with --reference: FILEs were driven in the bed of the reference as it was left, or in"
+        " one prepared anew; default: prepared",
     )
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")

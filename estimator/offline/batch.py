@@ -35,6 +35,7 @@ from gritd.estimator.recording.salvage import Recording
 
 Table = NDArray[np.void]  # structured
 
+AT_ONCE = 20_000  # windows; a row of values takes ten times its place in an array
 _KINDS = {"float64": "<f8", "bool": "?"}
 _DTYPES = {name: _KINDS.get(kind, "<i8") for name, kind, _ in TICK_FIELDS}
 
@@ -85,21 +86,24 @@ def estimates(settings: Settings, recording: Recording, engine: str = "plain") -
     replayed = recorded_streams(recording, pipeline.settings.rates.tick)
     chosen = window_ends(replayed.ticks, round(NS / pipeline.settings.rates.update))
     tracker = pipeline.tracker
-    state, rows = tracker.start(), []
-    for snapshot in snapshots(pipeline.settings, replayed, chosen):
-        state, account = tracker.step(state, snapshot)
-        rows.append(row(_window(tracker, state, account)))
-    return np.array(rows, dtype=_WINDOW_DTYPE)
+    state, tables = tracker.start(), [np.empty(0, _WINDOW_DTYPE)]
+    for begin in range(0, len(chosen), AT_ONCE):
+        rows = []
+        for snapshot in snapshots(pipeline.settings, replayed, chosen[begin : begin + AT_ONCE]):
+            state, account = tracker.step(state, snapshot)
+            rows.append(row(_window(tracker, state, account)))
+        tables.append(np.array(rows, dtype=_WINDOW_DTYPE))
+    return np.concatenate(tables)
 
 
 def window_ends(ticks: Ints, length: int) -> Ints:
     """Numbers (m,) of the ticks (k,) [ns] that end a window of `length` [ns]: the first, then each
     that comes a window later.
     """
-    stamps, ends, following = ticks.tolist(), [], 0
-    while following < len(stamps):
+    ends, following = [], 0
+    while following < len(ticks):
         ends.append(following)
-        following = bisect_left(stamps, stamps[following] + length, following)
+        following = bisect_left(ticks, ticks[following] + length, following)
     return np.array(ends, dtype=np.int64)
 
 

@@ -13,9 +13,11 @@ from typing import Any, NamedTuple
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import CHANNELS, NS, Reading
+from gritd.estimator.offline.gaps import GAP, check_ticks, tick_after
 from gritd.estimator.recording.salvage import Message, Recording
 from gritd.estimator.recording.topics import CHECKPOINT, TICK
 
+NEVER = -(1 << 62)  # [ns]
 _RAW = {f"/raw/{channel}": channel for channel in CHANNELS}
 
 
@@ -73,18 +75,26 @@ def _logged(recording: Recording) -> Iterator[RecordedTick]:
 
 def ticks_at(readings: Iterable[Reading], rate: float) -> Iterator[RecordedTick]:
     """Ticks at `rate` [Hz] over readings in the order they were received, from the first to the
-    last.
+    last, but for gaps (`gaps.built_ticks`). Raises RecordingError where there are too many.
     """
-    period, waiting = round(NS / rate), list[Reading]()
-    stamp: int | None = None
+    period, waiting, count = round(NS / rate), list[Reading](), 0
+    start = stamp = heard = NEVER
     for reading in readings:
-        stamp = reading.received if stamp is None else stamp
-        while reading.received > stamp:
+        now = reading.received
+        if start == NEVER:
+            start = stamp = heard = now
+
+        while now > stamp:
             yield RecordedTick(stamp, waiting, None)
-            waiting, stamp = [], stamp + period
+            waiting, count = [], count + 1
+            check_ticks(count)
+            over = now - heard > GAP and stamp >= heard + GAP
+            stamp = tick_after(start, period, now) if over else stamp + period
+
+        heard = max(heard, now)
         waiting.append(reading)
 
-    if stamp is not None:
+    if start != NEVER:
         yield RecordedTick(stamp, waiting, None)
 
 

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import Calibration, Settings
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.status import CHANNEL_BITS
+from gritd.estimator.offline.gaps import built_ticks
 from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
@@ -61,12 +63,19 @@ def recorded_streams(recording: Recording, rate: float) -> RecordedStreams:
 
 
 def streams_at(recording: Recording, rate: float) -> RecordedStreams:
-    """Ticks at `rate` [Hz] from the first to the last receive time, whatever was logged."""
+    """Ticks at `rate` [Hz] from the first to the last receive time, but for gaps, whatever was
+    logged.
+    """
     raw = {
         name: rows[np.argsort(rows["log_time"], kind="stable")]
         for name, rows in _raw(recording).items()
     }
-    ticks = _built(raw, round(NS / rate))
+    received = [np.empty(0, np.int64), *(rows["log_time"] for rows in raw.values())]
+    try:
+        ticks = built_ticks(np.sort(np.concatenate(received)), round(NS / rate))
+    except RecordingError as error:
+        raise RecordingError(f"{recording.path}: {error}") from None
+
     consumed = {name: np.searchsorted(ticks, rows["log_time"]) for name, rows in raw.items()}
     return _streams(ticks, raw, consumed)
 
@@ -82,14 +91,6 @@ def _streams(
 ) -> RecordedStreams:
     streams = {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
     return RecordedStreams(ticks, streams)
-
-
-def _built(raw: Mapping[str, NDArray[np.void]], period: int) -> Ints:
-    if not raw:
-        return np.empty(0, np.int64)
-    start = min(int(rows["log_time"][0]) for rows in raw.values())
-    end = max(int(rows["log_time"][-1]) for rows in raw.values())
-    return np.arange(start, end + period, period)
 
 
 def _stream(channel: str, rows: NDArray[np.void], tick: Ints, ticks: int) -> Stream:

@@ -107,11 +107,12 @@ def bomb(path, chunks, size=30 << 20, noise=32_000):
 
 
 def later(path, seconds):
-    """Ten seconds, and one more reading of every channel much later."""
-    writer = honest(path, close=False)
-    last = {reading.channel: shifted(reading) for reading in driven(14.0, 1, skip=4.0)}
-    for reading in last.values():
-        writer.reading(shifted(reading, round(seconds * 1e9)))
+    """Ten seconds, and one more reading of every channel so much later, a little before now."""
+    writer = RunWriter(path, TOPICS, TESTBED.text, RunInfo("run", 70.0))
+    readings = [shifted(r, T0 - round(seconds * 1e9)) for r in driven(14.0, 1, skip=4.0)]
+    last = {reading.channel: shifted(reading, round(seconds * 1e9)) for reading in readings}
+    for reading in (*readings, *last.values()):
+        writer.reading(reading)
     writer.close()
 
 

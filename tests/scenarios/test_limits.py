@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import os
 import re
 import struct
 import warnings
@@ -29,12 +30,14 @@ from gritd.tools.commands.check_config import summary
 from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
 from gritd.tools.main import main
 from tests.estimator.recording.test_sequence import pieces
-from tests.scenarios.hostile import bomb, honest, mcap, record, tiny_chunks, watched
+from tests.scenarios.hostile import bomb, honest, later, mcap, record, tiny_chunks, watched
 from tests.scenarios.rig import TESTBED, driven
 
 QUICK = True
 BOMB = "recording that unpacks to a thousand times its size"
 MANY = "empty attachments, tiny chunks"
+LATER = "last reading a day, fifty years later"
+SPARSE = "sparse file of 9 GB, 4 GB of memory"
 PACKED = "import of packed text"
 MOVED = "chunks swapped or duplicated"
 EMPTY = "file of 8 bytes"
@@ -79,6 +82,35 @@ def test_records_that_cost_time_and_hold_nothing(tmp_path, figure):
         figure(MANY, OWN, "processor time", done.seconds, "s", 10, real=True)
         figure(MANY, OWN, "memory", done.memory, "MB", 400)
         path.unlink()
+
+
+DAY = 86_400.0
+GAPS = {"a day": DAY, "fifty years": 50 * 365.25 * DAY}
+
+
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("command", ["replay", "replay -o", "recover", "compare", "diagnose"])
+def test_a_reading_much_later(tmp_path, command, gap, figure):
+    """The gap takes neither time nor memory."""
+    path, out = tmp_path / "a.mcap", tmp_path / "out.mcap"
+    later(path, GAPS[gap])
+    name, *output = command.split()
+    given = () if name == "recover" else CONFIG
+    done = watched(name, path, *given, *((output[0], out) if output else ()))
+    assert done.code == 0, done
+    figure(LATER, OWN, "memory", done.memory, "MB", 400)
+    figure(LATER, OWN, "processor time", done.seconds, "s", 10 if name != "diagnose" else 60, True)
+
+
+def test_a_sparse_file_is_hashed_piece_by_piece(tmp_path, figure):
+    """9 GB, almost all of it a hole, in 4 GB of address space."""
+    path = tmp_path / "a.mcap"
+    honest(path, 20.0)
+    os.truncate(path, 9_000_000_000)
+    done = watched("compare", path, *CONFIG, bound=4_000_000_000)
+    assert done.code == 0, done
+    figure(SPARSE, OWN, "memory", done.memory, "MB", 400)
+    figure(SPARSE, OWN, "processor time", done.seconds, "s", 60, real=True)
 
 
 def test_packed_text(tmp_path, figure):

@@ -30,6 +30,9 @@ from gritd.tools.commands.replay_run import rerun_of, run_settings, ticks_of, to
 from gritd.tools.commands.replay_verify import verify
 from gritd.tools.diagnose.explain.provenance import check_rig
 
+AT_ONCE = 10_000  # ticks; as Python's numbers they take several times their place in an array
+ROW = np.dtype([(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS])
+
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 if a verified replay differs; 2 for usage and configuration; 3 if a recording is
@@ -130,7 +133,7 @@ def _every_tick(
     output = files.vacant(_target(arguments, first.path)) if arguments.output else None
     writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
 
-    records = []
+    records, tables = [], [np.empty(0, ROW)]
     rerun = rerun_of(recordings, configuration, as_it_ran=False)
 
     for _, tick in ticks_of(recordings, configuration, "replaying"):
@@ -141,6 +144,9 @@ def _every_tick(
                 writer.message(CHECKPOINT, stamp, rerun.checkpoint(stamp))
         record = rerun.step(tick)
         records.append(record)
+        if len(records) == AT_ONCE:
+            tables.append(np.array(records, ROW))
+            records = []
         if writer is not None:
             for reading in tick.readings:
                 writer.reading(reading)
@@ -150,9 +156,7 @@ def _every_tick(
         writer.close()
         print(f"wrote {writer.path}")
 
-    return np.array(
-        records, dtype=[(name, "<i8" if kind == TIME else "<f8") for name, kind, _ in TICK_FIELDS]
-    )
+    return np.concatenate([*tables, np.array(records, ROW)])
 
 
 def _with_engine(checkpoint: Checkpoint, engine: str | None) -> Checkpoint:

@@ -62,6 +62,8 @@ ROWS = (
     "wall clock in 1901, 1970, 2040, 2200",
     "message that cannot be written",
     "recording that unpacks to a thousand times its size",
+    "last reading a day, fifty years later",
+    "sparse file of 9 GB, 4 GB of memory",
     "import of packed text",
     "empty attachments, tiny chunks",
     "300 and 500 MB of address space",

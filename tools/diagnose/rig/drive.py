@@ -24,6 +24,7 @@ from scipy.signal import butter, sosfiltfilt
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
+from gritd.estimator.limits import limits, raised
 from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
@@ -229,6 +230,14 @@ def _motion(series: Mapping[str, Series], constant: float, name: str) -> DriveMo
         raise CommandError(
             f"{name}: found {max(end - begin, 0.0):.2f} s of position and current;"
             f" expected {TUNING.rig.shortest_log:g} s",
+            DAMAGED,
+        )
+
+    most = limits().ticks
+    if (end - begin) / step > most:
+        raise CommandError(
+            f"{name}: found {end - begin:.0f} s of position and current; a drive is followed at"
+            f" {1.0 / step:.0f} Hz for {most:.0f} points; {raised('ticks')}",
             DAMAGED,
         )
 

@@ -17,12 +17,16 @@ import numpy as np
 
 from gritd.estimator.config.settings import Calibration, Channel, Settings
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.offline.gaps import edges_of
 from gritd.estimator.offline.windows import Slopes, block_mean, block_slope
+from gritd.estimator.recording.mcapfile import RecordingError, opened
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 
 NS = 1e-9
+PIECE = 1 << 20  # [bytes] of a file read at once
+LONGEST = 86_400.0  # [s] of a recording; what is sought over its time grows with this
 Series = tuple[Array, Array]  # times [s] in order, and values
 
 
@@ -46,6 +50,7 @@ class Signals:
         str, Array
     ]  # sinkage, current, temperature, drawbar_pull, load, axle_torque; those there are
     damage: tuple[str, ...]
+    left_out: str = ""  # what of the recording is not used, in words
 
 
 def read_all(paths: Sequence[Path]) -> list[Recording]:
@@ -78,7 +83,15 @@ def _too_little(recording: Recording, found: str, expected: str) -> CommandError
 
 
 def sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """Of a file's bytes. Raises CommandError where it cannot be read."""
+    digest = hashlib.sha256()
+    try:
+        with opened(path) as file:
+            while piece := file.read(PIECE):
+                digest.update(piece)
+    except OSError as error:
+        raise CommandError(f"{path}: cannot read: {error.strerror or error}", _code(path)) from None
+    return digest.hexdigest()
 
 
 def distinct(paths: Sequence[Path]) -> dict[str, str]:
@@ -122,14 +135,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         raise _too_little(recording, f"no readings of {missing[0]}", "both encoders")
 
     encoders = [series["wheel_encoder"], series["carriage_encoder"]]
-    start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
-    count = int((end - start) * rate)
-    if count < 5:
-        raise _too_little(
-            recording, f"{max(end - start, 0.0):.2f} s of both encoders together", "some seconds"
-        )
-
-    edges = start + np.arange(count + 1) / rate
+    edges, left_out = _grid(recording, encoders, rate)
     wheel, carriage = (block_slope(*encoder, edges) for encoder in encoders)
     analogue = {
         name: block_mean(*values, edges)
@@ -140,14 +146,34 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         recording.run.name or recording.path.stem,
         recording.path,
         recording.run,
-        start,
-        0.5 * (edges[1:] + edges[:-1]) - start,
+        float(edges[0]),
+        0.5 * (edges[1:] + edges[:-1]) - edges[0],
         *wheel[:2],
         *carriage[:2],
         doubt(wheel, carriage),
         {name: values for name, values in analogue.items() if np.isfinite(values).any()},
         tuple(recording.damage),
+        left_out,
     )
+
+
+def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tuple[Array, str]:
+    """Edges [s] of the grid where both encoders speak, and what of the recording it leaves out."""
+    beats = np.sort(np.concatenate([time for time, _ in encoders]))
+    start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
+    within = beats[beats <= min(end, start + LONGEST)]
+    left_out = ""
+    if end > start + LONGEST:
+        end = within[-1]
+        left_out = f"Nothing is used of {recording.path} from {LONGEST:.0f} s after its beginning."
+
+    if (end - start) * rate < 5:
+        found = f"{max(end - start, 0.0):.2f} s of both encoders together"
+        raise _too_little(recording, found, "some seconds")
+    try:
+        return edges_of(within, start, end, rate), left_out
+    except RecordingError as error:
+        raise CommandError(f"{recording.path}: {error}", DAMAGED) from None
 
 
 _NONE = (np.zeros(0), np.zeros(0))

@@ -69,7 +69,7 @@ class WheelRig:
         """
         self.settings = settings
         self.new = [number >= reference for number in range(len(signals))]
-        self.caveats: list[str] = []
+        self.caveats = [s.left_out for s in signals if s.left_out]
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]
         self.channels = _channels(signals, settings, [w.known for w in self._weights])
         began = {

@@ -25,7 +25,8 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import paper_contact
 from gritd.estimator.stages.situation import Situation
 from gritd.estimator.terramechanics import linear, original
-from gritd.estimator.terramechanics.linear import Integrals, Shift
+from gritd.estimator.terramechanics.integrals import Integrals, integrals
+from gritd.estimator.terramechanics.linear import Shift
 from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
 
 THETA_1 = (0.05, 1.45)  # [rad] range of the table; outside it the edge is used
@@ -156,7 +157,7 @@ def _shift(
     paper = np.array(true_integrals(wheel, soil, (), theta_1, slip))
     exponent = linear.shear_exponent(wheel, soil.shear_modulus, theta_1, slip, linear.ARRAYS)
     ratio = np.clip(wheel.c1 + wheel.c2 * slip, 0.0, 1.0)
-    closed = np.array(linear.integrals(theta_1, ratio, exponent.f, linear.ARRAYS))
+    closed = np.array(integrals(theta_1, ratio, exponent.f, linear.ARRAYS))
     shift: Array = share * (paper - closed)
     if effects:
         shift = shift + np.array(true_integrals(wheel, soil, effects, theta_1, slip)) - paper

@@ -29,27 +29,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gritd.estimator.terramechanics.moments import Arrays, Kernels, Maths, Numbers, Value, kernels
+from gritd.estimator.terramechanics.integrals import (
+    NUMBERS,
+    Integrals,
+    both_kernels,
+    f_derivative,
+    integrals,
+    integrals_of,
+    ratio_derivative,
+    theta_1_derivative,
+)
+from gritd.estimator.terramechanics.moments import Arrays, Maths, Value
 from gritd.estimator.terramechanics.original import LOCKED
 from gritd.estimator.terramechanics.soil import Array, Scalar, Wheel
 
-NUMBERS: Maths = Numbers()
 ARRAYS: Maths = Arrays()
 
 GRADIENT = ("c", "tan_phi", "ln_k", "theta_1", "slip", "load")  # order of every gradient below
-
-
-class Integrals(NamedTuple):
-    """A₁ … C₃ (see above), each divided by θ₁."""
-
-    a1: Value
-    a2: Value
-    b1: Value
-    b2: Value
-    b3: Value
-    c1: Value
-    c2: Value
-    c3: Value
 
 
 class Exponent(NamedTuple):
@@ -113,16 +109,16 @@ def predict(
     """
     ratio, ratio_slip = _peak_ratio(wheel, slip, maths)
     exponent = shear_exponent(wheel, k, theta_1, slip, maths)
-    both = _kernels(theta_1, ratio, exponent.f, maths)
-    bare = _integrals(theta_1, exponent.f, both, maths)
+    both = both_kernels(theta_1, ratio, exponent.f, maths)
+    bare = integrals_of(theta_1, exponent.f, both, maths)
     x = _added(bare, shift.value) if shift else bare
     s = _scaled_peak(wheel, x, c, tan_phi, theta_1, load)
 
     at = _At(wheel, x, tan_phi, s)
-    by_theta_1 = at.along(c, *_theta_1_derivative(theta_1, exponent.f, bare, both, maths))
-    by_f = at.along(c, *_f_derivative(theta_1, both, maths))
+    by_theta_1 = at.along(c, *theta_1_derivative(theta_1, exponent.f, bare, both, maths))
+    by_f = at.along(c, *f_derivative(theta_1, both, maths))
     by_ratio = (
-        at.along(c, *_ratio_derivative(theta_1, exponent.f, both, maths))
+        at.along(c, *ratio_derivative(theta_1, exponent.f, both, maths))
         if wheel.c2
         else (0.0, 0.0, 0.0)
     )
@@ -211,11 +207,6 @@ def shear_exponent(
     )
 
 
-def integrals(theta_1: Value, ratio: Value, f: Value, maths: Maths = NUMBERS) -> Integrals:
-    """A₁ … C₃ over θ₁, for θ₁ [rad], ratio θₘ/θ₁ in [0, 1] and f [1/rad] of either sign."""
-    return _integrals(theta_1, f, _kernels(theta_1, ratio, f, maths), maths)
-
-
 def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scalar) -> Array:
     """Triangular σ [Pa] at θ [rad], Eqs. (11) and (12); numbers, or arrays of one shape (n,)."""
     front, rear = (
@@ -265,84 +256,6 @@ def _wheel_integrals(
     f = shear_exponent(wheel, k, theta_1, slip, maths).f
     x = integrals(theta_1, _peak_ratio(wheel, slip, maths)[0], f, maths)
     return _added(x, shift.value) if shift else x
-
-
-def _kernels(theta_1: Value, ratio: Value, f: Value, maths: Maths) -> tuple[Kernels, Kernels]:
-    """The integrals without and with the factor e^(−iθ₁v)."""
-    eta = abs(f) * theta_1
-    straight = kernels(maths, theta_1, ratio, eta, turning=False)
-    return straight, kernels(maths, theta_1, ratio, eta, turning=True)
-
-
-def _integrals(theta_1: Value, f: Value, both: tuple[Kernels, Kernels], maths: Maths) -> Integrals:
-    """A₁ … C₃ over θ₁. With θ = θ₁ − θ₁v, cos θ + i sin θ = e^(iθ₁) e^(−iθ₁v)."""
-    straight, turning = both
-    rotation = _rotation(theta_1, maths)
-    sign = maths.sign(f)
-    bare = rotation * turning.bare.hat
-    one, hat = sign * rotation * turning.mobilised.one, sign * rotation * turning.mobilised.hat
-    return Integrals(
-        sign * straight.mobilised.one, sign * straight.mobilised.hat,
-        bare.real, one.imag, hat.imag,
-        one.real, hat.real, bare.imag,
-    )  # fmt: skip
-
-
-def _theta_1_derivative(
-    theta_1: Value, f: Value, x: Integrals, both: tuple[Kernels, Kernels], maths: Maths
-) -> tuple[Integrals, Integrals]:
-    """Derivatives of θ₁x and of x with respect to θ₁ at fixed θₘ/θ₁ and f."""
-    straight, turning = both
-    rotation = _rotation(theta_1, maths)
-    spin = 1j * rotation
-    signed = maths.sign(f) * spin
-    bare = spin * (turning.bare.hat - turning.bare.hat_v)
-    one = f * rotation * turning.decayed.v + signed * (turning.mobilised.one - turning.mobilised.v)
-    hat = f * rotation * turning.decayed.hat_v + signed * (
-        turning.mobilised.hat - turning.mobilised.hat_v
-    )
-    dx = Integrals(
-        f * straight.decayed.v, f * straight.decayed.hat_v,
-        bare.real, one.imag, hat.imag,
-        one.real, hat.real, bare.imag,
-    )  # fmt: skip
-
-    return Integrals(*(value + theta_1 * slope for value, slope in zip(x, dx, strict=True))), dx
-
-
-def _f_derivative(
-    theta_1: Value, both: tuple[Kernels, Kernels], maths: Maths
-) -> tuple[Integrals, Integrals]:
-    """Derivatives of θ₁x and of x with respect to f; even in f."""
-    straight, turning = both
-    rotation = theta_1 * _rotation(theta_1, maths)
-    one, hat = rotation * turning.decayed.v, rotation * turning.decayed.hat_v
-    dx = Integrals(
-        theta_1 * straight.decayed.v, theta_1 * straight.decayed.hat_v,
-        0.0, one.imag, hat.imag,
-        one.real, hat.real, 0.0,
-    )  # fmt: skip
-    return Integrals(*(theta_1 * slope for slope in dx)), dx
-
-
-def _ratio_derivative(
-    theta_1: Value, f: Value, both: tuple[Kernels, Kernels], maths: Maths
-) -> tuple[Integrals, Integrals]:
-    """Derivatives of θ₁x and of x with respect to θₘ/θ₁."""
-    straight, turning = both
-    rotation = _rotation(theta_1, maths)
-    sign = maths.sign(f)
-    bare, hat = rotation * turning.bare.shift, sign * rotation * turning.mobilised.shift
-    dx = Integrals(
-        0.0, sign * straight.mobilised.shift,
-        bare.real, 0.0, hat.imag,
-        0.0, hat.real, bare.imag,
-    )  # fmt: skip
-    return Integrals(*(theta_1 * slope for slope in dx)), dx
-
-
-def _rotation(theta_1: Value, maths: Maths) -> Value:
-    return maths.cos(theta_1) + 1j * maths.sin(theta_1)
 
 
 def _scaled_peak(

@@ -19,7 +19,7 @@ from cmath import exp as turn
 from math import exp, sin
 from typing import Any
 
-from gritd.estimator.terramechanics import linear
+from gritd.estimator.terramechanics import integrals, linear
 from gritd.estimator.terramechanics.linear import Prediction, Shift
 from gritd.estimator.terramechanics.soil import Wheel
 
@@ -139,7 +139,7 @@ def _delicate(theta_1: float, f: float, slip: float, lam: float) -> bool:
     )
 
 
-def _added(x: Integrals, change: linear.Integrals, factor: float) -> Integrals:
+def _added(x: Integrals, change: integrals.Integrals, factor: float) -> Integrals:
     """The integrals with a multiple of eight real ones added."""
     a1, a2, b1, b2, b3, c1, c2, c3 = change
     return (

@@ -10,14 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gritd.estimator.terramechanics import linear
-from gritd.estimator.terramechanics.linear import (
-    ARRAYS,
-    GRADIENT,
-    Integrals,
-    integrals,
-    predict,
-    predict_batch,
-)
+from gritd.estimator.terramechanics.integrals import Integrals, integrals
+from gritd.estimator.terramechanics.linear import ARRAYS, GRADIENT, predict, predict_batch
 from gritd.estimator.terramechanics.soil import Wheel
 from tests.jacobian import assert_jacobian
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.terramechanics import linear, scalar
+from gritd.estimator.terramechanics.integrals import Integrals
 from gritd.estimator.terramechanics.soil import Wheel
 
 conditions = st.tuples(
@@ -33,7 +34,7 @@ def changes(prediction):
 @given(condition=conditions, seed=st.integers(0, 1000))
 def test_values_and_gradients_are_those_of_the_linear_model(wheel, shifted, condition, seed):
     drawn = np.random.default_rng(seed).uniform(-0.02, 0.02, (4, 8)).tolist()
-    shift = linear.Shift(*[linear.Integrals(*row) for row in drawn]) if shifted else None
+    shift = linear.Shift(*[Integrals(*row) for row in drawn]) if shifted else None
     have, want = (
         scalar.predict(wheel, *condition, shift),
         linear.predict(wheel, *condition, shift=shift),

@@ -1,6 +1,12 @@
-"""A small configuration that is valid, changes of it, and texts that mean harm."""
+"""A small configuration that is valid, changes of it, texts that mean harm, and the
+error line of a text."""
 
 from __future__ import annotations
+
+import pytest
+
+from gritd.estimator.config import configuration as config
+from gritd.estimator.config.configuration import ConfigError
 
 MINIMAL = """\
 testbed: bench
@@ -66,3 +72,12 @@ HOSTILE = {
     "tags": ("a: !" + "x" * 200_000 + " 1", "without a tag"),
     "huge": ("# " + "x" * 3_000_000, "more than 256 KiB"),
 }
+
+
+def message(text: str) -> str:
+    """The error line of a text that must be refused."""
+    with pytest.raises(ConfigError) as caught:
+        config.loads(text, "rig.yaml")
+    line = str(caught.value)
+    assert "\n" not in line and len(line) < 400
+    return line

@@ -3,8 +3,8 @@
     python -m gritd.tools.dev.sensitivity CAMPAIGNS [--only NAME …] [--fields ROOM.FIELD …]
                                           [--jobs N] [--minutes M] [--out docs/sensitivity.md]
 
-CAMPAIGNS is a folder of campaigns, each of recordings and one configuration (tools/dev/twenty.py
-makes twenty). Each campaign is diagnosed once as it is; the numbers that it reads are counted. Then
+CAMPAIGNS is a folder of campaigns, each of recordings and one configuration (`twenty make`
+makes some). Each campaign is diagnosed once as it is; the numbers that it reads are counted. Then
 each of them is halved and doubled, one at a time. The table is written after every diagnosis.
 """
 

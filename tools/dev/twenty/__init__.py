@@ -1,0 +1,1 @@
+"""Twenty campaigns whose diagnoses must be the same before and after a change."""

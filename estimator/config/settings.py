@@ -152,6 +152,24 @@ class Logging:
 
 
 @dataclass(frozen=True)
+class Repeatability:
+    """How far the soil of one preparation of a bed lies from that of all, standard deviations."""
+
+    cohesion: float = 0.0  # [Pa]
+    tan_phi: float = 0.0
+    shear_modulus: float = 0.0  # share of k
+
+
+@dataclass(frozen=True)
+class BedSettings:
+    """The bed that runs are driven on, one after the other."""
+
+    name: str = ""  # none: every run begins with the stated prior
+    repeatability: Repeatability = Repeatability()
+    stale_after: float = 7 * 86400.0  # [s] without a run; then the next begins with the prior
+
+
+@dataclass(frozen=True)
 class Place:
     """Where on the bed a run takes place; from the run's own metadata."""
 
@@ -183,6 +201,7 @@ class Settings:
     logging: Logging
     effects: tuple[ConfiguredEffect, ...] = ()
     place: Place = Place()
+    bed: BedSettings = BedSettings()
 
 
 def settings_of_run(settings: Settings, run: RunInfo) -> Settings:

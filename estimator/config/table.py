@@ -32,12 +32,14 @@ from gritd.estimator.config.schema import (
 )
 from gritd.estimator.config.settings import (
     ENGINES,
+    BedSettings,
     ConfiguredEffect,
     Drive,
     FilterSettings,
     Load,
     Logging,
     Rates,
+    Repeatability,
     Settings,
     SoilPrior,
     Uncertain,
@@ -207,6 +209,28 @@ LOGGING = {
     ),
 }
 
+REPEATABILITY = {
+    "cohesion": Key(Quantity("Pa", low=0), "of c", "0 Pa"),
+    "tan_phi": Key(Quantity("", low=0), "of tan φ", "0.0"),
+    "shear_modulus": Key(Quantity("", low=0, high=1), "of k, relative", "0 %"),
+}
+
+BED = {
+    "name": Key(
+        Text(EXPECTED, PATTERN), "the bed in the bin; none: every run begins with `soil`", "''"
+    ),
+    "repeatability": Key(
+        Section(REPEATABILITY, Repeatability),
+        "standard deviation of one preparation about the bed's soil",
+        "{}",
+    ),
+    "stale_after": Key(
+        Quantity("s", above=0, unlimited=True),
+        "without a run for so long the next begins with `soil`",
+        "168 h",
+    ),
+}
+
 RUN = {
     "name": Key(Text(EXPECTED, PATTERN), "name of the run and its files", "''"),
     "load": Key(Quantity("N", above=0), "nominal load of the run", ABSENT),
@@ -297,6 +321,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "rates": Key(Section(RATES, _rates), "how often", "{}"),
         "filter": Key(Section(FILTER, FilterSettings), "the extended Kalman filter", "{}"),
         "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),
+        "bed": Key(Section(BED, BedSettings), "runs on one bed add up to one estimate", "{}"),
         "effects": Key(Effects(effect_schema), "physics beyond the paper's, by effect name", "{}"),
         "run": Key(
             Section(RUN, _run), "about this run; the command line may say it instead", ABSENT

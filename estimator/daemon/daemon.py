@@ -23,6 +23,7 @@ from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
 from gritd.estimator.daemon.scheduling import undisturbed
+from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.carry import needs_restart
 from gritd.estimator.online.pipeline import Pipeline
@@ -80,7 +81,9 @@ class Daemon:
         readers: Sequence[ReaderThread],
         source: Source,
         clock: Clock,
+        start: Estimate | None = None,
     ) -> None:
+        """start: what the run begins with in the place of the stated prior."""
         self.configuration = configuration
         self.run = run
         self.readers = readers
@@ -88,7 +91,8 @@ class Daemon:
 
         self.writer = _writer(path, configuration, run)
         pipeline = Pipeline(settings_of_run(configuration.settings, run))
-        self.loop = Loop(pipeline, source, LogSink(self.writer), clock, configuration.text)
+        sink = LogSink(self.writer)
+        self.loop = Loop(pipeline, source, sink, clock, configuration.text, start)
 
         self._pulses = [
             Pulse("loop", lambda: self.loop.ticks, LOOP_PATIENCE),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from threading import Event
 from typing import NamedTuple, Protocol
 
 from gritd.estimator.daemon.clock import Clock
+from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
+from gritd.estimator.online.bed import begun
 from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import encode
 from gritd.estimator.online.pipeline import Pipeline, State
@@ -53,8 +56,15 @@ class Loop:
     """Ticks until told to stop. `latest` is the last tick and loop record, for whoever watches."""
 
     def __init__(
-        self, pipeline: Pipeline, source: Source, sink: Sink, clock: Clock, configuration: str = ""
+        self,
+        pipeline: Pipeline,
+        source: Source,
+        sink: Sink,
+        clock: Clock,
+        configuration: str = "",
+        start: Estimate | None = None,
     ) -> None:
+        """start: what the run begins with in the place of the stated prior."""
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock
         self._configuration = configuration
         self._period = round(NS / pipeline.settings.rates.tick)
@@ -64,6 +74,8 @@ class Loop:
         self._lateness: deque[float] = deque(maxlen=RECENT)
         self.latest: tuple[TickRow, LoopRecord] | None = None
         self.ticks = self.missed = 0
+        self._start = start
+        self.estimate: Estimate | None = None  # at the end
 
     def ask(self, change: Change) -> None:
         """To be done between two ticks; from any thread."""
@@ -81,9 +93,8 @@ class Loop:
 
     def run(self, stop: Event) -> None:
         """Tick at every deadline; one more tick after the stop takes what the readers left."""
-        state = self._pipeline.start()
-
         deadline = self._clock.now() + self._period
+        state = self._begun(deadline - self._period)
         last = False
         while not last:
             last = stop.is_set()
@@ -94,6 +105,16 @@ class Loop:
             self._hand_over(readings, tick, deadline, woken)
             state = self._between(state, deadline)
             deadline = self._next(deadline)
+
+        self.estimate = state.track.estimate
+
+    def _begun(self, stamp: int) -> State:
+        """The state before the first tick; logged where it is not the stated prior."""
+        state = self._pipeline.start()
+        if self._start is not None:
+            state = replace(state, track=begun(state.track, self._start))
+            self._checkpoint(state, stamp, 0, new_part=False)
+        return state
 
     def _hand_over(self, readings: list[Reading], tick: TickRow, deadline: int, woken: int) -> None:
         waiting, dropped = self._sink.counts()

@@ -30,6 +30,7 @@ class RunInfo:
     notes: str = ""
     part: int = 0
     lost_before: int = 0
+    bed: str = ""  # whose earlier runs the estimate began with
 
     def entries(self) -> dict[str, str]:
         return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
@@ -59,6 +60,7 @@ class RunInfo:
             notes=entries.get("notes", ""),
             part=number("part", int, 0, 0, MOST),
             lost_before=number("lost_before", int, 0, 0, MOST_LOST),
+            bed=entries.get("bed", ""),
         )
         return run, wrong
 

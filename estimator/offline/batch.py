@@ -9,6 +9,7 @@ tracker is that of the live loop.
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Callable
 from math import nan
 from typing import Annotated, NamedTuple
 
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
+from gritd.estimator.filter.estimate import Estimate, Vector
 from gritd.estimator.filter.tracker import Account, Tracker, TrackState
 from gritd.estimator.messages.readings import NS
+from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import (
     TICK_FIELDS,
     Aid,
@@ -30,6 +33,7 @@ from gritd.estimator.messages.tick import (
 )
 from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.offline.windows import Ints
+from gritd.estimator.online.bed import begun
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
 
@@ -74,26 +78,58 @@ ESTIMATES = names_of(Window)
 _WINDOW_DTYPE = np.dtype([(name, _DTYPES[name]) for name in ESTIMATES])
 
 
+class Replayed(NamedTuple):
+    """What the filter made of a recording."""
+
+    rows: Table  # one a window (n,), fields ESTIMATES, each as in /tick
+    estimate: Estimate  # at the end
+    nuisances: Vector  # variances of the calibration's errors (q,)
+    believed: bool  # at the end: a tick would tell it, and not the stated prior
+
+
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
-    """What the filter makes of a recording: one row a window, shape (n,), fields ESTIMATES, each as
-    in /tick.
+    """What the filter makes of a recording, window by window; see `replayed`."""
+    return replayed(settings, recording, engine).rows
+
+
+def replayed(
+    settings: Settings,
+    recording: Recording,
+    engine: str = "plain",
+    start: Estimate | None = None,
+    advance: Callable[[int, int], None] = lambda done, total: None,
+) -> Replayed:
+    """What the filter makes of a recording, begun with the stated prior or with `start`.
 
     The windows are those the loop updated the filter at: by the recording's own ticks where it has
     them, else by ticks at the configured rate. Of `flags`, those that concern single ticks (late
-    readings, counter jumps) are left out. Raises RecordingError.
+    readings, counter jumps) are left out. `advance` is told after each window how many are done
+    and how many there are. Raises RecordingError.
     """
     pipeline = Pipeline(settings, engine)
-    replayed = recorded_streams(recording, pipeline.settings.rates.tick)
-    chosen = window_ends(replayed.ticks, round(NS / pipeline.settings.rates.update))
+    streams = recorded_streams(recording, pipeline.settings.rates.tick)
+    chosen = window_ends(streams.ticks, round(NS / pipeline.settings.rates.update))
+
     tracker = pipeline.tracker
-    state, tables = tracker.start(), [np.empty(0, _WINDOW_DTYPE)]
+    state, flags = tracker.start(), 0
+    state = state if start is None else begun(state, start)
+    tables = [np.empty(0, _WINDOW_DTYPE)]
+
     for begin in range(0, len(chosen), AT_ONCE):
         rows = []
-        for snapshot in snapshots(pipeline.settings, replayed, chosen[begin : begin + AT_ONCE]):
+        for snapshot in snapshots(pipeline.settings, streams, chosen[begin : begin + AT_ONCE]):
             state, account = tracker.step(state, snapshot)
             rows.append(row(_window(tracker, state, account)))
+            flags = account.flags
+            advance(begin + len(rows), len(chosen))
         tables.append(np.array(rows, dtype=_WINDOW_DTYPE))
-    return np.concatenate(tables)
+
+    return Replayed(
+        np.concatenate(tables),
+        state.estimate,
+        tracker.measurement.variances,
+        not flags & Flag.PRIOR,
+    )
 
 
 def window_ends(ticks: Ints, length: int) -> Ints:

@@ -40,6 +40,11 @@ class Progress:
         self._done += steps
         self._show(self._counted)
 
+    def reached(self, done: int, total: int) -> None:
+        """So many of so many steps are done."""
+        self._total = total
+        self.advance(done - self._done)
+
     def at(self, step: str, share: float = 0.0) -> None:
         """This step begins, with about that share of the work done; 0 where nobody knows. A
         terminal shows it at once: the next one may be long in coming.

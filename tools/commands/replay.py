@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from gritd.estimator.config.configuration import Configuration, load, loads, wit
 from gritd.estimator.config.settings import ENGINES
 from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import TICK_FIELDS
-from gritd.estimator.offline.batch import estimates
+from gritd.estimator.offline.batch import replayed
+from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.offline.playback import Checkpoint
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -24,6 +26,8 @@ from gritd.estimator.recording.topics import CHECKPOINT, TICK_TOPIC, TOPICS
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.progress import Progress
+from gritd.tools.commands.estimate import check_same_rig, lines
 from gritd.tools.commands.readiness import never_ready
 from gritd.tools.commands.replay_report import Rows, report
 from gritd.tools.commands.replay_run import rerun_of, run_settings, ticks_of, told
@@ -39,6 +43,8 @@ def main(argv: Sequence[str]) -> int:
     damaged.
     """
     arguments = _parser().parse_args(argv)
+    if arguments.carry and (arguments.verify or arguments.output):
+        raise CommandError("--carry: expected neither --verify nor --output with it", USAGE)
     if arguments.verify and (arguments.config or arguments.output or arguments.engine):
         raise CommandError(
             "--verify replays a recording as it was made: without --config, --engine, --output",
@@ -53,7 +59,30 @@ def main(argv: Sequence[str]) -> int:
         if arguments.output:
             files.vacant(_target(arguments, path))
 
+    if arguments.carry:
+        return _carried(paths, arguments)
     return max([_replay(path, arguments) for path in paths])
+
+
+def _carried(paths: Sequence[Path], arguments: Namespace) -> int:
+    """Every run begun with what the runs before it know, as the daemon does on one bed."""
+    recordings = [files.recording(path) for path in paths]
+    configurations = [_configuration(recording, arguments) for recording in recordings]
+    given = [run_settings(r, c, r) for r, c in zip(recordings, configurations, strict=True)]
+    check_same_rig(given, recordings)
+
+    repeatability = configurations[0].settings.bed.repeatability
+    engine = configurations[0].settings.filter.engine
+    runs = []
+    with Progress("replaying") as progress:
+        for run in bed_runs(
+            zip(given, recordings, strict=True), repeatability, engine, progress.reached
+        ):
+            runs.append(run)
+            print(report(run.recording.path, run.carried.rows, "windows"))
+
+    print("\n".join(["", *lines(runs, repeatability)]))
+    return DAMAGED if any(recording.damage for recording in recordings) else DONE
 
 
 def _replay(path: Path, arguments: Namespace) -> int:
@@ -113,7 +142,9 @@ def _recompute(
         rows, each = _every_tick(recordings, configuration, arguments), "ticks"
     else:
         settings = told(first, configuration, first)
-        rows, each = estimates(settings, first, settings.filter.engine), "windows"
+        with Progress(f"replaying {first.path.name}") as progress:
+            made = replayed(settings, first, settings.filter.engine, advance=progress.reached)
+        rows, each = made.rows, "windows"
 
     if not len(rows):
         raise CommandError(f"{first.path}: holds no readings", DAMAGED)
@@ -131,7 +162,8 @@ def _every_tick(
 ) -> Rows:
     first = recordings[0]
     output = files.vacant(_target(arguments, first.path)) if arguments.output else None
-    writer = RunWriter(output, TOPICS, configuration.text, first.run) if output else None
+    run = replace(first.run, bed="")  # it begins with the stated prior
+    writer = RunWriter(output, TOPICS, configuration.text, run) if output else None
 
     records, tables = [], [np.empty(0, ROW)]
     rerun = rerun_of(recordings, configuration, as_it_ran=False)
@@ -192,6 +224,11 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--verify", action="store_true", help="compare every field of every /tick, bit for bit"
+    )
+    parser.add_argument(
+        "--carry",
+        action="store_true",
+        help="the recordings are runs on one bed: each begins with what those before it know",
     )
     parser.add_argument("--engine", choices=ENGINES, help="instead of the configured filter engine")
     parser.add_argument(

@@ -27,6 +27,11 @@ COMMANDS = {
         "the forward simulation drawn over recordings, with the residual",
     ),
     "replay": ("gritd.tools.commands.replay", "the on-line filter over recordings"),
+    "estimate": (
+        "gritd.tools.commands.estimate",
+        "what runs on one bed know together of its soil",
+    ),
+    "bed": ("gritd.tools.commands.bed", "the bed on which the daemon's runs add up: show, new"),
     "diagnose": (
         "gritd.tools.commands.diagnose",
         "where model and recordings differ, and which physics was left out",

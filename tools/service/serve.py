@@ -14,8 +14,9 @@ from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.recorded import Playback
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.daemon.bed_file import BedError
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.daemon.daemon import WARNING, Daemon, DaemonError
+from gritd.estimator.daemon.daemon import INFO, WARNING, Daemon, DaemonError
 from gritd.estimator.daemon.publish import Publisher, PublishError
 from gritd.estimator.daemon.scheduling import real_time
 from gritd.estimator.messages.run_info import RunInfo
@@ -25,6 +26,7 @@ from gritd.estimator.recording.retention import sweep
 from gritd.estimator.recording.writer import WriterStatus
 from gritd.tools.cli.command import DONE, FAILED, CommandError
 from gritd.tools.cli.files import open_to_all
+from gritd.tools.service.bed_keeper import bed_of_run
 from gritd.tools.service.tap import Taps, playback_of
 from gritd.tools.service.telemetry import Reporter
 from gritd.tools.service.watcher import Watcher, say
@@ -59,7 +61,7 @@ def serve(configuration: Configuration, service: Service) -> int:
     """
     try:
         return _serve(configuration, service)
-    except (DaemonError, RecordingError, PublishError) as error:
+    except (BedError, DaemonError, RecordingError, PublishError) as error:
         raise CommandError(error, FAILED) from None
 
 
@@ -75,17 +77,23 @@ def _serve(configuration: Configuration, service: Service) -> int:
         say(f"{rescued}: a power cut had taken its name; it has it again")
 
     path = run_path(service.folder, service.run.name, clock.now())
-    daemon = Daemon(configuration, path, service.run, readers, QueueSource(queue), clock)
+    bed = bed_of_run(service.folder, settings, service.run)
+    run, start = (bed.named(service.run), bed.start) if bed else (service.run, None)
+    daemon = Daemon(configuration, path, run, readers, QueueSource(queue), clock, start)
     publisher = Publisher(service.socket, Reporter(daemon, readers, queue, notice))
     watcher = Watcher(configuration.source, readers, queue, publisher, service.status_every)
 
     _listen_to_signals(daemon, watcher)
     _announce(daemon, path, notice)
+    if bed:
+        watcher.tell(daemon, INFO, bed.announced())
     with closing(publisher):
         publisher.start()
         last = daemon.serve(lambda daemon: _watch(daemon, watcher, taps, playback))
 
     watcher.report(daemon)
+    if bed:
+        say(bed.closed(daemon))
     if taps:
         say(taps.close())
     say(closing_line(last))

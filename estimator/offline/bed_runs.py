@@ -1,0 +1,66 @@
+"""Recordings of one bed, one after the other: what each knows alone, and what all know together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+from gritd.estimator.config.settings import Repeatability, Settings
+from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.tracker import Tracker
+from gritd.estimator.offline.batch import Replayed, replayed
+from gritd.estimator.online.bed import Known, after_run, before_run, surprise
+from gritd.estimator.recording.recording import Recording
+
+Advance = Callable[[int, int], None]
+
+
+class BedRun(NamedTuple):
+    """One run of a bed."""
+
+    recording: Recording
+    settings: Settings
+    prior: Estimate
+    alone: Replayed  # begun with the stated prior
+    carried: Replayed  # begun with what the runs before it know
+    known: Known  # of the bed after it
+    surprise: float  # by which it moved what was known: chi-square, 3 degrees of freedom
+
+    @property
+    def counts(self) -> bool:
+        """Whether the bed's estimate rests on it too: the filter's own is believed at its end."""
+        return self.carried.believed and bool(self.carried.rows["updates"][-1] > 0)
+
+
+def bed_runs(
+    runs: Iterable[tuple[Settings, Recording]],
+    repeatability: Repeatability,
+    engine: str = "plain",
+    advance: Advance = lambda done, total: None,
+) -> Iterator[BedRun]:
+    """Each run, in the order given. A run that the filter does not believe adds nothing. Raises
+    RecordingError.
+    """
+    known: Known | None = None
+    for settings, recording in runs:
+        prior = Tracker(settings, engine).prior
+        known = known or Known(prior, 0)
+
+        alone = replayed(settings, recording, engine, None, advance)
+        start = before_run(known, repeatability)
+        carried = alone
+        if known.runs:
+            carried = replayed(settings, recording, engine, start, advance)
+
+        run = BedRun(
+            recording,
+            settings,
+            prior,
+            alone,
+            carried,
+            after_run(known, carried.estimate, repeatability, carried.nuisances),
+            surprise(start, carried.estimate),
+        )
+        run = run if run.counts else run._replace(known=known)
+        known = run.known
+        yield run

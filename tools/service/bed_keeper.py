@@ -1,0 +1,83 @@
+"""What the daemon does with the bed: a run begins with what the runs before it know, and adds to
+it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from gritd.estimator.config.settings import Settings, settings_of_run
+from gritd.estimator.daemon import bed_file
+from gritd.estimator.daemon.bed_file import Bed, BedError
+from gritd.estimator.daemon.daemon import Daemon
+from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.online.bed import fingerprint
+
+FLAGS, UPDATES = TICK_NAMES.index("flags"), TICK_NAMES.index("updates")
+
+
+@dataclass(frozen=True)
+class BedOfRun:
+    """The bed that a run is driven on, as the run found it."""
+
+    folder: Path
+    bed: Bed
+    settings: Settings  # of the run
+    began: float  # [s since the epoch]
+
+    @property
+    def start(self) -> Estimate | None:
+        """What the run begins with; None for the stated prior."""
+        return bed_file.start_of(self.bed, self.settings, self.began)
+
+    def named(self, run: RunInfo) -> RunInfo:
+        """The run, with the bed whose earlier runs it begins with."""
+        return replace(run, bed=self.bed.name) if self.start is not None else run
+
+    def announced(self) -> str:
+        """What the run begins with, in a line."""
+        reason = bed_file.useless(self.bed, self.settings, self.began)
+        if reason:
+            return f"bed {self.bed.name!r}: begins with the stated prior: {reason}"
+        return f"bed {self.bed.name!r}: begins with what {self.bed.runs} runs know"
+
+    def closed(self, daemon: Daemon) -> str:
+        """Keep what the run added; a line that says so, or why it adds nothing."""
+        if reason := self._nothing_learnt(daemon):
+            return f"bed {self.bed.name!r}: this run adds nothing: {reason}"
+        assert daemon.loop.estimate is not None
+        after = bed_file.after(
+            self.bed, self.settings, daemon.loop.estimate, self.began, time.time()
+        )
+        try:
+            bed_file.save(self.folder, after)
+        except BedError as error:
+            return f"bed {self.bed.name!r}: this run adds nothing: {error}"
+        return f"bed {self.bed.name!r}: {after.runs} runs now"
+
+    def _nothing_learnt(self, daemon: Daemon) -> str:
+        if daemon.loop.estimate is None or daemon.loop.latest is None:
+            return "it had no tick"
+        settings = settings_of_run(daemon.configuration.settings, daemon.run)
+        if fingerprint(settings) != fingerprint(self.settings):
+            return "prior, calibration, filter or effects changed on the way"
+        tick = daemon.loop.latest[0]
+        if not tick[UPDATES]:
+            return "the filter was never updated"
+        if int(tick[FLAGS]) & Flag.PRIOR:
+            return "the filter's estimate was not believed at its end"
+        return ""
+
+
+def bed_of_run(folder: Path, settings: Settings, run: RunInfo) -> BedOfRun | None:
+    """The bed in the bin, or None. Raises BedError."""
+    now = time.time()
+    bed = bed_file.current(folder, settings, now)
+    if bed is None:
+        return None
+    return BedOfRun(folder, bed, settings_of_run(settings, run), now)

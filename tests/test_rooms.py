@@ -31,6 +31,7 @@ ROOMS = (
         "tools.diagnose",
         "tools.importers",
         "tools.paper",
+        "tools.calibrate",
         "tools.recordings",
     ),
     ("tools.bench", "tools.report"),

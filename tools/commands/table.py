@@ -5,6 +5,10 @@ from __future__ import annotations
 # command -> (module, what it does)
 COMMANDS = {
     "init": ("gritd.tools.commands.init", "a folder to work in: configuration and CAN messages"),
+    "calibrate": (
+        "gritd.tools.commands.calibrate",
+        "scale and offset of a sensor from known values, into the configuration",
+    ),
     "demo": (
         "gritd.tools.commands.demo",
         "the daemon against the simulated testbed on real wires, with verdict and figure",

@@ -1,0 +1,1 @@
+"""From measurements with known values to scale and offset, each with its uncertainty."""

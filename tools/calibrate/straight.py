@@ -1,0 +1,49 @@
+"""The procedure that most sensors share: known values are set, a line is fitted, and scale, offset,
+date and serial number are written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gritd.estimator.config.settings import Uncertain
+from gritd.tools.calibrate.line import Line, fitted
+from gritd.tools.calibrate.outcome import Found, Outcome, residual_table
+from gritd.tools.calibrate.sources import Signal, Source
+
+
+@dataclass(frozen=True)
+class Straight:
+    """What is fitted, and where it is written.
+
+    path:   of the mapping with scale and offset in the configuration.
+    scale:  SI unit of the scale; shown: a usual unit of the known values.
+    offset: whether it is written; counts have none.
+    """
+
+    signal: Signal
+    path: tuple[str, ...]
+    unit: str
+    scale: str
+    shown: str
+    offset: bool = True
+
+    def outcome(self, source: Source, known: Sequence[Uncertain]) -> Outcome:
+        """Raises CommandError."""
+        return self.of_line(fitted(source.points(self.signal, known)))
+
+    def of_line(self, line: Line, factor: float = 1.0) -> Outcome:
+        """What a line says. `factor` turns the known values into what the channel measures."""
+        scale = Uncertain(line.scale.value * factor, line.scale.sigma * abs(factor))
+        shown = f"{self.shown}/{self.signal.unit}" if self.scale else ""
+        found = [Found((*self.path, "scale"), scale, self.scale, shown)]
+        if self.offset:
+            found.append(Found((*self.path, "offset"), line.offset, self.unit, self.shown))
+        return Outcome(
+            tuple(found),
+            self.path,
+            tuple(residual_table(line, self.signal.unit, self.shown)),
+            line.warnings,
+            ((".".join(self.path), line),),
+        )

@@ -20,6 +20,9 @@ from gritd.estimator.online.checkpoint import decode, encode
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.mcapfile import RecordingError
 
+# What a calculation ends in that begins with numbers that do not belong together.
+IMPOSSIBLE = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
 
 class Rerun:
     """`settings_of` gives the run's settings from a configuration."""
@@ -32,9 +35,17 @@ class Rerun:
         self.pipeline = Pipeline(settings_of(configuration))
         self._state = self.pipeline.start()
         self.known = True  # whether the state is the run's own, so that its ticks can be compared
+        self._given = False  # the state came from a checkpoint: it may be anybody's
 
     def step(self, tick: RecordedTick) -> TickRow:
-        self._state, record = self.pipeline.step(self._state, tick.readings, tick.stamp)
+        """Raises RecordingError where a checkpoint's state leads nowhere."""
+        try:
+            self._state, record = self.pipeline.step(self._state, tick.readings, tick.stamp)
+        except IMPOSSIBLE as error:
+            if not self._given:
+                raise
+            reason = f"{type(error).__name__}: {error!s:.100}"
+            raise RecordingError(f"/checkpoint: a state that no run comes to: {reason}") from error
         return record
 
     def lose(self) -> None:
@@ -71,7 +82,7 @@ class Rerun:
             self._state = decode(checkpoint.state, self.pipeline.settings)
         except ValueError as error:
             raise RecordingError(f"/checkpoint: {error}") from None
-        self.known = True
+        self.known = self._given = True
         return same
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import typing
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import IntFlag
 from functools import cache
@@ -23,8 +23,9 @@ from gritd.estimator.online.pipeline import State
 from gritd.estimator.wheel.sync import Sync
 from gritd.estimator.wheel.windows import Counters, MeanWindow, Sample, SlopeWindow
 
-DEEPEST = 40  # levels of a state; a text of more is none
 _FIELDS = "__dataclass_fields__"
+DEEPEST = 40  # levels of a state; a text of more is none
+LARGEST = 10**60  # of whole numbers: sums of squared nanoseconds and counts are exact
 _SHARED = "counters"  # of a SlopeWindow: the Sync's own
 
 
@@ -45,10 +46,9 @@ def decode(text: str, settings: Settings) -> State:
         parts = json.loads(text)
         sync = Sync(settings)
         sync.remember(_object(parts["sync"]))
-        state = State(sync, *_object(parts["rest"]))
-        if not all(isinstance(recall, tuple) for recall in state.track.recall.values()):
-            raise TypeError("what an effect remembers is no list of numbers")
-        return state
+        rest = _object(parts["rest"])
+        _check(State, [name for name in _field_names(State) if name != "sync"], rest)
+        return State(sync, *rest)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(
             f"not a state of this configuration: {type(error).__name__}: {error!s:.100}"
@@ -89,9 +89,41 @@ def _object(plain: Any, depth: int = 0) -> Any:
 
 
 def _build(kind: Any, values: list[Any]) -> Any:
+    """Raises TypeError, ValueError where the values are not what it is declared to hold."""
+    if issubclass(kind, IntFlag):
+        return kind(*values)
+    names = _field_names(kind)
+    _check(kind, names, values)
     if not hasattr(kind, _FIELDS):
         return kind(*values)
-    return kind(**dict(zip(_field_names(kind), values, strict=True)))
+    return kind(**dict(zip(names, values, strict=True)))
+
+
+def _check(kind: Any, names: list[str], values: Sequence[Any]) -> None:
+    """Raises TypeError where a value is not what its field is declared to hold."""
+    hints = typing.get_type_hints(kind)
+    for name, value in zip(names, values, strict=False):
+        if not _fits(value, hints[name]):
+            raise TypeError(f"{kind.__name__}.{name}: {value!r:.40} is none of its values")
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value is what the hint declares; a number is also one to calculate with."""
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, UnionType):
+        return any(_fits(value, part) for part in parts)
+    if origin is tuple and parts[-1:] != (...,):
+        alike = isinstance(value, tuple) and len(value) == len(parts)
+        return alike and all(map(_fits, value, parts))
+    if origin in (tuple, list, deque):
+        return isinstance(value, origin) and all(_fits(item, parts[0]) for item in value)
+    if origin is Mapping:
+        return isinstance(value, dict) and all(_fits(item, parts[1]) for item in value.values())
+    if hint is float or hint is int:
+        kinds = (int, float) if hint is float else int
+        small = not isinstance(value, int) or abs(value) <= LARGEST
+        return isinstance(value, kinds) and not isinstance(value, bool) and small
+    return value is None if hint is type(None) else isinstance(value, hint)
 
 
 def _field_names(kind: Any) -> list[str]:

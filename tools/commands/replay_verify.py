@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.messages.tick import REVISION, TICK_NAMES, TickRow
 from gritd.estimator.offline.playback import RecordedTick
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import TICK_REVISION
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK_TOPIC
@@ -35,10 +36,13 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
     for recording, tick in ticks_of(recordings, configuration, "verifying"):
         if gaps.before(recording, tick):
             rerun.lose()
-        if tick.checkpoint is not None:
-            differences.resumed(tick.stamp, rerun.resume(tick.checkpoint))
+        try:
+            if tick.checkpoint is not None:
+                differences.resumed(tick.stamp, rerun.resume(tick.checkpoint))
+            record = rerun.step(tick)
+        except RecordingError as error:
+            raise CommandError(f"{recording.path}: {error}", DAMAGED) from error
 
-        record = rerun.step(tick)
         if tick.logged is not None and rerun.known:
             differences.compare(tick.logged, record)
         elif tick.logged is not None:

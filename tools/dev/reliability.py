@@ -65,6 +65,7 @@ ROWS = (
     "last reading a day, fifty years later",
     "sparse file of 9 GB, 4 GB of memory",
     "import of packed text",
+    "hostile checkpoints",
     "empty attachments, tiny chunks",
     "300 and 500 MB of address space",
     "terminal escapes in names",

@@ -19,6 +19,7 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import settings_of_run
 from gritd.estimator.daemon.clock import Clock
 from gritd.estimator.daemon.disagreement import Watch
+from gritd.estimator.daemon.feed import Feed
 from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
@@ -104,6 +105,7 @@ class Daemon:
         ]
 
         self.model = Watch()  # whether model and measurement agree
+        self.feed = Feed()  # whether the filter gets what it needs
         self.health = ""  # the threads that hang; stroke the watchdog only while there are none
         self.rotation = Rotation()
         self._stop, self._loop_stop = StopRequest(), Event()

@@ -12,6 +12,7 @@ import time
 from math import exp, hypot, isfinite, sqrt
 from typing import NamedTuple
 
+from gritd.estimator.daemon.notice import Notice
 from gritd.estimator.filter.measurement import COMPONENTS
 from gritd.estimator.messages.status import Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
@@ -36,13 +37,6 @@ class Disagreement(NamedTuple):
     channel: str
     since: float
     sigmas: float
-
-
-class Notice(NamedTuple):
-    """A line to say; over: that something has ended."""
-
-    text: str
-    over: bool = False
 
 
 class Watch:

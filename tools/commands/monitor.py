@@ -154,6 +154,8 @@ def lines(report: Report) -> Iterator[str]:
 def _trouble(report: Report) -> Iterator[str]:
     if report["hanging"]:
         yield f"{TROUBLE} hanging: {report['hanging']}"
+    if unfed := report.get("unfed"):
+        yield f"{TROUBLE} the filter has not been fed for a second: {unfed}"
     for name, stats in report["devices"].items():
         if stats["state"] != "OPEN":
             yield f"{TROUBLE} {name} {stats['state']} {stats['last_error']}".rstrip()

@@ -23,7 +23,7 @@ METRICS = {
     "gritd_log_written_total": ("counter", "messages written", "log.written"),
     "gritd_log_dropped_total": ("counter", "messages the log dropped", "log.dropped"),
     "gritd_log_queued": ("gauge", "messages waiting for the disk", "log.queued"),
-    "gritd_healthy": ("gauge", "1 while no thread hangs", "healthy"),
+    "gritd_healthy": ("gauge", "1 while the filter is fed and no thread hangs", "healthy"),
     "gritd_cohesion_pascals": ("gauge", "cohesion c", "tick.cohesion"),
     "gritd_cohesion_sigma_pascals": ("gauge", "its standard deviation", "tick.cohesion_sigma"),
     "gritd_tan_phi": ("gauge", "tangent of the internal friction angle", "tick.tan_phi"),
@@ -49,7 +49,9 @@ PER_DEVICE = ("readings", "frames", "bad", "lost", "errors", "quarantined", "reo
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0 where a healthy daemon answers, 1 where none does or one of its threads hangs."""
+    """Exit 0 where a healthy daemon answers; 1 where none does, one of its threads hangs, or the
+    filter has not been fed for a second.
+    """
     arguments = _parser().parse_args(argv)
     with connected(arguments.socket) as connection:
         report = next(reports(connection))
@@ -132,6 +134,8 @@ def summary(report: Report) -> Iterator[str]:
         note = prior_note(report)
         yield f"  c        {tick['cohesion']:.0f} ± {tick['cohesion_sigma']:.0f} Pa{note}"
         yield f"  tan φ    {tick['tan_phi']:.4f} ± {tick['tan_phi_sigma']:.4f}"
+    if unfed := report.get("unfed"):
+        yield f"  filter   has not been fed for a second: {unfed}"
     if disagreeing := report.get("disagreement"):
         yield f"  model    {disagreement(disagreeing)}"
 

@@ -79,6 +79,7 @@ ROWS = (
     "step, ramp or patch of the soil",
     "a filter out of its depth",
     "second daemon on a socket, too many readers",
+    "silence, garbage, counter jumps, a stopped process",
 )
 
 Figure = dict[str, Any]

@@ -27,9 +27,10 @@ from gritd.estimator.recording.writer import WriterStatus
 from gritd.tools.cli.command import DONE, FAILED, CommandError
 from gritd.tools.cli.files import open_to_all
 from gritd.tools.service.bed_keeper import bed_of_run
+from gritd.tools.service.journal import say, tell
 from gritd.tools.service.tap import Taps, playback_of
 from gritd.tools.service.telemetry import Reporter
-from gritd.tools.service.watcher import Watcher, say
+from gritd.tools.service.watcher import Watcher
 
 
 class QueueSource:
@@ -128,7 +129,7 @@ def _watch(daemon: Daemon, watcher: Watcher, taps: Taps | None, playback: Playba
     """
     watcher(daemon)
     for line in taps.trouble() if taps else ():
-        watcher.tell(daemon, WARNING, line)
+        tell(daemon, WARNING, line)
     if playback and playback.over:
         daemon.stop()
 

@@ -40,8 +40,9 @@ class Reporter:
         return {
             "pid": os.getpid(),
             "uptime": time.monotonic() - self._began,
-            "healthy": not daemon.health,
+            "healthy": not (daemon.health or daemon.feed.unfed),
             "hanging": daemon.health,
+            "unfed": daemon.feed.unfed,
             "real_time": self._notice or "yes",
             "wall_clock": daemon.clock.notice,
             "configuration": daemon.configuration.source,
@@ -84,13 +85,14 @@ def _tick(daemon: Daemon) -> Report:
     return {
         "status": Status(int(fields["status"])).name,
         "flags": [flag.name for flag in Flag if flag and int(fields["flags"]) & flag],
-        "channels": {name: _condition(fields, bit) for name, bit in _channels(daemon).items()},
+        "channels": {name: _condition(fields, bit) for name, bit in channels_of(daemon).items()},
         "tick": fields,
         "loop": {**record._asdict(), **loop},
     }
 
 
-def _channels(daemon: Daemon) -> dict[str, int]:
+def channels_of(daemon: Daemon) -> dict[str, int]:
+    """CHANNEL_BITS of the channels that are configured."""
     settings = daemon.configuration.settings
     used = {*settings.channels, *(("wrench",) if settings.wrench else ())}
     return {name: bit for name, bit in CHANNEL_BITS.items() if name in used}

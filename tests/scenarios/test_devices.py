@@ -114,5 +114,5 @@ def test_garbage_bad_checksum_and_truncated_frames(tmp_path, seed, figure):
 
 def counted(daemon, *names):
     """Counters of the encoders' device, from the daemon's own account."""
-    (line,) = [line for _, line in daemon.said if line.startswith("device encoders: ")]
+    line = [line for _, line in daemon.said if line.startswith("device encoders: ")][-1]
     return [int(re.search(rf"(\d+) {name}", line).group(1)) for name in names]

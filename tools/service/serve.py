@@ -87,7 +87,7 @@ def _serve(configuration: Configuration, service: Service) -> int:
     _listen_to_signals(daemon, watcher)
     _announce(daemon, path, notice)
     if bed:
-        watcher.tell(daemon, INFO, bed.announced())
+        tell(daemon, INFO, bed.announced())
     with closing(publisher):
         publisher.start()
         last = daemon.serve(lambda daemon: _watch(daemon, watcher, taps, playback))

@@ -23,6 +23,11 @@ def reloading() -> str:
     return f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}"
 
 
+def extended(seconds: float) -> str:
+    """That the start takes so long from now on."""
+    return f"EXTEND_TIMEOUT_USEC={round(seconds * 1e6)}"
+
+
 def status(text: str) -> str:
     """One line for people, shown by `systemctl status`."""
     return "STATUS=" + " ".join(text.split())

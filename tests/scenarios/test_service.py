@@ -8,12 +8,19 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 
 import pytest
 
-from tests.scenarios.rig import ROOT
+from gritd.tools.testbed import rig_config
+from tests.scenarios.rig import ROOT, TESTBED, WIRES, DaemonProcess
 
 UNIT = ROOT / "config" / "gritd.service"
+CRASHES = "ten crashes in a minute"
+CRASHING = """
+import os, gritd.tools.service.serve as serving
+serving.serve = lambda *_: os._exit(7)
+"""
 EXPOSURE = 2.5  # of systemd-analyze security; 0 is best, 10 worst
 
 systemd = pytest.mark.skipif(
@@ -72,6 +79,39 @@ def test_the_files_of_an_installation(tmp_path):
     assert {"usr/lib/sysusers.d/gritd.conf", "etc/gritd/testbed.dbc"} <= below(tmp_path)
     install("uninstall", tmp_path)
     assert below(tmp_path) == {"etc/gritd/config.yaml", "etc/gritd/testbed.dbc"}
+
+
+@pytest.mark.parametrize(
+    "home, warned", [("root/.pyenv", True), ("home/eva", True), ("usr", False)]
+)
+def test_an_interpreter_in_a_home_folder_is_warned_of(tmp_path, home, warned):
+    python = tmp_path / "python3"
+    python.write_text(f"#!/bin/sh\necho /{home}\n")
+    python.chmod(0o755)
+    done = subprocess.run(
+        [str(ROOT / "tools" / "install"), "check"],
+        env={"PYTHON": str(python), "PATH": "/usr/bin:/bin"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == "" and (f"the Python of /{home} cannot be used" in done.stderr) == warned
+    assert ("PYTHON=/usr/bin/python3" in done.stderr) == warned
+
+
+def test_crash_after_crash_backs_off(tmp_path, monkeypatch, figure):
+    """A daemon that ends at once, started at once each time, as the unit does: never given up."""
+    assert "StartLimitIntervalSec=0" in UNIT.read_text()
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path))
+    config, said, took = rig_config.write(TESTBED, {}, "linear", tmp_path), [], []
+    for _ in range(8):
+        began = time.monotonic()
+        with DaemonProcess(config, prelude=CRASHING) as daemon:
+            assert daemon.exit_code() == 7
+            said.append([line for _, line in daemon.said if "ended again" in line])
+        took.append(time.monotonic() - began)
+    waits = [f"ended again and again: starts in {seconds} s" for seconds in (1, 2, 4)]
+    assert said == [[]] * 5 + [[line] for line in waits]
+    figure(CRASHES, WIRES, "starts at once", said.count([]), "", 5)
+    assert took[7] > 4.0
 
 
 def install(command, root):

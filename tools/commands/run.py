@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import time
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -12,8 +14,12 @@ from typing import TYPE_CHECKING
 
 from gritd.estimator.config.yamltree import Mapping, Scalar, compose, read_text
 from gritd.estimator.daemon.lock import LockError, alone_at, locked
+from gritd.estimator.daemon.notify import Notifier, extended
+from gritd.estimator.daemon.starts import forget, wait_before
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name, number, whole
 from gritd.tools.service.client import LONGEST, SOCKET
+
+START = 30.0  # [s] that the manager gives a start, as in the unit
 
 if TYPE_CHECKING:
     from gritd.estimator.config.configuration import Configuration
@@ -28,11 +34,26 @@ def main(argv: Sequence[str]) -> int:
     arguments = parser.parse_args(argv)
     if arguments.fast and not arguments.from_tap:
         parser.error("argument --fast: only with --from-tap")
+    runtime = os.environ.get("RUNTIME_DIRECTORY")
+    if runtime:
+        _wait(Path(runtime))
     try:
         with ExitStack() as held:
-            return _run(arguments, held)
+            code = _run(arguments, held)
+        if runtime and code == DONE:
+            forget(Path(runtime))
+        return code
     except LockError as error:
         raise CommandError(error, FAILED) from None
+
+
+def _wait(runtime: Path) -> None:
+    """Under a service manager: not at once, where the daemon has ended again and again."""
+    seconds = wait_before(runtime, time.monotonic())
+    if seconds > 0.0:
+        print(f"ended again and again: starts in {seconds:.0f} s", file=sys.stderr, flush=True)
+        Notifier().tell(extended(seconds + START))
+        time.sleep(seconds)
 
 
 def _run(arguments: Namespace, held: ExitStack) -> int:

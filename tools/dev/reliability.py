@@ -80,6 +80,7 @@ ROWS = (
     "a filter out of its depth",
     "second daemon on a socket, too many readers",
     "silence, garbage, counter jumps, a stopped process",
+    "ten crashes in a minute",
 )
 
 Figure = dict[str, Any]

@@ -21,15 +21,9 @@ import numpy as np
 
 from gritd.tools.diagnose.explain.explanation import explain
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.fit.base import (
-    BaseFit,
-    explainable,
-    fit_roughly,
-    formed,
-    refit,
-    refit_with_form,
-)
-from gritd.tools.diagnose.noise.estimate import estimate, estimate_beside_form
+from gritd.tools.diagnose.fit.base import BaseFit, explainable, fit_roughly, refit
+from gritd.tools.diagnose.fit.reference import fit_beside_reference
+from gritd.tools.diagnose.noise.estimate import estimate
 from gritd.tools.diagnose.rig.interface import Rig, Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
@@ -68,10 +62,7 @@ def fit_base(rig: Rig, rng: np.random.Generator) -> BaseFit:
     """
     stack = Stack(rig)
     rough = fit_roughly(stack)
-    if not all(rig.new):
-        noise = estimate_beside_form(
-            stack, rough.fitted.predicted, formed(rough), rough.problem.noise, rng
-        )
-        return refit_with_form(rough, noise)
+    if stack.referred:
+        return fit_beside_reference(rough, rng)
     noise = estimate(stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng)
     return refit(rough, noise)

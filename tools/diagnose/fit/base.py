@@ -4,11 +4,13 @@ noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
@@ -26,6 +28,7 @@ class BaseFit:
 
     problem: Problem
     model: Model
+    forms: tuple[Freedom, ...] = ()  # what the form of the model may be off by
 
     @property
     def fitted(self) -> Fitted:
@@ -59,29 +62,25 @@ def explainable(rough: BaseFit) -> Explainable:
     return Explainable(np.column_stack([*leading, fitted.raw]), ripples)
 
 
-def formed(rough: BaseFit) -> Explainable:
-    """What constants and the discrepancy of form could explain about a rough fit."""
-    stack = rough.problem.stack
-    forms = [f.columns for f in form_freedoms(stack, rough.problem.noise)]
-    return Explainable(rough.fitted.raw, np.column_stack([np.zeros((stack.size, 0)), *forms]))
-
-
-def refit_with_form(rough: BaseFit, noise: Noise) -> BaseFit:
-    """In the noise that was found, the discrepancy of form learnt from both campaigns together."""
-    problem = _problem(rough, noise)
-    forms = form_freedoms(problem.stack, noise)
-    start = (rough.fitted.u, np.zeros(0))
-    return BaseFit(problem, fit_model(problem, forms, (), (), start, tuple(0 for _ in forms)))
-
-
 def refit(rough: BaseFit, noise: Noise) -> BaseFit:
     """In the noise that was found, what each run does for itself allowed."""
-    problem = _problem(rough, noise)
+    problem = in_noise(rough, noise)
     fitted = problem.descend((), (), rough.fitted.u, np.zeros(0))
-    return BaseFit(problem, plain_model(problem, fitted))
+    return BaseFit(problem, plain_model(problem, fitted), form_freedoms(problem.stack, noise))
 
 
-def _problem(rough: BaseFit, noise: Noise) -> Problem:
+def refit_beside(rough: BaseFit, noise: Noise, more: Sequence[Freedom]) -> BaseFit:
+    """In the noise that was found, the discrepancy of form and more freedoms learnt from both
+    campaigns together.
+    """
+    problem = in_noise(rough, noise)
+    forms = (*form_freedoms(problem.stack, noise), *more)
+    start = (rough.fitted.u, np.zeros(0))
+    model = fit_model(problem, forms, (), (), start, tuple(0 for _ in forms))
+    return BaseFit(problem, model, forms)
+
+
+def in_noise(rough: BaseFit, noise: Noise) -> Problem:
     """Without freedoms, what each run does for itself allowed."""
     allowed = tolerance(rough.problem.stack, TUNING.fit.tolerance)
     return Problem(rough.problem.stack, noise, np.column_stack((allowed, noise.of_runs)))

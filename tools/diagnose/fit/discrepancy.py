@@ -49,7 +49,7 @@ def _columns(stack: Stack, source: FormSource) -> Array:
     conditions = np.column_stack(
         [_joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
     )
-    shared = not all(stack.rig.new)
+    shared = stack.referred
     most = TUNING.fit.form_features_shared if shared else TUNING.fit.form_features
     features = features_of(conditions[acting], most, TUNING.fit.form_left_out)
     smooth = np.zeros((stack.size, len(features.points)))

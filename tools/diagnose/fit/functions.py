@@ -21,15 +21,18 @@ TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # 
 LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
 
 
-def smooth_signatures(stack: Stack) -> tuple[Signature, ...]:
-    """One for each channel and covariate (or product of two) that varies."""
+def smooth_signatures(stack: Stack, everywhere: bool = False) -> tuple[Signature, ...]:
+    """One for each channel and covariate (or product of two) that varies; everywhere: in the
+    reference campaign too.
+    """
     signatures = []
     for channel in stack.rig.channels:
         own = stack.of(channel)
         size = size_of(stack, channel)
 
         for along, columns in _families(stack):
-            kept = _scaled(np.where((own & stack.new)[:, None], columns, 0.0), own, size)
+            acting = (own if everywhere else own & stack.new)[:, None]
+            kept = _scaled(np.where(acting, columns, 0.0), own, size)
             if kept.shape[1]:
                 signatures.append(Signature(Shape(channel, along), kept, (0,) * kept.shape[1], {}))
 

@@ -14,19 +14,39 @@ stands at its bound is held there: it keeps the density of its prior and has no 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.problem import Fitted, Free
-from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 
 Chosen = tuple[int, ...]  # of each freedom, which of its sizes
+
+
+@dataclass(frozen=True, eq=False)
+class _Eliminated:
+    """What is left of m kept columns, p strengths and the residual when all else is eliminated.
+
+    gram (m, m), to_strong (m, p), pull (m,) of the kept columns without prior; strong (p, p),
+    strong_pull (p,), centre (p,) of the strengths; misfit and spread of what was eliminated.
+    """
+
+    gram: Array
+    to_strong: Array
+    pull: Array
+    strong: Array
+    strong_pull: Array
+    centre: Array
+    misfit: float
+    spread: float
 
 
 class Marginal:
@@ -56,6 +76,7 @@ class Marginal:
             if self._strong[first + i] and not fitted.held[first + i]
         ]
         self._known: dict[Chosen, float] = {}
+        self._filled: list[set[Chosen]] = [set() for _ in self.freedoms]
 
     def log_evidence(self, chosen: Chosen) -> float:
         """For given sizes, their prior counted."""
@@ -118,36 +139,85 @@ class Marginal:
         return mean, spread
 
     def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
-        """The same sizes but for one freedom, which has each of its own."""
+        """The same sizes but for one freedom, which has each of its own; with their evidence."""
         count = len(self.freedoms[number].sizes.values)
+        if count > 1 and chosen not in self._filled[number]:
+            self._fill(chosen, number)
+            self._filled[number].update(
+                (*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)
+            )
         return [(*chosen[:number], size, *chosen[number + 1 :]) for size in range(count)]
+
+    def _fill(self, chosen: Chosen, number: int) -> None:
+        """The log evidence for each size of one freedom, all others as chosen.
+
+        What is not this freedom is eliminated once; in the eigenvectors of what remains of it, each
+        of its sizes is a matter of its eigenvalues.
+        """
+        begin, end = int(self._ends[1 + number]), int(self._ends[2 + number])
+        scale, acting = self._scaled(chosen)
+        scale[begin:end] = 1.0
+        acting[begin:end] = False
+        rest = self._eliminated(scale, acting & ~self._held, np.arange(begin, end))
+
+        values, vectors = np.linalg.eigh(rest.gram)
+        values = np.maximum(values, 0.0)
+        turned = vectors.T @ rest.to_strong
+        pulled = vectors.T @ rest.pull
+        for which, size in enumerate(self.freedoms[number].sizes.values):
+            share = size**2 / (1.0 + size**2 * values)
+            misfit = rest.misfit - share @ pulled**2
+            spread = rest.spread + np.log1p(size**2 * values).sum()
+            a = rest.strong - (turned * share[:, None]).T @ turned
+            b = rest.strong_pull - turned.T @ (share * pulled)
+            these = (*chosen[:number], which, *chosen[number + 1 :])
+            self._known[these] = self._told(these, misfit, spread, a, b, rest.centre)
+
+    def _told(
+        self, chosen: Chosen, misfit: float, spread: float, a: Array, b: Array, centre: Array
+    ) -> float:
+        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.freedoms, chosen, strict=True))
+        strength = strength_evidence(self._strengths, a, b, centre)
+        return float(sizes - 0.5 * (misfit + spread) + strength)
+
+    def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
+        """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
+        products = self._products * scale[:, None] * scale
+        weak = np.flatnonzero(acting & ~self._strong)
+        strong = np.flatnonzero(acting & self._strong)
+        prior, centre = self._weight[weak] ** 2, self._centre[weak]
+
+        pull = products[weak, -1] - prior * centre
+        gram = products[np.ix_(weak, weak)]
+        gram[np.diag_indices_from(gram)] += prior
+        root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
+
+        beside = np.concatenate((kept, strong))
+        columns = np.column_stack((products[np.ix_(weak, beside)], pull))
+        inside = solve_triangular(root, columns, lower=True, check_finite=False)
+        last, own = inside[:, -1], inside[:, :-1]
+        matrix = products[np.ix_(beside, beside)] - own.T @ own
+        right = products[beside, -1] - own.T @ last
+
+        count = len(kept)
+        strain = np.sum(prior * centre**2) + self._strain_of_held()
+        return _Eliminated(
+            gram=matrix[:count, :count],
+            to_strong=matrix[:count, count:],
+            pull=right[:count],
+            strong=matrix[count:, count:],
+            strong_pull=right[count:],
+            centre=self._centre[strong],
+            misfit=float(products[-1, -1] + strain - last @ last),
+            spread=2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
+        )
 
     def _log_evidence(self, chosen: Chosen) -> float:
         scale, acting = self._scaled(chosen)
-        acting &= ~self._held
-        index = np.flatnonzero(acting)
-        products = self._products * scale[:, None] * scale
-
-        strong = self._strong[index]
-        prior = np.where(strong, 0.0, self._weight[index] ** 2)
-        centre = self._centre[index]
-        gram = products[np.ix_(index, index)] + np.diag(prior)
-        pull = products[index, -1] - prior * centre
-
-        root = np.linalg.cholesky(gram[np.ix_(~strong, ~strong)])
-        rest = np.column_stack((gram[np.ix_(~strong, strong)], pull[~strong]))
-        inside = np.linalg.solve(root, rest)
-        spread = 2.0 * (np.log(np.diag(root)).sum() - np.log(self._weight[index][~strong]).sum())
-        strain = np.sum(prior * centre**2) + self._strain_of_held()
-        misfit = products[-1, -1] + strain - inside[:, -1] @ inside[:, -1]
-
-        a = gram[np.ix_(strong, strong)] - inside[:, :-1].T @ inside[:, :-1]
-        b = pull[strong] - inside[:, :-1].T @ inside[:, -1]
-        sizes = sum(f.sizes.log_prior[i] for f, i in zip(self.freedoms, chosen, strict=True))
-        return float(
-            sizes
-            - 0.5 * (misfit + spread)
-            + strength_evidence(self._strengths, a, b, centre[strong])
+        none = np.zeros(0, dtype=np.intp)
+        rest = self._eliminated(scale, acting & ~self._held, none)
+        return self._told(
+            chosen, rest.misfit, rest.spread, rest.strong, rest.strong_pull, rest.centre
         )
 
     def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:

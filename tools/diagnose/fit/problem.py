@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
@@ -62,6 +63,7 @@ class Fitted:
         Array  # (N, m) in the channels' units: the last of the tolerance, predicted elsewhere too
     )
     held: Bools  # (q + p,) stands at its bound and wants out
+    root: Array  # (t, t) Cholesky root of the tolerance's products and its prior
     converged: bool = False
 
     @property
@@ -93,9 +95,8 @@ class Fitted:
         """Of `nats` (q + p, q + p), the tolerance fitted to each."""
         count = self.raw.shape[1]
         own, tolerance = self.jacobian[:, :count], self.jacobian[:, count:]
-        gram = tolerance.T @ tolerance + np.eye(tolerance.shape[1])
-        shared = own.T @ tolerance
-        taken = shared @ np.linalg.solve(gram, shared.T)
+        inside = solve_triangular(self.root, tolerance.T @ own, lower=True, check_finite=False)
+        taken = inside.T @ inside
         return np.asarray(own.T @ own - taken + np.diag(self.penalty[:count] ** 2))
 
     def covariance(self) -> Array:
@@ -128,6 +129,13 @@ class Problem:
         self.carried = np.zeros((stack.size, 0))
         self.measured = whiten(noise, stack.measured)
 
+    @cached_property
+    def root(self) -> Array:
+        """Cholesky root (t, t) of the tolerance's products and its unit prior."""
+        gram = self.tolerance.T @ self.tolerance
+        gram[np.diag_indices_from(gram)] += 1.0
+        return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
+
     def beside(self, columns: Array) -> Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
@@ -146,6 +154,7 @@ class Problem:
 
     def _with(self, columns: Array, whitened: Array) -> Problem:
         other = copy(self)
+        other.__dict__.pop("root", None)
         other.tolerance = np.column_stack((self.tolerance, whitened))
         other.allowed = np.column_stack((self.allowed, columns))
         other.carried = np.column_stack((self.carried, columns))
@@ -198,7 +207,6 @@ class _Ground:
         self._count = len(constants)
         weights = (np.ones(self._count), [f.weight for f in free])
         self._penalty = np.concatenate((*weights, np.ones(problem.tolerance.shape[1])))
-        self._gram = problem.tolerance.T @ problem.tolerance + np.eye(problem.tolerance.shape[1])
 
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
@@ -212,7 +220,7 @@ class _Ground:
         residual = problem.measured - whiten(problem.noise, predicted)
 
         tolerance = problem.tolerance
-        slack = np.asarray(np.linalg.solve(self._gram, tolerance.T @ residual))
+        slack = cho_solve((problem.root, True), tolerance.T @ residual, check_finite=False)
         left = residual - tolerance @ slack
         strain = np.sum((self._penalty[: centre.size] * centre) ** 2)
         objective = float(left @ left + slack @ slack + strain)
@@ -243,6 +251,7 @@ class _Ground:
             tried.objective,
             problem.carried,
             np.zeros(centre.size, bool),
+            problem.root,
         )
         return replace(fitted, held=self.bounds.held(centre, fitted.gradient))
 

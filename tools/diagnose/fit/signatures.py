@@ -21,13 +21,19 @@ def strengths(effect: type[Effect]) -> list[Parameter]:
 
 
 def raw_signatures(
-    stack: Stack, u: Array, base: Array, names: list[str] | None = None
+    stack: Stack,
+    u: Array,
+    base: Array,
+    names: list[str] | None = None,
+    everywhere: bool = False,
 ) -> Iterator[Signature]:
-    """Unwhitened signatures of all candidates about the prediction (N,) at constants u (q,)."""
+    """Unwhitened signatures of all candidates about the prediction (N,) at constants u (q,);
+    everywhere: in the reference campaign too.
+    """
     for name, effect in stack.rig.effects.items():
         if names is None or name in names:
             for fixed in shape_grid(stack.rig, effect):
-                made = signature(stack, u, base, effect, fixed)
+                made = signature(stack, u, base, effect, fixed, everywhere=everywhere)
                 if made is not None:
                     yield made
 
@@ -39,12 +45,16 @@ def signature(
     effect: type[Effect],
     fixed: Mapping[str, float],
     others: tuple[Effect, ...] = (),
+    everywhere: bool = False,
 ) -> Signature | None:
-    """Of an effect about the prediction base (N,) at constants u (q,), its shape parameters fixed.
+    """Of an effect about the prediction base (N,) at constants u (q,), its shape parameters fixed;
+    everywhere: in the reference campaign too.
 
     None where the effect changes nothing that is measured, or runs away however weak it is.
     """
-    derivatives = [_derivative(stack, u, base, effect, fixed, p, others) for p in strengths(effect)]
+    derivatives = [
+        _derivative(stack, u, base, effect, fixed, p, others, everywhere) for p in strengths(effect)
+    ]
     columns = np.column_stack(derivatives)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
@@ -60,6 +70,7 @@ def _derivative(
     fixed: Mapping[str, float],
     strength: Parameter,
     others: tuple[Effect, ...],
+    everywhere: bool,
 ) -> Array:
     """Change of all values (N,) per expected size; by a smaller step where the full one runs away,
     as a motor may that heats the more the more current it draws; NaN where every step does.
@@ -68,7 +79,7 @@ def _derivative(
     for step in TUNING.fit.derivative_steps:
         acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            change = stack.predict(u, (*others, acting)) - base
+            change = stack.predict(u, (*others, acting), everywhere) - base
         if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:
             return np.asarray(change / step)
     return np.full(stack.size, np.nan)

@@ -25,20 +25,21 @@ from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def spikes(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
-    """(N,) how far a single value stands off its neighbours, where that is beyond SPIKE; else 0."""
-    residual = stack.measured - predicted
+def spikes(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) how far a single value of a residual (N,) stands off its neighbours, where that is
+    beyond SPIKE; else 0.
+    """
     off = np.abs(residual - median_filter(residual, TUNING.noise.spike_neighbours, mode="nearest"))
     sigma = np.array([c.sigma for c in colours])[stack.channel]
     return np.where(off > TUNING.noise.spike * sigma, off, 0.0)
 
 
-def uncertain(stack: Stack, predicted: Array, colours: Sequence[Colour]) -> Array:
-    """(N,) what adds to the noise of single values: blur, spikes, and what is left open of the
-    motion.
+def uncertain(stack: Stack, predicted: Array, residual: Array, colours: Sequence[Colour]) -> Array:
+    """(N,) what adds to the noise of single values: blur of the prediction, spikes of the residual,
+    and what is left open of the motion.
     """
     return np.hypot(
-        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, predicted, colours)),
+        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, residual, colours)),
         stack.motion_sigma,
     )
 
@@ -55,7 +56,9 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
         colours.append(Colour(max(sigma, _least(stack, channel)), TUNING.noise.slow_times[0], 0.0))
     draws = tuple((c,) for c in colours)
     nothing = np.zeros((stack.size, 0))
-    return Noise(stack, tuple(colours), draws, uncertain(stack, predicted, colours), nothing)
+    return Noise(
+        stack, tuple(colours), draws, uncertain(stack, predicted, residual, colours), nothing
+    )
 
 
 def estimate(
@@ -83,23 +86,26 @@ def estimate(
         stack,
         colours,
         tuple(f[1:] for f in posteriors),
-        uncertain(stack, predicted, colours),
+        uncertain(stack, predicted, residual, colours),
         replicates.own_columns(stack, residual, colours, waves),
     )
 
 
-def estimate_beside_form(
+def estimate_of_reference(
     stack: Stack,
     predicted: Array,
+    residual: Array,
     explainable: Explainable,
     before: Noise,
     rng: np.random.Generator,
 ) -> Noise:
-    """The same from a reference campaign: all that it shows beside what the form explains is what
-    this rig does when nothing is new, waves included.
+    """The same from a reference campaign: all that its residual (N,) shows beside what is
+    explainable is what this rig does when nothing is new, waves included.
+
+    predicted: (N,) by the equations.
     """
-    residual, cells = stack.measured - predicted, np.full(stack.size, -1, dtype=np.intp)
-    estimates = [
+    cells = np.full(stack.size, -1, dtype=np.intp)
+    found = [
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
@@ -107,9 +113,22 @@ def estimate_beside_form(
     return Noise(
         stack,
         colours,
-        tuple(f[1:] for f in estimates),
-        uncertain(stack, predicted, colours),
+        tuple(f[1:] for f in found),
+        uncertain(stack, predicted, residual, colours),
         np.zeros((stack.size, 0)),
+    )
+
+
+def louder(one: Noise, other: Noise) -> Noise:
+    """Of each channel the noise that holds more slow power."""
+    step = step_of(one.stack.gaps)
+    pairs = list(zip(one.colours, other.colours, strict=True))
+    power = [[c.sigma**2 * _slow_power(c, step) for c in pair] for pair in pairs]
+    number = [int(np.argmax(both)) for both in power]
+    return replace(
+        other,
+        colours=tuple(pair[n] for pair, n in zip(pairs, number, strict=True)),
+        draws=tuple((one, other)[n].draws[channel] for channel, n in enumerate(number)),
     )
 
 

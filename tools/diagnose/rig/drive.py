@@ -105,7 +105,9 @@ class DriveRig:
         """Nothing: both sides of the comparison go through one filter."""
         return [{"torque": np.zeros_like(run.time)} for run in self.runs]
 
-    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+    def predict(
+        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+    ) -> list[dict[str, Array]]:
         """Motor torque [N·m] of every run (n,), for constants u (q,) in prior σ and effects."""
         inertia, damping, *timing = (k.of(float(x)) for k, x in zip(self.constants, u, strict=True))
         torques = [

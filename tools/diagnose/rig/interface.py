@@ -165,9 +165,11 @@ class Rig(Protocol):
         the motion, in the channel's unit.
         """
 
-    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+    def predict(
+        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+    ) -> list[dict[str, Array]]:
         """Every channel of every run, for constants u (q,) in prior σ and effects beyond the
-        baseline.
+        baseline; everywhere: the effects act in the reference campaign too.
         """
 
     def unit_factor(self, unit: str) -> float:
@@ -245,9 +247,18 @@ class Stack:
         first = np.diff(self.channel[kept] * 100_000 + self.run[kept], prepend=-1) != 0
         return np.where(first, np.inf, gap)
 
-    def predict(self, u: Array, effects: Sequence[Effect] = ()) -> Array:
-        """(N,) in the channels' units, for constants u (q,) in prior σ."""
+    def predict(self, u: Array, effects: Sequence[Effect] = (), everywhere: bool = False) -> Array:
+        """(N,) in the channels' units, for constants u (q,) in prior σ; everywhere: the effects act
+        in the reference campaign too.
+        """
+        if everywhere and self.referred:
+            return self.joined(self.rig.predict(u, effects, True))
         return self.joined(self.rig.predict(u, effects))
+
+    @cached_property
+    def referred(self) -> bool:
+        """Whether some runs are of a reference campaign."""
+        return not all(self.rig.new)
 
     @cached_property
     def partial(self) -> dict[int, tuple[int, Array]]:

@@ -119,14 +119,18 @@ class WheelRig:
 
     # ---- prediction ------------------------------------------------------------------------------
 
-    def predict(self, u: Array, effects: Sequence[Effect]) -> list[dict[str, Array]]:
+    def predict(
+        self, u: Array, effects: Sequence[Effect], everywhere: bool = False
+    ) -> list[dict[str, Array]]:
         value = {
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)
         }
         baseline = self._baseline(value)
         true = [
-            self._true(value, (*baseline, *effects) if new else baseline, new, campaign)
+            self._true(
+                value, (*baseline, *effects) if new or everywhere else baseline, new, campaign
+            )
             for new, campaign in self._campaigns
         ]
         read = self._read(np.hstack(true), value)

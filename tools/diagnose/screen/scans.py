@@ -117,25 +117,36 @@ def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
 # ---- what is searched --------------------------------------------------------------------------
 
 
-def families(stack: Stack, noise: Noise, surrogates: Surrogates) -> tuple[Family, ...]:
-    """Of every channel."""
+def families(
+    stack: Stack, noise: Noise, surrogates: Surrogates, acting: Bools | None = None
+) -> tuple[Family, ...]:
+    """Of every channel, on the values (N,) where they may act: those that may hold something new,
+    unless others are given.
+    """
+    acting = stack.new if acting is None else acting
     searched = []
     for channel in stack.rig.channels:
         for axis in lines.AXES:
             every = lines.frequencies(stack, channel, axis)
-            searched.append(waves(stack, noise, surrogates.residuals, channel, axis, every))
+            searched.append(waves(stack, noise, surrogates.residuals, channel, axis, every, acting))
             at = places(stack, channel, axis)
-            searched.append(steps(stack, noise, surrogates.residuals, channel, axis, at))
+            searched.append(steps(stack, noise, surrogates.residuals, channel, axis, at, acting))
     return tuple(family for family in searched if family.blocks and family.at.size)
 
 
 def waves(
-    stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, frequencies: Array
+    stack: Stack,
+    noise: Noise,
+    nulls: Array,
+    channel: str,
+    axis: str,
+    frequencies: Array,
+    acting: Bools | None = None,
 ) -> Family:
     """Waves of some frequencies (f,) [1/s, 1/m]; nulls (N, draws) whitened surrogates."""
     size, x = np.sqrt(2.0) * size_of(stack, channel), stack.covariate(axis)
     blocks = []
-    stretches = _stretches(stack, channel)
+    stretches = _stretches(stack, channel, stack.new if acting is None else acting)
     for index in stretches if frequencies.size else ():
         rows = _rows(stack.of(channel) & (stack.run == stack.run[index[0]]))
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
@@ -146,18 +157,26 @@ def waves(
     return Family(Shape(channel, (axis,), "wave"), frequencies, tuple(blocks), near)
 
 
-def _stretches(stack: Stack, channel: str) -> list[Index]:
-    """Those of runs in which something new may act."""
-    return [index for index in lines.stretches(stack, channel) if stack.new[index[0]]]
+def _stretches(stack: Stack, channel: str, acting: Bools) -> list[Index]:
+    """Those of the marked values (N,)."""
+    return [index for index in lines.stretches(stack, channel) if acting[index[0]]]
 
 
-def steps(stack: Stack, noise: Noise, nulls: Array, channel: str, axis: str, at: Array) -> Family:
+def steps(
+    stack: Stack,
+    noise: Noise,
+    nulls: Array,
+    channel: str,
+    axis: str,
+    at: Array,
+    acting: Bools | None = None,
+) -> Family:
     """Steps at some places (f,) [s, m]; nulls (N, draws) whitened surrogates."""
     shape = Shape(channel, (axis,), "step")
     if not at.size:
         return Family(shape, at, ())
     rows = _rows(stack.of(channel))
-    raw = size_of(stack, channel) * _risen(stack, rows, axis, at)[:, :, None]
+    raw = size_of(stack, channel) * _risen(stack, rows, axis, at, acting)[:, :, None]
     return Family(shape, at, (_block(noise, nulls, rows, raw),))
 
 
@@ -178,15 +197,14 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     return np.unique(0.5 * (ordered[beyond - 1] + ordered[beyond]))
 
 
-def _risen(stack: Stack, rows: slice, axis: str, at: Array) -> Array:
-    """(n, p) from 0 to 1 at each place while the wheel moves."""
-    x, moving = stack.covariate(axis)[rows], stack.covariate("speed")[rows] > 0.0
+def _risen(stack: Stack, rows: slice, axis: str, at: Array, acting: Bools | None = None) -> Array:
+    """(n, p) from 0 to 1 at each place while the wheel moves, on the values that may act."""
+    x, moving = stack.covariate(axis)[rows], (stack.covariate("speed") > 0.0)[rows]
+    where = (moving & (stack.new if acting is None else acting)[rows])[:, None]
     width = TUNING.screen.step_width * (
         float(np.ptp(x[moving])) if axis == "position" else TUNING.noise.stretch
     )
-    return np.asarray(
-        np.where(moving[:, None], 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0)
-    )
+    return np.asarray(np.where(where, 0.5 * (1.0 + np.tanh((x[:, None] - at) / width)), 0.0))
 
 
 def _rows(own: Bools) -> slice:
@@ -286,7 +304,7 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
         out[rows] = size * _risen(stack, rows, axis, np.array([shape.at]))
         return out
 
-    parts = _stretches(stack, shape.channel)
+    parts = _stretches(stack, shape.channel, stack.new)
     parts = [np.concatenate(parts)] if shape.shared else parts
     out = np.zeros((stack.size, 2 * len(parts)))
     for number, index in enumerate(parts):

@@ -13,7 +13,7 @@ largest of *all* these surprises in every null, however many were tried and howe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -47,6 +47,7 @@ class Screen:
     nulls:  (draws,) the largest surprise of all candidates.
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
+    habit:  the largest surprise of each candidate in a run of the reference (habit.py).
     """
 
     evidence: dict[Candidate, float]
@@ -56,6 +57,7 @@ class Screen:
     nulls: Array
     chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
+    habit: Mapping[Candidate, float] = field(default_factory=dict)
 
     @property
     def listed(self) -> dict[str, float]:
@@ -81,10 +83,19 @@ class Screen:
 
     def surprise(self, of: Candidate, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows for
-        this candidate.
+        this candidate, and beyond what the reference shows of it.
         """
         start, reach = self.usual[of]
-        return ((self.evidence[of] if evidence is None else evidence) - start) / reach
+        evidence = self.evidence[of] if evidence is None else evidence
+        return (evidence - start) / reach - TUNING.screen.habit * self.habit.get(of, 0.0)
+
+    def beside_reference(self, evidence: Mapping[Candidate, float]) -> Screen:
+        """The same where single runs of a reference campaign show some evidence of the candidates
+        [nats].
+        """
+        usual = {of: self.usual[of] for of in evidence if of in self.usual}
+        habit = {of: max((evidence[of] - s) / r, 0.0) for of, (s, r) in usual.items()}
+        return replace(self, habit=habit)
 
     @property
     def largest(self) -> tuple[Candidate, float]:

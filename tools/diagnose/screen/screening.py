@@ -9,7 +9,6 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.base import BaseFit
-from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures
@@ -19,10 +18,17 @@ from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
+from gritd.tools.diagnose.screen.habit import habits
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.ripples import loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
-from gritd.tools.diagnose.screen.screen import Screen, screen_signatures, tail_chance, whitened
+from gritd.tools.diagnose.screen.screen import (
+    Screen,
+    WhitenedSignature,
+    screen_signatures,
+    tail_chance,
+    whitened,
+)
 from gritd.tools.diagnose.tuning import TUNING
 
 # covariates over which no form of the model varies
@@ -63,7 +69,7 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     return Screening(
         base.problem,
         base.model,
-        form_freedoms(stack, noise),
+        base.forms,
         smooth_signatures(stack),
         families(stack, noise, drawn),
         drawn,
@@ -76,6 +82,8 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     first: the screen beside the base model, whose likeliest signatures alone are tried again.
     """
     problem, drawn = screening.problem, screening.surrogates
+    if problem.stack.referred and first is None:
+        return _screen_beside_reference(screening, model)
     signatures = [*_signatures(problem, model, first), *screening.functions]
     beside = without_harmonics(problem, model.fitted, drawn)
     searched = {family.shape: family.average(beside) for family in screening.families}
@@ -84,9 +92,33 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
 
     # whether there is a mismatch at all; beside an effect, explanations compete on even terms, and
     # with a reference campaign the noise's colour is not open
-    if model.names or not all(problem.stack.rig.new):
+    if model.names or problem.stack.referred:
         return screen
     return replace(screen, open=_open(screening, model, screen))
+
+
+def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
+    """Beside the model of both campaigns: every candidate in the new one, and in each run of the
+    reference; waves and steps in all of its runs.
+    """
+    problem, stack = screening.problem, screening.problem.stack
+    projection = model.fitted.projection(screening.surrogates)
+    effects = _signatures(problem, model, None, everywhere=True)
+    both = whitened(problem.noise, [*effects, *smooth_signatures(stack, everywhere=True)])
+
+    acting = np.where(stack.new, 1.0, 0.0)[:, None]
+    new = [
+        WhitenedSignature(
+            replace(s.signature, columns=s.signature.columns * acting), s.columns * acting
+        )
+        for s in both
+    ]
+    searched = {family.shape: family.average(projection) for family in screening.families}
+    screen = screen_signatures(projection, new, searched)
+
+    of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
+    shapes = {f.shape: float(f.average(projection)[0]) for f in of_reference}
+    return screen.beside_reference({**shapes, **habits(projection, both, stack)})
 
 
 def chance_of(
@@ -98,9 +130,11 @@ def chance_of(
     return {shape: tail_chance(mean[1:], float(mean[0])) for shape, mean in averages.items()}
 
 
-def _signatures(problem: Problem, model: Model, first: Screen | None) -> Iterator[Signature]:
+def _signatures(
+    problem: Problem, model: Model, first: Screen | None, everywhere: bool = False
+) -> Iterator[Signature]:
     """Signatures about the model's fit: all that there are at the first screen, later those that
-    were likeliest there.
+    were likeliest there; everywhere: in the reference campaign too.
     """
     stack, fitted = problem.stack, model.fitted
     for name, effect in stack.rig.effects.items():
@@ -113,7 +147,9 @@ def _signatures(problem: Problem, model: Model, first: Screen | None) -> Iterato
 
         prior = -np.log(max(len(tried), 1))
         for fixed in _worth(problem, model, effect, tried):
-            made = signature(stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
+            made = signature(
+                stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting, everywhere
+            )
             if made is not None:
                 yield replace(made, prior=prior)
 

@@ -14,6 +14,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
+from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
@@ -152,18 +153,19 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
 def promises(search: Search, model: Model) -> list[Promise]:
     """Of every effect that is not in the model, the most promising first."""
     effects = search.problem.stack.rig.effects
-    found = []
+    found, projection = [], model.fitted.projection()
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
-        tried = list(_tried(search, model, effects[name]))
+        tried = list(_tried(search, model, effects[name], projection))
         if tried:
             found.append(max(tried, key=lambda promise: promise.gain))
     return sorted(found, key=lambda promise: -promise.gain)
 
 
-def _tried(search: Search, model: Model, effect: type[Effect]) -> Iterator[Promise]:
+def _tried(
+    search: Search, model: Model, effect: type[Effect], projection: Projection
+) -> Iterator[Promise]:
     """The promise of an effect for each of its likeliest signatures."""
     fitted, problem = model.fitted, search.problem
-    projection = fitted.projection()
     for fixed in search.first.fixed[effect.name][: TUNING.search.again]:
         made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
         if made is None:
@@ -200,17 +202,28 @@ def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
 
 def _retested(search: Search) -> Search:
     """With the best model less each of its effects, if that was not fitted yet."""
-    best, effects = search.best(), search.problem.stack.rig.effects
-    for leave in best.names[:-1]:
-        kept = tuple(n for n in best.names if n != leave)
-        if kept and not search.has(kept):
-            types = tuple(effects[n] for n in kept)
-            free = free_of(types)
-            begins = (best.fitted.u, np.array([_at(best, f) for f in free]))
-            screening = search.screening
-            less = fit_model(screening.problem, screening.forms, types, free, begins, best.sizes)
+    best = search.best()
+    for leave in best.names[:-1] if len(best.names) > 1 else ():
+        less = without(search, best, leave)
+        if less not in search.models:
             search = replace(search, models=(*search.models, less))
     return search
+
+
+def without(search: Search, model: Model, name: str) -> Model:
+    """A model less one of its effects: of the search, or fitted for the question."""
+    kept = tuple(n for n in model.names if n != name)
+    if not kept:
+        return search.bare
+    known = [m for m in search.models if set(m.names) == set(kept)]
+    if known:
+        return max(known, key=lambda m: m.evidence)
+
+    types = tuple(search.problem.stack.rig.effects[n] for n in kept)
+    free = free_of(types)
+    begins = (model.fitted.u, np.array([_at(model, f) for f in free]))
+    screening = search.screening
+    return fit_model(screening.problem, screening.forms, types, free, begins, model.sizes)
 
 
 def _at(model: Model, wanted: Free) -> float:

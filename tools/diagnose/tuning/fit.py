@@ -113,6 +113,21 @@ class Fit:
         3.0, "-", "prior standard deviation of what is projected out, in expected sizes"
     )
 
+    # --- shared.py: what the reference shows already ---
+    shared_sizes: tuple[float, ...] = tuned(
+        (0.0, 0.3, 1.0, 3.0), "expected sizes", "of the library's effects in both campaigns"
+    )
+    shared_prior: tuple[float, ...] = tuned(
+        (0.25, 0.25, 0.25, 0.25), "prior", "probability of each of the sizes", "judgement"
+    )
+    shared_least: float = tuned(
+        0.3, "squares of the noise", "a direction that shows less is left out", "run time"
+    )
+    shared_most: int = tuned(150, "directions", "of all effects, at most", "run time")
+    standing_ripple: float = tuned(
+        15.0, "nats", "a ripple of the reference gains: some hundred orders are tried"
+    )
+
     # --- signatures.py ---
     highest_order: float = tuned(200.0, "1/turn", "ripples")
     order_nyquist: float = tuned(0.45, "-", "of the grid's rate: faster ripples are damped", DAMPED)

@@ -49,6 +49,11 @@ class Screen:
     colour_sweeps: int = tuned(2, "sweeps", "over the channels")
     whitened_at_once: int = tuned(8_000_000, "numbers", "whitened at once", "memory")
 
+    # --- habit.py ---
+    habit: float = tuned(
+        2.0, "-", "times the surprise that single runs of the reference show of the same kind"
+    )
+
     # --- scans.py ---
     step_places: int = tuned(48, "places", "of a step along an axis", "run time")
     step_values: int = tuned(8, "values", "on either side of a step")

@@ -11,6 +11,13 @@ from gritd.tools.diagnose.tuning.field import tuned
 class Verdict:
     """When a name is accepted, and when nothing is."""
 
+    # --- breadth.py: learnt from an opened batch, whose plants have forms of their own ---
+    stretches: int = tuned(24, "stretches", "of all runs, at least", "run time")
+    stretches_of_a_run: int = tuned(3, "stretches", "at least", "run time")
+    best_stretches: int = tuned(2, "stretches", "where an effect gains most: they do not count")
+    broad: float = tuned(3.0, "nats", "that an effect must gain in all others: twenty to one")
+    tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
+
     # --- decide.py ---
     alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be told apart")
     explained_share: float = tuned(

@@ -8,7 +8,7 @@ any.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.verdict.breadth import Breadth
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
 from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
@@ -32,27 +33,37 @@ def decide(search: Search) -> Decision:
         )
         return Decision(verdict, search.bare, 1.0, None, _quiet(found), 0.0, {})
 
-    best = search.best()
+    evidence = Breadth(search).evidence()
+    best = max(search.models[1:], key=lambda m: search.weight(m) - m.evidence + evidence[m])
     alone = nameless_beside(search.screening, search.bare)
     beside = nameless_beside(search.screening, best) if best.names else alone
-    return judged(search, weigh(search, alone, beside), beside, learnt(len(_candidates(search))))
+
+    weighed = weigh(search, best, evidence, alone, beside)
+    return judged(search, weighed, beside, learnt(len(_candidates(search))))
 
 
 def _candidates(search: Search) -> Sequence[str]:
     return list(search.problem.stack.rig.effects)
 
 
-def weigh(search: Search, alone: Nameless | None, beside: Nameless | None) -> list[Weighed]:
+def weigh(
+    search: Search,
+    best: Model,
+    evidence: Mapping[Model, float],
+    alone: Nameless | None,
+    beside: Nameless | None,
+) -> list[Weighed]:
     """All explanations with their evidence [nats above the bare model].
 
-    alone, beside: functions without a name in the place of effects, and beside the best ones.
+    best: the likeliest model; evidence: of every model, as it counts (breadth.py); alone, beside:
+    functions without a name in the place of effects, and beside the best ones.
     """
-    bare, best = search.bare, search.best()
-    every = [Weighed(m, m.names, False, m.evidence - bare.evidence) for m in search.models[1:]]
+    bare = search.bare.evidence
+    every = [Weighed(m, m.names, False, evidence[m] - bare) for m in search.models[1:]]
     if alone is not None:
         every.append(Weighed(alone.model, (), True, alone.gain))
     if beside is not None and best.names:
-        gain = best.evidence - bare.evidence + beside.gain
+        gain = evidence[best] - bare + beside.gain
         every.append(Weighed(beside.model, best.names, True, gain))
     return every
 
@@ -102,7 +113,7 @@ def taken_share(search: Search, model: Model) -> float:
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
     shared = np.zeros(fitted.residual.size)
-    if not all(search.problem.stack.rig.new):  # what both campaigns do is no misfit
+    if search.problem.stack.referred:  # what both campaigns do is no misfit
         count = fitted.carried.shape[1]
         shared = fitted.jacobian[:, -count:] @ fitted.slack[-count:] if count else shared
     left = [f.residual - shared for f in (off, fitted)]

@@ -1,0 +1,63 @@
+"""The base model of two campaigns: what a reference shows is this rig, and nothing new.
+
+The reference has three things of its own that no explanation is asked for: a discrepancy of form,
+the library's effects in both campaigns (shared.py), and noise. Noise is what the reference leaves
+beside the other two as they were *fitted*: what their priors do not let them follow counts as
+noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.base import BaseFit, refit_beside
+from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.shared import rippling_columns, shared_columns, shared_freedoms
+from gritd.tools.diagnose.noise.colour import Noise
+from gritd.tools.diagnose.noise.estimate import estimate_of_reference, louder
+from gritd.tools.diagnose.noise.saturated import Explainable
+
+
+def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
+    """From a rough fit of both campaigns: first in the least noise that the reference may have,
+    then in what the fit left of it.
+    """
+    stack = rough.problem.stack
+    shared = shared_columns(stack, rough.fitted.u, rough.fitted.predicted)
+    none = np.zeros((stack.size, 0))
+    noise = _least_noise(rough, shared, none, rng)
+    first = refit_beside(rough, noise, shared_freedoms(noise, shared, none))
+
+    ripples = rippling_columns(stack, left(first))
+    again = first
+    if ripples.shape[1]:
+        noise = _least_noise(rough, shared, ripples, rng)
+        again = refit_beside(first, noise, shared_freedoms(noise, shared, ripples))
+
+    nothing = Explainable(none, none)
+    predicted = again.fitted.predicted
+    found = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
+    noise = louder(noise, found)
+    return refit_beside(again, noise, shared_freedoms(noise, shared, ripples))
+
+
+def left(base: BaseFit) -> Array:
+    """What a fit leaves (N,), its freedoms counted, in the channels' units."""
+    fitted = base.fitted
+    count = fitted.carried.shape[1]
+    freedoms = fitted.carried @ fitted.slack[-count:] if count else 0.0
+    return np.asarray(base.problem.stack.measured - fitted.predicted - freedoms)
+
+
+def _least_noise(rough: BaseFit, shared: Array, ripples: Array, rng: np.random.Generator) -> Noise:
+    """What no function of the form, no effect and no constant could explain of the reference."""
+    stack, before = rough.problem.stack, rough.problem.noise
+    forms = [f.columns for f in form_freedoms(stack, before)]
+    whole = np.column_stack([ripples, *forms])
+    leading = np.column_stack((rough.fitted.raw, shared))
+    predicted = rough.fitted.predicted
+    residual = stack.measured - predicted
+    return estimate_of_reference(
+        stack, predicted, residual, Explainable(leading, whole), before, rng
+    )

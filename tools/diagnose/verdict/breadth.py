@@ -1,0 +1,93 @@
+"""Whether an effect explains the recordings, or a few stretches of them.
+
+The evidence of an effect adds up over all values as if the rest of the model were exact. It is not,
+and a peculiar stretch can pay for an effect that is not there. So each effect of a likely model is
+judged once more by prediction: every run is cut into stretches, each stretch is predicted by the
+model with and without the effect as the other stretches tell them, and the gains are added without
+those of the two stretches where the effect gains most. What is there gains elsewhere too
+(leave-one-group-out prediction: Vehtari, Gelman and Gabry 2017, Stat. Comput. 27, 1413-1432).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.heldout import held_out
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.search.search import Search, without
+from gritd.tools.diagnose.tuning import TUNING
+
+
+class Breadth:
+    """The test, for the models of one search."""
+
+    def __init__(self, search: Search) -> None:
+        self._search = search
+        self._stretches = stretches(search.problem.stack)
+        self._density: dict[Model, Array] = {}
+        self._less: dict[tuple[Model, str], Model] = {}
+
+    def evidence(self) -> Mapping[Model, float]:
+        """Of every model of the search, its evidence; a model with an effect that is not broad has
+        no more than without that effect.
+        """
+        counted = {model: model.evidence for model in self._search.models}
+        for model in sorted(self._search.models[1:], key=lambda m: -self._search.weight(m)):
+            if self._matters(model, counted):
+                narrow = [name for name in model.names if not self.broad(model, name)]
+                less = [counted_of(counted, self.without(model, name)) for name in narrow]
+                counted[model] = min([model.evidence, *less])
+        return counted
+
+    def broad(self, model: Model, name: str) -> bool:
+        """Whether an effect of a model gains in more than two stretches, and more than single runs
+        of a reference show of it.
+        """
+        gains = np.sort(self.gains(model, name))
+        rest = gains[: -TUNING.verdict.best_stretches]
+        usual = TUNING.screen.habit * self._search.first.habit.get(name, 0.0)
+        return bool(rest.size == 0 or rest.sum() > TUNING.verdict.broad + usual)
+
+    def gains(self, model: Model, name: str) -> Array:
+        """Log density (b,) of each stretch given the others, above that without the effect."""
+        return self._predicted(model) - self._predicted(self.without(model, name))
+
+    def without(self, model: Model, name: str) -> Model:
+        """The model less one of its effects."""
+        if (model, name) not in self._less:
+            self._less[model, name] = without(self._search, model, name)
+        return self._less[model, name]
+
+    def _matters(self, model: Model, counted: Mapping[Model, float]) -> bool:
+        """Whether the model is nearly as likely as the best one so far, as they count."""
+        search = self._search
+        best = max(search.weight(m) - m.evidence + counted[m] for m in search.models[1:])
+        return search.weight(model) > best - TUNING.verdict.tested
+
+    def _predicted(self, model: Model) -> Array:
+        if model not in self._density:
+            self._density[model] = held_out(model.fitted, self._stretches).log_density
+        return self._density[model]
+
+
+def counted_of(counted: Mapping[Model, float], model: Model) -> float:
+    """Of a model that may not have been part of the search."""
+    return counted.get(model, model.evidence)
+
+
+def stretches(stack: Stack) -> list[Bools]:
+    """Equal parts of the runs in which candidates act, in time."""
+    runs = np.flatnonzero(stack.rig.new)
+    count = max(-(-TUNING.verdict.stretches // len(runs)), TUNING.verdict.stretches_of_a_run)
+    found = []
+    for number in runs:
+        own = stack.run == number
+        first, last = stack.time[own].min(), stack.time[own].max()
+        share = (stack.time - first) / max(float(last - first), 1e-9)
+        part = np.minimum((count * share).astype(int), count - 1)
+        found += [own & (part == k) for k in range(count)]
+    return [part for part in found if part.any()]

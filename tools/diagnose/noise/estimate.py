@@ -105,7 +105,7 @@ def estimate_of_reference(
     predicted: (N,) by the equations.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
-    found = [
+    estimates = [
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
@@ -113,7 +113,7 @@ def estimate_of_reference(
     return Noise(
         stack,
         colours,
-        tuple(f[1:] for f in found),
+        tuple(f[1:] for f in estimates),
         uncertain(stack, predicted, residual, colours),
         np.zeros((stack.size, 0)),
     )

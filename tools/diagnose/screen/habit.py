@@ -3,7 +3,8 @@
 A reference that its discrepancy of form does not quite follow shows evidence for anything that acts
 in one of its runs alone. The same kind of evidence is no news in the new campaign. So each
 candidate is tested in every run of the reference as it is tested in the new campaign, and the
-alarm counts from the largest surprise found there.
+alarm counts from the largest surprise found there. A ripple is tested in all of these runs
+together: it may be of one size and phase in all.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_evidence
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate
+from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.screen.screen import WhitenedSignature
 
@@ -24,20 +26,26 @@ from gritd.tools.diagnose.screen.screen import WhitenedSignature
 def habits(
     projection: Projection, everywhere: Sequence[WhitenedSignature], stack: Stack
 ) -> Mapping[Candidate, float]:
-    """Of every candidate the largest log Bayes factor in a single run of the reference.
+    """Of every candidate the largest log Bayes factor in a single run of the reference, of a ripple
+    that in all of its runs.
 
     everywhere: signatures that act in both campaigns.
     """
     columns = np.column_stack([s.columns for s in everywhere])
     ends = np.cumsum([s.columns.shape[1] for s in everywhere])
     found: dict[Candidate, float] = {}
-    for number in np.flatnonzero(~np.array(stack.rig.new)):
-        a, b = _in_run(projection, columns, stack.run == number)
+    effects = stack.rig.effects
+    single = [stack.run == number for number in np.flatnonzero(~np.array(stack.rig.new))]
+    for number, rows in enumerate([~stack.new, *single]):
+        a, b = _in_run(projection, columns, rows)
         weighed: dict[Candidate, list[float]] = {}
         for s, end in zip(everywhere, ends, strict=True):
+            of = s.signature.of
+            if number == 0 and not (isinstance(of, str) and order_of(effects[of])):
+                continue
             own = slice(end - s.columns.shape[1], end)
             value = float(log_evidence(a[own, own], b[own], s.signature.sign))
-            weighed.setdefault(s.signature.of, []).append(value + s.signature.prior)
+            weighed.setdefault(of, []).append(value + s.signature.prior)
         for of, values in weighed.items():
             found[of] = max(found.get(of, 0.0), float(logsumexp(values)))
     return found

@@ -117,7 +117,9 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     screen = screen_signatures(projection, new, searched)
 
     of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
-    shapes = {f.shape: float(f.average(projection)[0]) for f in of_reference}
+    shapes: dict[Candidate, float] = {
+        f.shape: float(f.average(projection)[0]) for f in of_reference
+    }
     return screen.beside_reference({**shapes, **habits(projection, both, stack)})
 
 

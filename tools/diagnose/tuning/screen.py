@@ -50,9 +50,7 @@ class Screen:
     whitened_at_once: int = tuned(8_000_000, "numbers", "whitened at once", "memory")
 
     # --- habit.py ---
-    habit: float = tuned(
-        2.0, "-", "times the surprise that single runs of the reference show of the same kind"
-    )
+    habit: float = tuned(2.0, "-", "times the surprise that the reference shows of the same kind")
 
     # --- scans.py ---
     step_places: int = tuned(48, "places", "of a step along an axis", "run time")

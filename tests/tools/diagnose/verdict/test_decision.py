@@ -152,6 +152,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
         objective,
         np.zeros((30, 0)),
         np.zeros(2, bool),
+        np.zeros((0, 0)),
     )
 
     constant, strength = np.linspace(-4.0, 5.0, 300), np.linspace(0.0, 8.0, 400)

@@ -1,0 +1,57 @@
+"""What a reference shows already: fewer columns with the same covariance, and ripples that stand
+out.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gritd.estimator.effects import make
+from gritd.tools.diagnose.fit.shared import _reduced, rippling_columns
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+
+def test_the_reduced_columns_have_the_same_covariance() -> None:
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((200, 6)) @ rng.standard_normal((6, 40))
+    raw, whitened = _reduced(3.0 * columns, columns)
+    assert raw.shape == whitened.shape == (200, 6)
+    np.testing.assert_allclose(whitened @ whitened.T, columns @ columns.T, atol=1e-8)
+    np.testing.assert_allclose(raw, 3.0 * whitened, atol=1e-8)
+
+
+def _columns(acting: tuple[Any, ...], seed: int) -> tuple[Stack, Any]:
+    """Ripples of two campaigns of which nothing is new, about a prediction without ripples."""
+    before, after = (
+        record(plan(seed=s, seconds=60.0, standstill=False), acting) for s in (seed, seed + 1)
+    )
+    stack = Stack(WheelRig([*before, *after], settings(), len(before), "same"))
+    smooth = Stack(
+        WheelRig(
+            [*record(plan(seed=seed, seconds=60.0, standstill=False), ())] * 2,
+            settings(),
+            3,
+            "same",
+        )
+    )
+    residual = stack.measured - smooth.measured
+    return stack, rippling_columns(stack, residual)
+
+
+def test_a_ripple_of_the_reference_is_of_its_size_in_both() -> None:
+    ripple = make("gear_ripple", {"ripple_cos": 0.3, "ripple_sin": 0.0, "order": 12.0})
+    stack, columns = _columns((ripple,), 5)
+    torque = stack.of("torque")
+    runs = {int(stack.run[np.flatnonzero(column)[0]]) for column in columns.T if column.any()}
+    assert runs == set(range(6))
+    loudest = np.abs(columns[torque]).max()
+    assert 0.2 < loudest < 0.45
+
+
+def test_noise_does_not_ripple() -> None:
+    assert _columns((), 7)[1].shape[1] == 0

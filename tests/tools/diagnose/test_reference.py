@@ -1,0 +1,62 @@
+"""Two campaigns of a rig that is not the library's: what both do is no news, and what is new has a
+name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.method import diagnose, fit_base
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen.screening import prepare_screening, screen_beside
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+# a rig with a gear that rubs and ripples, and a wheel whose stress peaks elsewhere
+HABITS = (
+    make("gear_ripple", {"ripple_cos": 0.15, "ripple_sin": 0.1, "order": 23.0}),
+    make("load_dependent_friction", {"arm": 0.002}),
+    make("stress_peak_shift", {"share": 0.12}),
+)
+NEW = make("viscous_friction", {"damping": 0.8})
+
+
+def rig_of(habits: Sequence[Effect], new: Sequence[Effect]) -> WheelRig:
+    """A reference campaign with habits, and one with something new beside them."""
+    before = record(plan(seed=3, seconds=24.0, wrench=False), habits)
+    after = record(plan(seed=4, seconds=24.0, wrench=False), (*habits, *new))
+    moved = [replace(s, name=f"new-{s.name}") for s in after]
+    return WheelRig([*before, *moved], settings(), len(before), "same")
+
+
+def judged(new: Sequence[Effect]) -> Diagnosis:
+    return diagnose(rig_of(HABITS, new))
+
+
+def test_what_both_campaigns_do_is_no_news() -> None:
+    assert judged(()).verdict == "consistent"
+
+
+def test_what_is_new_is_named_alone() -> None:
+    found = judged((NEW,))
+    assert found.verdict == "explained"
+    assert [h.effect for h in found.hypotheses if h.accepted] == ["viscous_friction"]
+
+
+def _rng() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+def test_the_reference_tells_what_its_single_runs_show() -> None:
+    """What a run of the reference shows counts from where NEW is surprising."""
+    base = fit_base(rig_of(HABITS, (NEW,)), np.random.default_rng(0))
+    screen = screen_beside(prepare_screening(base, _rng()), base.model)
+    loud = max(screen.evidence, key=lambda of: screen.evidence[of])
+    raised = screen.beside_reference({loud: screen.evidence[loud]})
+    assert raised.surprise(loud) < 0.0 < screen.surprise(loud)

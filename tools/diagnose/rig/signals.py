@@ -23,10 +23,10 @@ from gritd.estimator.recording.mcapfile import RecordingError, opened
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.diagnose.tuning import TUNING
 
 NS = 1e-9
 PIECE = 1 << 20  # [bytes] of a file read at once
-LONGEST = 86_400.0  # [s] of a recording; what is sought over its time grows with this
 Series = tuple[Array, Array]  # times [s] in order, and values
 
 
@@ -161,11 +161,11 @@ def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tupl
     """Edges [s] of the grid where both encoders speak, and what of the recording it leaves out."""
     beats = np.sort(np.concatenate([time for time, _ in encoders]))
     start, end = max(t[0] for t, _ in encoders), min(t[-1] for t, _ in encoders)
-    within = beats[beats <= min(end, start + LONGEST)]
+    within = beats[beats <= min(end, start + TUNING.rig.longest)]
     left_out = ""
-    if end > start + LONGEST:
+    if end > start + TUNING.rig.longest:
         end = within[-1]
-        left_out = f"Nothing is used of {recording.path} from {LONGEST:.0f} s after its beginning."
+        left_out = f"Nothing is used of {recording.path} from {TUNING.rig.longest:.0f} s after its beginning."
 
     if (end - start) * rate < 5:
         found = f"{max(end - start, 0.0):.2f} s of both encoders together"

@@ -84,6 +84,11 @@ class Rig:
     proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")
     proposal_rate: float = tuned(10.0, "Hz", "grid of a foreseen experiment")
 
+    # --- signals.py ---
+    longest: float = tuned(
+        86_400.0, "s", "of a recording: what is sought over its time grows with this", "memory"
+    )
+
     # --- states.py, drive.py, proposals.py ---
     moving: float = tuned(0.05, "-", "of the largest value: below it a speed or load is at rest")
     creep: float = tuned(0.05, "-", "of the usual rim speed: below it the wheel does not drive")

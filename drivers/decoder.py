@@ -37,7 +37,7 @@ class Decoder:
         one after the other.
         """
         steps = [(clock.steps, clock.step) for clock in self._clocks.values()]
-        return max(steps, default=(0, 0.0), key=lambda found: found[0])
+        return max(steps, default=(0, 0.0), key=lambda of: of[0])
 
     def decode(self, received: int, data: bytes) -> list[Reading]:
         """The readings completed by a chunk that came at `received` [ns]. Never raises on any
@@ -88,8 +88,8 @@ class Decoder:
             if frame.device_us is not None:
                 timed.setdefault(frame.key, []).append(place)
         for key, places in timed.items():
-            found = self._mapped(key, [frames[i].device_us or 0 for i in places], received)
-            for place, stamp in zip(places, found, strict=True):
+            mapped = self._mapped(key, [frames[i].device_us or 0 for i in places], received)
+            for place, stamp in zip(places, mapped, strict=True):
                 stamps[place] = stamp
         return stamps
 

@@ -82,8 +82,8 @@ def _evidence(information: Array, score: Array) -> Array:
     # rounding can leave a size below zero where the change would say nothing
     sizes = np.maximum(sizes, 0.0)
     along = np.einsum("sij,si->sj", axes, score)
-    found: Array = 0.5 * (along**2 / (1.0 + sizes) - np.log1p(sizes)).sum(axis=1)
-    return found
+    evidence: Array = 0.5 * (along**2 / (1.0 + sizes) - np.log1p(sizes)).sum(axis=1)
+    return evidence
 
 
 def _product(one: Array, other: Array) -> Array:

@@ -79,11 +79,11 @@ class Texts:
 
     def table(self) -> dict[str, str]:
         entries = Texts(self.blob())
-        found: dict[str, str] = {}
+        table: dict[str, str] = {}
         while entries.position < len(entries.data):
             key = entries.text()
-            found[key] = entries.text()
-        return found
+            table[key] = entries.text()
+        return table
 
     def finish(self) -> None:
         if self.position != len(self.data):
@@ -118,7 +118,8 @@ def _decompress(block: Block, data: bytes) -> bytes:
                 lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=block.size + 1)
             )
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-        if "memory" in str(error).lower():
+        # zstd also says "too much memory" of a damaged head that asks for a huge window: no want
+        if "not enough memory" in str(error).lower():
             raise MemoryError(str(error)) from None
         raise Damaged(f"cannot be unpacked: {error}") from None
     if block.compression:
@@ -178,11 +179,11 @@ def _indexed(file: BinaryIO, block: Block) -> Starts:
         return np.empty(0, np.int64)
     file.seek(first)
     data = file.read(end - first)
-    found = []
+    starts = []
     for _, start, stop in records(data):
-        found.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
+        starts.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
     return np.sort(
-        np.concatenate(found).astype(np.int64)
+        np.concatenate(starts).astype(np.int64)
     )  # one that is too large becomes negative, and stands first
 
 

@@ -87,19 +87,17 @@ def _require(path: Path, known: Topic, codec: Codec | None) -> None:
             f"{path}: {known.name}: not CDR with a flat ros2msg schema; expected {expected}"
         )
     for name, kind, _ in known.fields:
-        found = dict(zip(codec.names, codec.kinds, strict=True)).get(name)
-        if found is None:
+        held = dict(zip(codec.names, codec.kinds, strict=True)).get(name)
+        if held is None:
             raise RecordingError(f"{path}: {known.name}: no field {name!r}; expected {expected}")
-        if not _fits(found, kind):
-            raise RecordingError(
-                f"{path}: {known.name}: field {name!r} is {found}; expected {kind}"
-            )
+        if not _fits(held, kind):
+            raise RecordingError(f"{path}: {known.name}: field {name!r} is {held}; expected {kind}")
 
 
-def _fits(found: str, expected: str) -> bool:
+def _fits(held: str, expected: str) -> bool:
     """Whether values of one ROS type can stand for another without becoming something else."""
-    if found == expected:
+    if held == expected:
         return True
-    if found not in CODES or expected not in CODES:
-        return {found, expected} == {TIME, "int64"}
-    return np.can_cast(np.dtype(CODES[found]), np.dtype(CODES[expected]), "same_kind")
+    if held not in CODES or expected not in CODES:
+        return {held, expected} == {TIME, "int64"}
+    return np.can_cast(np.dtype(CODES[held]), np.dtype(CODES[expected]), "same_kind")

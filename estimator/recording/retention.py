@@ -20,7 +20,7 @@ def sweep(folder: Path) -> list[Path]:
     A draft with messages had its name, and a power cut took it back: it gets it again. Those are
         returned.
     """
-    found = []
+    renamed = []
     for draft in sorted(folder.glob(f".*.mcap{DRAFT}")):
         path = draft.with_name(draft.name[1:].removesuffix(DRAFT))
         with suppress(OSError):  # one that cannot be read is left for whoever can
@@ -29,8 +29,8 @@ def sweep(folder: Path) -> list[Path]:
             if not _messages(draft):
                 draft.unlink()
             elif not os.path.lexists(path):
-                found.append(draft.rename(path))
-    return found
+                renamed.append(draft.rename(path))
+    return renamed
 
 
 def _messages(draft: Path) -> bool:
@@ -50,12 +50,12 @@ def trim(folder: Path, cap: float, open_files: Collection[Path]) -> Iterator[Pat
     Raises OSError where the folder cannot be read; where a file cannot be deleted, after all the
     others were tried.
     """
-    found = sorted(_sizes(folder))
+    stored = sorted(_sizes(folder))
     kept = {path.absolute() for path in open_files}
-    excess = sum(size for _, size, _ in found) - cap
+    excess = sum(size for _, size, _ in stored) - cap
     failure = None
 
-    for _, size, path in found:
+    for _, size, path in stored:
         if excess <= 0:
             break
         if path.absolute() in kept:

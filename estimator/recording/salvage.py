@@ -150,14 +150,14 @@ class _Check:
         there twice.
         """
         numbers = chunk.heads["sequence"]
-        found = {
+        ranges = {
             channel: (int(numbers[own[0]]), int(numbers[own[-1]]), len(own))
             for channel, own in chunk.groups.items()
         }
-        if numbered and self._sequence.repeated(found):
+        if numbered and self._sequence.repeated(ranges):
             self._recording.misplaced += 1
             raise Damaged("it stands there twice")
-        if not self._sequence.add(found) and numbered:
+        if not self._sequence.add(ranges) and numbered:
             self._recording.misplaced += 1
             self._recording.damage.append(
                 f"byte {block.start}: chunk of {block.stored} bytes is not in its place: its"

@@ -53,9 +53,9 @@ def line(error: BaseException) -> str:
 
 
 def _is_want(error: BaseException) -> bool:
-    said = str(error).lower()
+    message = str(error).lower()
     short = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
-    return short or any(words in said for words in WORDS)
+    return short or any(words in message for words in WORDS)
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

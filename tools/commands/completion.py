@@ -40,18 +40,18 @@ def main(argv: Sequence[str]) -> int:
 
 def words() -> dict[str, list[str]]:
     """Command → what may follow it beside files: its options, and for some its names."""
-    found = {name: options_of(module) for name, (module, _) in COMMANDS.items()}
-    found["effects"] += list(EFFECTS)
-    found["completion"] += list(HOW)
-    return found
+    options = {name: options_of(module) for name, (module, _) in COMMANDS.items()}
+    options["effects"] += list(EFFECTS)
+    options["completion"] += list(HOW)
+    return options
 
 
 def options_of(module: str) -> list[str]:
     """The options that a command's help names."""
-    said = io.StringIO()
-    with suppress(SystemExit), redirect_stdout(said):  # so --help ends
+    help_text = io.StringIO()
+    with suppress(SystemExit), redirect_stdout(help_text):  # so --help ends
         importlib.import_module(module).main(["--help"])
-    return sorted({*OPTION.findall(said.getvalue())})
+    return sorted({*OPTION.findall(help_text.getvalue())})
 
 
 def bash(known: Mapping[str, Sequence[str]]) -> str:

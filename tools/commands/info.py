@@ -50,17 +50,17 @@ def main(argv: Sequence[str]) -> int:
 
 def told(recordings: Sequence[Recording]) -> Iterator[str]:
     """A run over all its parts, in lines."""
-    first, found = recordings[0], summary(recordings)
+    first, of_run = recordings[0], summary(recordings)
     size = sum(recording.path.stat().st_size for recording in recordings)
     yield (
-        f"{first.path}: {_clock(found.start)}, {found.duration:.1f} s, "
-        f"{sum(topic.messages for topic in found.topics)} messages, {size / 1e6:.1f} MB"
+        f"{first.path}: {_clock(of_run.start)}, {of_run.duration:.1f} s, "
+        f"{sum(topic.messages for topic in of_run.topics)} messages, {size / 1e6:.1f} MB"
         + (f", {len(recordings)} parts" if len(recordings) > 1 else "")
     )
     yield from _run(first)
     yield from _configuration(first)
     yield ""
-    yield from _topics(found)
+    yield from _topics(of_run)
     yield ""
     yield from _condition(recordings)
     yield from _filter(first)
@@ -114,10 +114,10 @@ def _testbed(settings: Settings) -> Iterator[str]:
     )
 
 
-def _topics(found: RunSummary) -> Iterator[str]:
+def _topics(of_run: RunSummary) -> Iterator[str]:
     """Rate and gaps of every topic; a gap is more than five usual distances of two messages."""
     yield f"{'topic':24}{'messages':>10}{'rate':>12}{'gaps':>6}   longest"
-    for topic in found.topics:
+    for topic in of_run.topics:
         rate = f"{topic.rate:.4g} Hz" if topic.rate else "–"
         longest = f"{topic.longest * 1e3:.0f} ms from {topic.at:.1f} s" if topic.rate else ""
         yield (

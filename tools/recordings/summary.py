@@ -47,14 +47,14 @@ def summary(recordings: Sequence[Recording]) -> RunSummary:
 
 def times_of(recordings: Sequence[Recording]) -> dict[str, NDArray[np.int64]]:
     """Receive times (n,) [ns] of every topic's messages, ascending."""
-    found: dict[str, list[NDArray[np.int64]]] = {}
+    pieces_of: dict[str, list[NDArray[np.int64]]] = {}
     for recording in recordings:
         for chunk in recording.chunks():
             for channel, own in chunk.groups.items():
                 times = chunk.heads["log_time"][own].astype(np.int64)
-                found.setdefault(recording.sources[channel].topic.name, []).append(times)
+                pieces_of.setdefault(recording.sources[channel].topic.name, []).append(times)
 
-    return {topic: np.sort(np.concatenate(pieces)) for topic, pieces in found.items()}
+    return {topic: np.sort(np.concatenate(pieces)) for topic, pieces in pieces_of.items()}
 
 
 def topic_summary(topic: str, times: NDArray[np.int64], start: int) -> TopicSummary:

@@ -47,8 +47,10 @@ def connected(given: str | None) -> socket.socket:
     if len(answering) > 1:
         for _, connection in answering:
             connection.close()
-        found = ", ".join(str(path) for path, _ in answering)
-        raise CommandError(f"found {len(answering)} daemons; expected --socket with one of {found}")
+        sockets = ", ".join(str(path) for path, _ in answering)
+        raise CommandError(
+            f"found {len(answering)} daemons; expected --socket with one of {sockets}"
+        )
     return answering[0][1]
 
 
@@ -56,8 +58,8 @@ def places() -> list[Path]:
     """Where a daemon may listen: the usual places, and every socket of that name that some process
     of this computer has open.
     """
-    found = {path.resolve(): path for path in (*PLACES, *_listening()) if path.exists()}
-    return list(found.values())
+    sockets = {path.resolve(): path for path in (*PLACES, *_listening()) if path.exists()}
+    return list(sockets.values())
 
 
 def _listening() -> list[Path]:

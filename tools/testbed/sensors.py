@@ -62,13 +62,13 @@ def sent(
         "motor_temperature": np.full(time.shape, AMBIENT),
     }
 
-    found = {}
+    streams = {}
     for name, channel in settings.channels.items():
         some = slice(None, None, SPARSE if name == "motor_temperature" else 1)
-        found[name] = _channel(channel, time[some], values[name][some], rng)
+        streams[name] = _channel(channel, time[some], values[name][some], rng)
     if settings.wrench is not None:
-        found["wrench"] = _wrench(settings.wrench, time, response, rng)
-    return found
+        streams["wrench"] = _wrench(settings.wrench, time, response, rng)
+    return streams
 
 
 def _channel(channel: Channel, time: Array, physical: Array, rng: np.random.Generator) -> Sent:

@@ -137,10 +137,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
 
     cases = [case for path in arguments.paths for case in read(path)]
-    by, score = learn(cases)
+    by, mean_log_truth = learn(cases)
     table = {name: value for name, value in asdict(by).items() if name != "candidates"}
     text = json.dumps(
-        table | {"cases": len(cases), "score": score, "note": arguments.note}, indent=1
+        table | {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}, indent=1
     )
     print(text)
     if arguments.out is not None:

@@ -52,7 +52,7 @@ def test_emps_names_the_friction_and_recovers_the_published_parameters(tmp_path:
         "Fc",
         "Does it say that something remains",
     ):
-        assert checks[question].met, f"{question}: {checks[question].found}"
+        assert checks[question].met, f"{question}: {checks[question].answer}"
     assert checks["Is the force of the unseen log predicted better"].met
 
 

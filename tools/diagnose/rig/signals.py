@@ -165,7 +165,10 @@ def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tupl
     left_out = ""
     if end > start + TUNING.rig.longest:
         end = within[-1]
-        left_out = f"Nothing is used of {recording.path} from {TUNING.rig.longest:.0f} s after its beginning."
+        left_out = (
+            f"Nothing is used of {recording.path} from {TUNING.rig.longest:.0f} s after its"
+            " beginning."
+        )
 
     if (end - start) * rate < 5:
         found = f"{max(end - start, 0.0):.2f} s of both encoders together"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from math import isfinite
 from typing import ClassVar, NamedTuple
@@ -18,6 +18,7 @@ from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing import FieldValue, Frame
 from gritd.estimator.config.settings import Channel, Wrench
 from gritd.estimator.messages.readings import Value
+from gritd.estimator.plugins import SENSORS, plugins, refused
 
 SensorSettings = Channel | Wrench
 
@@ -138,11 +139,27 @@ def within(value: FieldValue, low: float, high: float) -> bool:
 
 @cache
 def sensor_kinds() -> dict[str, type[Sensor]]:
-    """Channel name -> its class, found by walking drivers/sensors."""
+    """Channel name -> its class: of drivers/sensors, or of another package, which takes the place
+    of ours. Raises PluginError.
+    """
     package = importlib.import_module("gritd.drivers.sensors")
     for module in pkgutil.iter_modules(package.__path__, "gritd.drivers.sensors."):
         importlib.import_module(module.name)
     kinds = [kind for base in (Sensor, Encoder, Analog) for kind in base.__subclasses__()]
-    return {
+    own = {
         kind.channel: kind for kind in kinds if kind.__module__.startswith("gritd.drivers.sensors.")
     }
+    return own | _added(own)
+
+
+def _added(own: Mapping[str, type[Sensor]]) -> dict[str, type[Sensor]]:
+    """Sensor kinds of other packages, each named for a channel."""
+    found = plugins(SENSORS)
+    for name, kind in found.items():
+        if not (isinstance(kind, type) and issubclass(kind, Sensor)):
+            raise refused(SENSORS, name, "found no subclass of Sensor; expected one")
+        if name not in own or kind.channel != name:
+            known = ", ".join(sorted(own))
+            why = f"found the channel {kind.channel}; expected {name} to be one of {known}"
+            raise refused(SENSORS, name, why)
+    return found

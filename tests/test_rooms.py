@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 
 # the lowest first; a room imports itself and those of lower rows
 ROOMS = (
-    ("config", "estimator.visible"),
+    ("config", "estimator.visible", "estimator.plugins"),
     ("estimator.terramechanics", "estimator.messages", "estimator.threads"),
     ("estimator.stages",),
     ("estimator.effects",),
@@ -89,7 +89,12 @@ def test_imports_point_down() -> None:
 
 
 def test_drivers_know_messages_configuration_and_threads_of_the_estimator() -> None:
-    allowed = {"estimator.config", "estimator.messages", "estimator.threads"}
+    allowed = {
+        "estimator.config",
+        "estimator.messages",
+        "estimator.plugins",
+        "estimator.threads",
+    }
     rooms = {
         room_of(module)
         for path in FILES

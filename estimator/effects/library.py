@@ -2,7 +2,8 @@
 out.
 
 Each module of this package but `base` and this one defines one Effect; the file's name is the
-effect's name. `EFFECTS` finds them. A subclass of it in the same file is a form of it, not another.
+effect's name. `EFFECTS` finds them, and those of other packages (docs/plug-ins.md). A subclass of
+it in the same file is a form of it, not another.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from gritd.estimator.effects.base import STAGES, Effect
+from gritd.estimator.plugins import EFFECTS as GROUP
+from gritd.estimator.plugins import plugins, refused
 
 SHARED = ("base", "library")  # modules of this package that are no effect
 
@@ -34,7 +37,21 @@ def _find() -> dict[str, type[Effect]]:
             )
         effects[module] = own[0]
 
-    return effects
+    return effects | _added(effects)
+
+
+def _added(own: Mapping[str, type[Effect]]) -> dict[str, type[Effect]]:
+    """Effects of other packages. Raises PluginError."""
+    found = plugins(GROUP)
+    for name, effect in found.items():
+        if not (isinstance(effect, type) and issubclass(effect, Effect)):
+            raise refused(GROUP, name, "found no subclass of Effect; expected one")
+        if effect.name != name:
+            why = f"found the effect {effect.name}; expected {name}, the name of its file"
+            raise refused(GROUP, name, why)
+        if name in own:
+            raise refused(GROUP, name, "found an effect of gritd's own; expected another name")
+    return found
 
 
 def make(name: str, values: Mapping[str, float]) -> Effect:

@@ -9,10 +9,16 @@ from collections.abc import Callable
 from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.limits import LimitsError
+from gritd.estimator.plugins import PluginError
 from gritd.tools.cli import memory
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, INTERRUPTED, USAGE, CommandError
 
-SETTINGS = (ConfigError, DeviceSettingsError, LimitsError)  # what the user set is wrong
+SETTINGS = (
+    ConfigError,
+    DeviceSettingsError,
+    LimitsError,
+    PluginError,
+)  # what the user set is wrong
 
 
 def guarded(command: Callable[[], int | None]) -> int:

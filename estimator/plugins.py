@@ -1,0 +1,41 @@
+"""What other packages add, by the entry points of their distributions: effects, sensors, importers.
+
+A package that cannot be loaded, or offers something else than it says, ends the command with one
+line: to go on without it would change results in silence.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+EFFECTS, SENSORS, IMPORTERS = "gritd.effects", "gritd.sensors", "gritd.importers"  # the groups
+
+
+class PluginError(Exception):
+    """A plug-in cannot be used: one line that names its distribution."""
+
+
+def plugins(group: str) -> dict[str, Any]:
+    """What the entry points of a group name, by their names, in order. Raises PluginError."""
+    found: dict[str, Any] = {}
+    for entry in sorted(entry_points(group=group), key=lambda each: each.name):
+        if entry.name in found:
+            raise refused(group, entry.name, "found it twice; expected each name once")
+        found[entry.name] = _loaded(entry)
+    return found
+
+
+def _loaded(entry: EntryPoint) -> Any:
+    try:
+        return entry.load()
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}"
+        raise refused(entry.group, entry.name, f"cannot be loaded: {said}") from error
+
+
+def refused(group: str, name: str, why: str) -> PluginError:
+    """The error for a plug-in that offers something else than was expected."""
+    named = [each for each in entry_points(group=group) if each.name == name]
+    packages = ", ".join(sorted({each.dist.name for each in named if each.dist})) or "unknown"
+    return PluginError(f"plug-in {name} of {group} (package {packages}): {why}")

@@ -31,7 +31,7 @@ from gritd.estimator.messages.tick import (
     names_of,
     row,
 )
-from gritd.estimator.offline.snapshots import recorded_streams, snapshots
+from gritd.estimator.offline.snapshots import RecordedStreams, recorded_streams, snapshots
 from gritd.estimator.offline.windows import Ints
 from gritd.estimator.online.bed import begun
 from gritd.estimator.online.pipeline import Pipeline
@@ -99,15 +99,28 @@ def replayed(
     start: Estimate | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
-    """What the filter makes of a recording, begun with the stated prior or with `start`.
+    """What the filter makes of a recording, begun with the stated prior or with `start`. See
+    `followed`. Raises RecordingError.
+    """
+    streams = recorded_streams(recording, settings.rates.tick)
+    return followed(settings, streams, engine, start, advance)
+
+
+def followed(
+    settings: Settings,
+    streams: RecordedStreams,
+    engine: str = "plain",
+    start: Estimate | None = None,
+    advance: Callable[[int, int], None] = lambda done, total: None,
+) -> Replayed:
+    """What the filter makes of readings, window by window.
 
     The windows are those the loop updated the filter at: by the recording's own ticks where it has
     them, else by ticks at the configured rate. Of `flags`, those that concern single ticks (late
     readings, counter jumps) are left out. `advance` is told after each window how many are done
-    and how many there are. Raises RecordingError.
+    and how many there are.
     """
     pipeline = Pipeline(settings, engine)
-    streams = recorded_streams(recording, pipeline.settings.rates.tick)
     chosen = window_ends(streams.ticks, round(NS / pipeline.settings.rates.update))
 
     tracker = pipeline.tracker

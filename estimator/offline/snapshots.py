@@ -66,15 +66,20 @@ def streams_at(recording: Recording, rate: float) -> RecordedStreams:
     """Ticks at `rate` [Hz] from the first to the last receive time, but for gaps, whatever was
     logged.
     """
-    raw = {
-        name: rows[np.argsort(rows["log_time"], kind="stable")]
-        for name, rows in _raw(recording).items()
-    }
-    received = [np.empty(0, np.int64), *(rows["log_time"] for rows in raw.values())]
     try:
-        ticks = built_ticks(np.sort(np.concatenate(received)), round(NS / rate))
+        return streams_of(_raw(recording), rate)
     except RecordingError as error:
         raise RecordingError(f"{recording.path}: {error}") from None
+
+
+def streams_of(raw: Mapping[str, NDArray[np.void]], rate: float) -> RecordedStreams:
+    """Ticks at `rate` [Hz] over the readings of some channels: structured arrays (n,) with the
+    fields stamp and log_time [ns] and those of the channel. Raises RecordingError for a gap that is
+    too long.
+    """
+    raw = {name: rows[np.argsort(rows["log_time"], kind="stable")] for name, rows in raw.items()}
+    received = [np.empty(0, np.int64), *(rows["log_time"] for rows in raw.values())]
+    ticks = built_ticks(np.sort(np.concatenate(received)), round(NS / rate))
 
     consumed = {name: np.searchsorted(ticks, rows["log_time"]) for name, rows in raw.items()}
     return _streams(ticks, raw, consumed)

@@ -1,0 +1,1 @@
+"""What `import gritd` offers to Python programs and notebooks; `gritd` hands it on."""

@@ -1,0 +1,90 @@
+"""The diagnosis of runs, as `gritd diagnose` makes it."""
+
+from __future__ import annotations
+
+import html
+import importlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from gritd.estimator.config.configuration import Configuration
+from gritd.interface.runs import Place, Run, configured
+from gritd.tools.commands.diagnose import of_files, text
+from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.report import reference as references
+
+HEIGHT = 900  # [px] of the report in a notebook
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was found. A notebook shows its report; `print` shows its verdict in lines."""
+
+    diagnosis: Diagnosis
+    damage: tuple[str, ...] = ()  # what of the files could not be read
+
+    @property
+    def verdict(self) -> str:
+        """consistent, explained, unlisted or insufficient."""
+        return str(self.diagnosis.verdict)
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Effect → probability, the likeliest first."""
+        return {each.effect: each.probability for each in self.diagnosis.hypotheses}
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """The effects that were accepted."""
+        return tuple(each.effect for each in self.diagnosis.accepted)
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything, as `gritd diagnose --json` writes it."""
+        return dict(self.diagnosis.to_json())
+
+    def report(self, path: Place) -> Path:
+        """The page that `gritd diagnose --report` writes. Raises OSError."""
+        importlib.import_module("gritd.tools.report.diagnosis").write(self.diagnosis, Path(path))
+        return Path(path)
+
+    def __str__(self) -> str:
+        return text(self.diagnosis)
+
+    def _repr_html_(self) -> str:
+        page = importlib.import_module("gritd.tools.report.diagnosis").render(self.diagnosis)
+        return (
+            f'<iframe srcdoc="{html.escape(page)}" width="100%" height="{HEIGHT}" '
+            'style="border: none"></iframe>'
+        )
+
+
+def diagnose(
+    runs: Sequence[Run | Place],
+    config: Place | Configuration,
+    reference: Sequence[Run | Place] = (),
+    *,
+    bed: Literal["same", "prepared"] = "prepared",
+    seed: int = 0,
+    jobs: int = 1,
+    step: Callable[[str], None] = lambda what: None,
+) -> Result:
+    """Where runs and model differ, and which physics was left out.
+
+    runs: recordings or their files. config: the testbed and what is known of the soil.
+    reference: recordings of the same rig with nothing new; then what is named is what is new.
+    bed: with a reference, "same" or "prepared". seed: of the surrogates. jobs: processes that fit.
+    step: is told what begins.
+
+    Raises CommandError and ConfigError, one line.
+    """
+    given = references.given([_file(each) for each in reference], bed)
+    found, damage = of_files(
+        [_file(run) for run in runs], configured(config), seed, step, jobs, "", given
+    )
+    return Result(found, tuple(damage))
+
+
+def _file(run: Run | Place) -> Path:
+    return run.path if isinstance(run, Run) else Path(run)

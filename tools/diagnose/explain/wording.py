@@ -47,6 +47,8 @@ def label(candidate: Candidate) -> str:
     """An effect's name; of a misfit without a name, its channel and what it lives along."""
     if isinstance(candidate, str):
         return candidate
+    if candidate.kind == "strain":
+        return f"{candidate.channel} beyond what is known of it"
     along = f"{candidate.channel}~{'·'.join(candidate.along)}"
     return along if candidate.kind == "smooth" else f"{along} {candidate.kind}"
 

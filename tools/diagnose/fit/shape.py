@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Kind = Literal["smooth", "wave", "step"]
+Kind = Literal["smooth", "wave", "step", "strain"]
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A misfit of one channel along one covariate, or along the product of two.
+    """A misfit of one channel along one covariate, or along the product of two; or the strain of a
+    constant, whose name then stands for the channel and along what.
 
     at:     frequency [1/s, 1/m] of a wave, place [s, m] of a step; None for all of them together.
     shared: of a wave, whether all stretches of the recordings have one phase.

@@ -84,7 +84,8 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     problem, drawn = screening.problem, screening.surrogates
     if problem.stack.referred and first is None:
         return _screen_beside_reference(screening, model)
-    signatures = [*_signatures(problem, model, first), *screening.functions]
+    effects = _signatures(problem, model, first)
+    signatures = [*effects, *screening.functions, *_strains(problem, model)]
     beside = without_harmonics(problem, model.fitted, drawn)
     searched = {family.shape: family.average(beside) for family in screening.families}
     projection = model.fitted.projection(drawn)
@@ -168,6 +169,19 @@ def _worth(
     orders = sorted({fixed[order] for fixed in tried})
     loud = loudest(problem.stack, problem.noise, model.fitted.residual, orders)
     return [fixed for fixed in tried if fixed[order] in loud]
+
+
+def _strains(problem: Problem, model: Model) -> Iterator[Signature]:
+    """Every constant off by more than is known of it: a misfit that it takes is one that is said.
+    None beside an effect, where explanations compete.
+    """
+    if model.names:
+        return
+    for number, constant in enumerate(problem.stack.rig.constants):
+        columns = TUNING.screen.strained * model.fitted.raw[:, number : number + 1]
+        if np.any(columns):
+            shape = Shape(constant.name, (constant.name,), "strain")
+            yield Signature(shape, columns, (0,), {})
 
 
 def _open(screening: Screening, model: Model, screen: Screen) -> float:

@@ -35,6 +35,7 @@ class Screen:
         6, "candidates", "whose evidence is weighed with the noise's colour open", "run time"
     )
     again: int = tuned(4, "signatures", "of an effect that a later screen tries", "run time")
+    strained: float = tuned(3.0, "σ", "expected size of a constant's error that was not foreseen")
 
     # --- ripples.py ---
     loudest: int = tuned(10, "orders", "whose physics is simulated", "run time")

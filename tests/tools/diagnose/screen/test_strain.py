@@ -1,0 +1,25 @@
+"""A constant that the fit moves far from what is known of it is no agreement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gritd.tools.diagnose.explain.result import Diagnosis
+from tests.tools.diagnose.campaigns import diagnosed, plan, soil
+
+
+def _of_modulus(factor: float) -> Diagnosis:
+    """Recordings on soil whose sinkage modulus is another: 5 % is known of it."""
+    drawn = plan(seconds=12.0)
+    return diagnosed(replace(drawn, soil=replace(soil(), modulus=factor * soil().modulus)))
+
+
+def test_a_strained_constant_is_no_agreement() -> None:
+    found = _of_modulus(1.6)
+    assert found.verdict not in ("consistent", "insufficient")
+    assert found.test.name == "K beyond what is known of it"
+    assert any(note.startswith("Strained: K") for note in found.caveats)
+
+
+def test_a_constant_within_what_is_known_of_it_is() -> None:
+    assert _of_modulus(1.04).verdict == "consistent"

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.parts import parts
+from gritd.estimator.recording.parts import part_path, parts
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import CHECKPOINT
 from tests.scenarios import killed_writer
@@ -429,3 +429,34 @@ def test_the_open_part_is_never_deleted(tmp_path, figure):
     assert all(verified(part) for part in parts[1:])
     figure("disk cap and rotation", WIRES, "parts written and verified one by one", len(parts), "")
     assert Path(daemon.path()).exists()
+
+
+def test_links_and_folders_named_like_recordings(tmp_path, figure):
+    """A dangling link, a link to somebody's file, a folder, and both in the place of the next
+    parts: the cap holds, and what is no recording stays.
+    """
+    precious, old = tmp_path / "precious", tmp_path / "old.mcap"
+    precious.write_bytes(bytes(2_000_000))
+    old.write_bytes(bytes(990_000))
+    os.utime(old, (0, 0))
+    (tmp_path / "gone.mcap").symlink_to(tmp_path / "nothing")
+    (tmp_path / "link.mcap").symlink_to(precious)
+    (tmp_path / "folder.mcap").mkdir()
+    changes = {"part_time": "1 s", "disk_cap": "1 MB"}
+    with service(tmp_path, driven(40.0, 1, skip=1.0), logging=changes) as (_, daemon):
+        part_path(daemon.path(), 3).mkdir()
+        part_path(daemon.path(), 4).symlink_to(tmp_path / "nothing")
+        daemon.heard("old.mcap: deleted, over logging.disk_cap")
+        daemon.heard(".mcap: deleted, over logging.disk_cap", 4)
+        time.sleep(0.5)
+        daemon.stop()
+
+    files = [path for path in tmp_path.glob("*.mcap") if path.is_file() and not path.is_symlink()]
+    kept = sum(path.stat().st_size for path in files)
+    obstacles = [path for path in tmp_path.glob("*.mcap") if path not in files]
+    assert len(obstacles) == 5 and precious.stat().st_size == 2_000_000
+    assert not daemon.lines("cannot be kept"), daemon.text
+    _, _, dropped, _ = daemon.account()
+    row = "links and folders named like recordings"
+    figure(row, WIRES, "kept, of a cap of 1 MB", kept / 1e6, "MB", 1.2, real=True)
+    figure(row, WIRES, "messages lost", dropped, "", 0)

@@ -36,6 +36,7 @@ ESCAPES = "terminal escapes in names"
 OUTSIDE = "names that lead out of the folder"
 OBSTACLES = "symlinked lock, FIFO, killed parent"
 READABLE = "world-writable configuration, readable recordings"
+SCHEDULER = "hostile worker behind --scheduler"
 COMMANDS = "the commands as processes"
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r\nfake line"
@@ -267,20 +268,45 @@ def runs(pid):
 
 
 def test_who_may_write_the_configuration_and_read_the_recordings(tmp_path, figure):
-    wrong = 0
-    for number, (readable, mode) in enumerate({"owner": 0o600, "group": 0o640}.items()):
+    """A configuration that anybody may write is warned of by the daemon, in its log and by
+    check-config; one that only its owner may write is not.
+    """
+    modes = wrong = 0
+    for readable, mode, writable in (("owner", 0o600, 0o600), ("group", 0o640, 0o666)):
         folder = tmp_path / readable
         folder.mkdir()
         with Wires(folder, logging={"readable_by": readable}) as wires:
-            wires.config.chmod((0o600, 0o666)[number])
+            wires.config.chmod(writable)
             with DaemonProcess(wires.config) as daemon:
                 daemon.ready()
-                warned = any("anybody may change it" in text for _, text in daemon.said)
-                assert warned == (readable == "group"), daemon.text
                 daemon.stop()
-        wrong += daemon.path().stat().st_mode & 0o777 != mode
-        assert any("anybody may change it" in line for line in log_lines(daemon.path())) == warned
+        modes += daemon.path().stat().st_mode & 0o777 != mode
         _, _, error = gritd("check-config", wires.config)
-        assert ("anybody may change it" in error) == warned
-    figure(READABLE, WIRES, "recordings of another mode than configured", wrong, limit=0)
-    figure(READABLE, WIRES, "world-writable configurations without a warning", 0, limit=0)
+        lines = (daemon.text, "\n".join(log_lines(daemon.path())), error)
+        warned = ["anybody may change it" in text for text in lines]
+        wrong += sum(each != (writable == 0o666) for each in warned)
+    figure(READABLE, WIRES, "recordings of another mode than configured", modes, limit=0)
+    figure(READABLE, WIRES, "warnings missing or without reason, of 6 places", wrong, limit=0)
+
+
+def test_a_scheduler_that_does_not_prove_who_it_is(tmp_path, figure):
+    """What it answers would be unpickled, which runs what it likes: it is not even connected to."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "run.mcap").write_bytes(b"")
+    (tmp_path / "a" / "rig.yaml").write_bytes(b"")
+    with socket.create_server(("127.0.0.1", 0)) as hostile:
+        hostile.settimeout(0.5)
+        given = ("--scheduler", f"tcp://127.0.0.1:{hostile.getsockname()[1]}")
+        commands = {
+            "diagnose": ("--campaigns", tmp_path, *given),
+            "prove": ("--cases", "1", "--output", tmp_path / "proof", *given),
+        }
+        said = {name: gritd(name, *more, timeout=60) for name, more in commands.items()}
+        connections = 0
+        with suppress(TimeoutError):
+            while hostile.accept():
+                connections += 1
+    wrong = [name for name, end in said.items() if not refused(*end, expected=(2,))]
+    assert not wrong and not (tmp_path / "proof").exists(), said
+    figure(SCHEDULER, COMMANDS, "connections to a scheduler over tcp://", connections, limit=0)
+    figure(SCHEDULER, COMMANDS, "not refused with one line", len(wrong), limit=0)

@@ -24,6 +24,7 @@ from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.progress import Progress
+from gritd.tools.cli.workers import add_cluster, cluster_of
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain import provenance
@@ -127,9 +128,9 @@ def _many(arguments: argparse.Namespace) -> int:
             "diagnose --campaigns: expected no recordings or --config: they are in its folders",
             USAGE,
         )
-    every = campaigns.find(arguments.campaigns)
+    cluster, every = cluster_of(arguments), campaigns.find(arguments.campaigns)
     failed = False
-    for campaign, sentence in campaigns.diagnosed(every, _one, arguments.jobs, arguments.scheduler):
+    for campaign, sentence in campaigns.diagnosed(every, _one, arguments.jobs, cluster):
         print(f"{campaign.folder.name}: {sentence}", flush=True)
         failed |= not campaign.done
     print(
@@ -319,11 +320,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="each folder in DIR: its *.mcap and its *.yaml",
     )
-    parser.add_argument(
-        "--scheduler",
-        metavar="tcp://…",
-        help="with --campaigns: a dask scheduler whose workers see DIR",
-    )
+    add_cluster(parser, "with --campaigns: ")
     parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
     parser.add_argument(
         "--jobs",

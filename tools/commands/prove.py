@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
-from gritd.tools.cli.workers import workers
+from gritd.tools.cli.workers import add_cluster, cluster_of, workers
 from gritd.tools.proof.blind import batch, page, score, tables, trial
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import STRATA
@@ -27,6 +27,7 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     CommandError.
     """
     arguments = _parser().parse_args(argv)
+    cluster_of(arguments)
     output: Path = arguments.output
     begun = batch.resumed(output) if arguments.resume else _started(arguments)
     print(
@@ -71,7 +72,7 @@ def _run(specs: Sequence[trial.Spec], arguments: argparse.Namespace, seals: Path
     told = set(seals.read_text(encoding="utf-8").split()) if seals.exists() else set()
     with (
         seals.open("a", encoding="utf-8") as published,
-        workers(arguments.jobs, arguments.scheduler) as (executor, width),
+        workers(arguments.jobs, cluster_of(arguments)) as (executor, width),
         Progress("cases", left) as progress,
     ):
 
@@ -132,9 +133,7 @@ def _parser() -> argparse.ArgumentParser:
         help="draw and seal all cases; diagnose them later with --resume",
     )
     parser.add_argument("--keep", action="store_true", help="keep the recordings, about 1 MB a run")
-    parser.add_argument(
-        "--scheduler", metavar="tcp://…", help="a dask scheduler whose workers see DIR"
-    )
+    add_cluster(parser)
 
     return parser
 

@@ -3,7 +3,9 @@ to the others.
 """
 
 import os
+import subprocess
 from pathlib import Path
+from shutil import which
 
 import pytest
 
@@ -78,23 +80,42 @@ def test_what_is_done_is_not_done_again_until_a_file_changes(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_same_on_a_cluster(tmp_path: Path) -> None:
-    """A real scheduler and two worker processes on loopback."""
+@pytest.mark.skipif(which("openssl") is None, reason="openssl is not installed")
+def test_the_same_on_a_cluster_that_proves_who_it_is(tmp_path: Path) -> None:
+    """A real scheduler and two worker processes on loopback, with a certificate."""
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    dask = pytest.importorskip("dask", reason="dask is not installed")
+    (tmp_path / "campaigns").mkdir()
     for name in ("a", "bad", "c"):
-        folder_of(tmp_path, name)
+        folder_of(tmp_path / "campaigns", name)
     options = {
         "n_workers": 2,
         "threads_per_worker": 1,
-        "host": "127.0.0.1",
+        "host": "tls://127.0.0.1",
         "dashboard_address": None,
     }
 
-    with distributed.LocalCluster(processes=True, **options) as cluster:
-        found = campaigns.find(tmp_path)
-        said = {
-            c.folder.name: w
-            for c, w in campaigns.diagnosed(found, write_result, 1, cluster.scheduler_address)
-        }
+    with dask.config.set(certificates(tmp_path)):
+        security = distributed.security.Security(require_encryption=True)
+        with distributed.LocalCluster(processes=True, security=security, **options) as cluster:
+            address = cluster.scheduler_address
+            found = campaigns.find(tmp_path / "campaigns")
+            done = campaigns.diagnosed(found, write_result, 1, address)
+            said = {campaign.folder.name: words for campaign, words in done}
 
+    assert address.startswith("tls://127.0.0.1:")
     assert said["a"] == said["c"] == "consistent" and said["bad"].startswith("not diagnosed")
+
+
+def certificates(folder: Path) -> dict[str, str]:
+    """dask's configuration with a certificate for everybody, made here."""
+    cert, key = str(folder / "cert.pem"), str(folder / "key.pem")
+    made = ["req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
+    to = ["-days", "2", "-subj", "/CN=testbed", "-keyout", key, "-out", cert]
+    subprocess.run(["openssl", *made, *to], check=True, capture_output=True)
+    roles = ("scheduler", "worker", "client")
+    return {
+        "distributed.comm.tls.ca-file": cert,
+        **{f"distributed.comm.tls.{role}.cert": cert for role in roles},
+        **{f"distributed.comm.tls.{role}.key": key for role in roles},
+    }

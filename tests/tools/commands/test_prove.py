@@ -212,6 +212,9 @@ def test_secrets_differ_unless_seeded(tmp_path: Path) -> None:
     assert batch.resumed(tmp_path / "a").specs() == one.specs()
 
 
+TRUST = "--trust-network"
+
+
 @pytest.mark.slow
 def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
     """A real scheduler and two worker processes on loopback."""
@@ -227,7 +230,9 @@ def test_the_same_cases_on_a_cluster(tmp_path: Path, finished: Path) -> None:
         address = cluster.scheduler_address
         assert address.startswith("tcp://127.0.0.1:")
         output = tmp_path / "batch"
-        assert prove.main([*SMALL, "--output", str(output), "--scheduler", address], STUB) == 0
+        assert (
+            prove.main([*SMALL, "--output", str(output), "--scheduler", address, TRUST], STUB) == 0
+        )
 
     here, there = (
         [
@@ -250,5 +255,21 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
     with pytest.raises(CommandError, match="found no scheduler; expected one that answers"):
         prove.main(
-            [*SMALL, "--output", str(tmp_path / "b"), "--scheduler", "tcp://127.0.0.1:9"], STUB
+            [*SMALL, "--output", str(tmp_path / "b"), "--scheduler", "tcp://127.0.0.1:9", TRUST],
+            STUB,
+        )
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "127.0.0.1:9", "inproc://x"])
+def test_a_scheduler_that_does_not_prove_who_it_is_is_refused(tmp_path: Path, address: str) -> None:
+    with pytest.raises(CommandError, match="found no encryption; expected tls://") as refused:
+        prove.main([*SMALL, "--output", str(tmp_path / "b"), "--scheduler", address], STUB)
+    assert refused.value.code == 2
+
+
+def test_tls_without_certificates_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    with pytest.raises(CommandError, match="found no certificates"):
+        prove.main(
+            [*SMALL, "--output", str(tmp_path / "b"), "--scheduler", "tls://127.0.0.1:9"], STUB
         )

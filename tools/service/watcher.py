@@ -171,4 +171,5 @@ def status_line(daemon: Daemon) -> str:
     )
 
     flags = [flag.name or "" for flag in Flag if flag and int(t["flags"]) & flag]
+    line = line.replace("nan", "  –")  # what is not known yet
     return f"{line}  {' '.join(flags)}".rstrip()

@@ -151,7 +151,7 @@ def base(**changed: object) -> Diagnosis:
         fit=fit(1.05),
         law=None,
         next_experiment=None,
-        caveats=("The configuration states n as almost exact; it floats within 1 % instead.",),
+        caveats=("The configuration states n more exactly than any soil is known.",),
         remaining_words="Nothing remains above the noise floor",
         nuisance={
             "sinkage_offset": Quantity(4e-5, 6e-5, "m"),

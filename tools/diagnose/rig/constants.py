@@ -114,8 +114,8 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
     if raised:
         least = ", ".join(f"{name} {TUNING.rig.soil_floors[name]:.0%}" for name in raised)
         caveats.append(
-            f"The configuration states {', '.join(raised)} as almost exact;"
-            f" they float within {least} instead."
+            f"The configuration states {', '.join(raised)} more exactly than any soil is known."
+            f" The standard deviations are taken as {least}."
         )
 
     low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.tuning import TUNING
 
 def doubts(rig: Rig, model: Model) -> tuple[str, ...]:
     """One sentence each, of the fit of the accepted model."""
-    return (*_strained(rig, model), *_bounded(model), *_unfinished(model))
+    return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model))
 
 
 def _strained(rig: Rig, model: Model) -> Iterator[str]:
@@ -27,8 +27,11 @@ def _strained(rig: Rig, model: Model) -> Iterator[str]:
             yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
 
 
-def _bounded(model: Model) -> Iterator[str]:
+def _bounded(rig: Rig, model: Model) -> Iterator[str]:
     fitted = model.fitted
+    for constant, held in zip(rig.constants, fitted.held, strict=False):
+        if held:
+            yield f"At its bound: {constant.name}, as far from what is known of it as it may go."
     for number, free in enumerate(fitted.free):
         if fitted.held[len(fitted.u) + number] and free.parameter.role == "shape":
             value = f"{free.value(float(fitted.x[number])):.3g} {free.parameter.unit}".rstrip()

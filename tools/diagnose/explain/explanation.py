@@ -182,12 +182,14 @@ def _soil(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
 
 
 def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
-    """The soil of one explanation."""
+    """The soil of one explanation. What stands at its bound is not known better than before."""
     mean, spread = model.constants()
-    sigma = np.sqrt(np.diag(spread))
+    sigma, held = np.sqrt(np.diag(spread)), model.fitted.held
     return {
-        k.name: Quantity(k.of(float(u)), k.spread(float(u), float(s)), k.unit)
-        for k, u, s in zip(rig.constants, mean, sigma, strict=True)
+        k.name: Quantity(
+            k.of(float(u)), k.sigma if at_bound else k.spread(float(u), float(s)), k.unit
+        )
+        for k, u, s, at_bound in zip(rig.constants, mean, sigma, held, strict=False)
         if k.soil
     }
 

@@ -76,6 +76,7 @@ def main(argv: Sequence[str]) -> int:
     if arguments.reference:
         named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
     named += ["--config", str(arguments.config), "--seed", str(seed)]
+    named += ["--quick"] if arguments.quick else []
     command = shlex.join(["gritd", "diagnose", *named])
     with Progress("diagnose") as progress:
         diagnosis, damage = of_files(
@@ -86,6 +87,7 @@ def main(argv: Sequence[str]) -> int:
             arguments.jobs,
             command,
             reference,
+            arguments.quick,
         )
     _write(arguments, diagnosis, configuration)
     print(text(diagnosis))
@@ -111,6 +113,7 @@ def _again(arguments: argparse.Namespace) -> int:
             arguments.jobs,
             then.command,
             then.reference,
+            then.quick,
         )
     _write(arguments, diagnosis, configuration)
     differs = list(record.differences(then, record.Record.of(diagnosis)))
@@ -228,6 +231,7 @@ def of_files(
     jobs: int = 1,
     command: str = "",
     reference: references.Given = references.NONE,
+    quick: bool = False,
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
     recordings, known = read_all(files), read_all(reference.files)
@@ -241,16 +245,19 @@ def of_files(
         **({"command": command} if command else {}),
         "files": {str(path): hashes[str(path)] for path in files},
         **reference.kept(hashes),
+        **({"quick": True} if quick else {}),
         "configuration": configuration.text,
         "grid_hz": rate,
         "versions": versions(),
     }
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        diagnosis = diagnose(rig, seed, needed, step if callable(step) else lambda _: None, jobs)
-        diagnosis = with_innovations(
-            diagnosis, configuration, recordings, soil=diagnosis.soil is not None
-        )
+        each = step if callable(step) else lambda _: None
+        diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
+        if not quick:
+            diagnosis = with_innovations(
+                diagnosis, configuration, recordings, soil=diagnosis.soil is not None
+            )
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)
     damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
@@ -322,6 +329,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_cluster(parser, "with --campaigns: ")
     parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="a first answer: only the likeliest effects, one at a time",
+    )
     parser.add_argument(
         "--jobs",
         type=whole(1, 1024),

@@ -14,7 +14,8 @@ Each step is one call, and hands one frozen value to the next.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from gritd.tools.diagnose.noise.estimate import estimate
 from gritd.tools.diagnose.rig.interface import Rig, Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import search_models
+from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.diagnose.verdict.decide import decide
 
 
@@ -36,11 +38,27 @@ def diagnose(
     redo: Mapping[str, Any] | None = None,
     step: Callable[[str], None] = lambda _: None,
     jobs: int = 1,
+    quick: bool = False,
 ) -> Diagnosis:
     """Everything `gritd diagnose` says of a rig's recordings. Deterministic for a seed.
 
-    redo: kept in the result; step: is told what begins; jobs: processes that fit.
+    redo: kept in the result; step: is told what begins; jobs: processes that fit; quick: a first
+    answer, for which only the likeliest effects are fitted, each alone.
     """
+    with first_answer() if quick else nullcontext():
+        return _diagnose(rig, seed, {**(redo or {}), "seed": seed}, step, jobs)
+
+
+@contextmanager
+def first_answer() -> Iterator[None]:
+    """The search ends after the likeliest single effects."""
+    with replaced("search", effects_first=TUNING.search.effects_quick, most_effects=1):
+        yield
+
+
+def _diagnose(
+    rig: Rig, seed: int, redo: Mapping[str, Any], step: Callable[[str], None], jobs: int
+) -> Diagnosis:
     rng = np.random.default_rng(seed)
     step("fitting the soil and the noise")
     base = fit_base(rig, rng)
@@ -50,7 +68,7 @@ def diagnose(
     decision = decide(search)
 
     step("holding out runs and conditions")
-    return explain(search, decision, {**(redo or {}), "seed": seed})
+    return explain(search, decision, redo)
 
 
 def fit_base(rig: Rig, rng: np.random.Generator) -> BaseFit:

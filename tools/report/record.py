@@ -40,6 +40,7 @@ class Record:
     probability: Mapping[str, float]
     known: Mapping[Path, str] = field(default_factory=dict)  # the reference's, with their SHA-256
     bed: Bed = "prepared"
+    quick: bool = False  # a first answer
 
     @property
     def reference(self) -> Given:
@@ -68,6 +69,7 @@ class Record:
             {str(h["effect"]): float(h["probability"]) for h in hypotheses},
             {_within(folder, Path(n)): str(v) for n, v in reference.get("files", {}).items()},
             "same" if reference.get("bed") == "same" else "prepared",
+            bool(redo.get("quick", False)),
         )
 
 

@@ -57,7 +57,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
-        caveats=(*_caveats(rig), *doubts(rig, whole)),
+        caveats=(*_caveats(rig, redo), *doubts(rig, whole)),
         share=decision.share,
         remaining=remainders(problem, accepted),
         remaining_words=_remaining(decision),
@@ -238,8 +238,13 @@ def _subject(rig: Rig) -> str:
     return "Model and recordings" if all(rig.new) else "Reference and new campaign"
 
 
-def _caveats(rig: Rig) -> list[str]:
+def _caveats(rig: Rig, redo: Mapping[str, Any]) -> list[str]:
     sentences = list(rig.caveats)
+    if redo.get("quick"):
+        sentences.append(
+            "A first answer (--quick): the likeliest effects were fitted one at a time, and no"
+            " second one was looked for."
+        )
     if len(rig.runs) == 1:
         sentences.append(
             "One run only: nothing tells a misfit from what was peculiar to that run;"

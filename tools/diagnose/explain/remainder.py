@@ -76,7 +76,8 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
     stack, rig, fitted = problem.stack, problem.stack.rig, model.fitted
     count = problem.tolerance.shape[1]
     spread = np.sqrt(np.sum(fitted.carried**2, axis=1))
-    learnt = "recordings" if fitted.slack.size > count else "prior"
+    source = "reference" if stack.referred else "recordings"
+    learnt = source if fitted.slack.size > count else "prior"
     found = {}
     for channel in rig.channels:
         own = stack.of(channel)

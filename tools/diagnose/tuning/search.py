@@ -14,6 +14,7 @@ class Search:
     """How far the search for effects goes."""
 
     effects_first: int = tuned(9, "effects", "fitted beside the base model", "run time")
+    effects_quick: int = tuned(3, "effects", "fitted for a first answer", "run time")
     effects_later: int = tuned(5, "effects", "fitted beside a model with effects", "run time")
     starts: int = tuned(2, "models", "of a size from which the next step starts", "run time")
     most_effects: int = tuned(3, "effects", "of a model, at most", "run time")

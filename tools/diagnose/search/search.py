@@ -54,10 +54,15 @@ class Search:
         """Beside the base model."""
         return self.screens[self.base]
 
+    def news(self, model: Model) -> float:
+        """Log evidence beyond what a reference campaign shows of the model's effects [nats]."""
+        usual = sum(self.first.habit.get(name, 0.0) for name in model.names)
+        return float(model.evidence - TUNING.screen.habit * usual)
+
     def weight(self, model: Model) -> float:
         """Log evidence and log prior of so many effects, above the bare model's [nats]."""
         more = np.log(TUNING.search.odds / max(len(self.problem.stack.rig.effects), 1))
-        return float(model.evidence - self.bare.evidence + max(len(model.names) - 1, 0) * more)
+        return float(self.news(model) - self.bare.evidence + max(len(model.names) - 1, 0) * more)
 
     def sized(self, size: int) -> list[Model]:
         """Models of so many effects, the likeliest first."""
@@ -153,11 +158,14 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
 def promises(search: Search, model: Model) -> list[Promise]:
     """Of every effect that is not in the model, the most promising first."""
     effects = search.problem.stack.rig.effects
-    found, projection = [], model.fitted.projection()
+    habit, projection = search.first.habit, model.fitted.projection()
+    found = []
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
         tried = list(_tried(search, model, effects[name], projection))
         if tried:
-            found.append(max(tried, key=lambda promise: promise.gain))
+            best = max(tried, key=lambda promise: promise.gain)
+            usual = TUNING.screen.habit * habit.get(name, 0.0)
+            found.append(replace(best, gain=best.gain - usual))
     return sorted(found, key=lambda promise: -promise.gain)
 
 

@@ -32,25 +32,22 @@ class Breadth:
         self._less: dict[tuple[Model, str], Model] = {}
 
     def evidence(self) -> Mapping[Model, float]:
-        """Of every model of the search, its evidence; a model with an effect that is not broad has
-        no more than without that effect.
+        """Of every model of the search, its evidence beyond what a reference shows; a model with an
+        effect that is not broad has no more than without that effect.
         """
-        counted = {model: model.evidence for model in self._search.models}
+        counted = {model: self._search.news(model) for model in self._search.models}
         for model in sorted(self._search.models[1:], key=lambda m: -self._search.weight(m)):
             if self._matters(model, counted):
                 narrow = [name for name in model.names if not self.broad(model, name)]
-                less = [counted_of(counted, self.without(model, name)) for name in narrow]
-                counted[model] = min([model.evidence, *less])
+                less = [self._counted(counted, self.without(model, name)) for name in narrow]
+                counted[model] = min([counted[model], *less])
         return counted
 
     def broad(self, model: Model, name: str) -> bool:
-        """Whether an effect of a model gains in more than two stretches, and more than single runs
-        of a reference show of it.
-        """
+        """Whether an effect of a model gains in more than two stretches."""
         gains = np.sort(self.gains(model, name))
         rest = gains[: -TUNING.verdict.best_stretches]
-        usual = TUNING.screen.habit * self._search.first.habit.get(name, 0.0)
-        return bool(rest.size == 0 or rest.sum() > TUNING.verdict.broad + usual)
+        return bool(rest.size == 0 or rest.sum() > TUNING.verdict.broad)
 
     def gains(self, model: Model, name: str) -> Array:
         """Log density (b,) of each stretch given the others, above that without the effect."""
@@ -65,18 +62,17 @@ class Breadth:
     def _matters(self, model: Model, counted: Mapping[Model, float]) -> bool:
         """Whether the model is nearly as likely as the best one so far, as they count."""
         search = self._search
-        best = max(search.weight(m) - m.evidence + counted[m] for m in search.models[1:])
+        best = max(search.weight(m) - search.news(m) + counted[m] for m in search.models[1:])
         return search.weight(model) > best - TUNING.verdict.tested
+
+    def _counted(self, counted: Mapping[Model, float], model: Model) -> float:
+        """Of a model that may not have been part of the search."""
+        return counted.get(model, self._search.news(model))
 
     def _predicted(self, model: Model) -> Array:
         if model not in self._density:
             self._density[model] = held_out(model.fitted, self._stretches).log_density
         return self._density[model]
-
-
-def counted_of(counted: Mapping[Model, float], model: Model) -> float:
-    """Of a model that may not have been part of the search."""
-    return counted.get(model, model.evidence)
 
 
 def stretches(stack: Stack) -> list[Bools]:

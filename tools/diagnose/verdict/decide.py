@@ -34,7 +34,7 @@ def decide(search: Search) -> Decision:
         return Decision(verdict, search.bare, 1.0, None, _quiet(found), 0.0, {})
 
     evidence = Breadth(search).evidence()
-    best = max(search.models[1:], key=lambda m: search.weight(m) - m.evidence + evidence[m])
+    best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
     alone = nameless_beside(search.screening, search.bare)
     beside = nameless_beside(search.screening, best) if best.names else alone
 

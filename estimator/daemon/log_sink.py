@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
-from gritd.estimator.recording.topics import CHECKPOINT_TOPIC, LOOP_TOPIC, TICK_TOPIC
+from gritd.estimator.recording.topics import CHECKPOINT_TOPIC, LOOP_TOPIC, messages_of
 from gritd.estimator.recording.writer import WriterThread
 
 
@@ -18,7 +18,8 @@ class LogSink:
 
     def put(self, readings: Sequence[Reading], tick: TickRow, loop: LoopRecord) -> None:
         stamp = loop.stamp
-        self._writer.put(readings, [(TICK_TOPIC.name, stamp, tick), (LOOP_TOPIC.name, stamp, loop)])
+        messages = [*messages_of(tick), (LOOP_TOPIC.name, stamp, loop)]
+        self._writer.put(readings, messages)
 
     def counts(self) -> tuple[int, int]:
         status = self._writer.status()

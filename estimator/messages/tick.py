@@ -183,6 +183,11 @@ def _fields_of(block: type, prefix: str = "", unit: str = "") -> Iterator[Field]
         yield prefix + name, kind, meaning.replace("{unit}", unit)
 
 
+def fields_of(blocks: type) -> tuple[Field, ...]:
+    """Fields of the values in a row of a tuple of blocks, like `Tick`."""
+    return tuple(field for placed in _placed(blocks) for field in _fields_of(*placed))
+
+
 TICK_NAMES = names_of(Tick)
-TICK_FIELDS = tuple(field for placed in _placed(Tick) for field in _fields_of(*placed))
+TICK_FIELDS = fields_of(Tick)
 LOOP_FIELDS = tuple(_fields_of(LoopRecord))

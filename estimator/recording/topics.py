@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from gritd.estimator.messages.readings import WRENCH_FIELDS
-from gritd.estimator.messages.tick import LOOP_FIELDS, TICK_FIELDS
+from gritd.estimator.messages.tick import LOOP_FIELDS, TICK_FIELDS, TickRow
+from gritd.estimator.messages.update import UPDATE_FIELDS, update_of
 from gritd.estimator.recording.cdr import STRING, TIME, Field, Topic
 
 _STAMP: Field = ("stamp", TIME, "when the sample was taken")
@@ -54,6 +57,7 @@ LOG_TOPIC = Topic(
 )
 
 TICK_TOPIC = Topic("/tick", "gritd_msgs/msg/Tick", TICK_FIELDS)
+UPDATE_TOPIC = Topic("/update", "gritd_msgs/msg/Update", UPDATE_FIELDS)
 LOOP_TOPIC = Topic("/loop", "gritd_msgs/msg/Loop", LOOP_FIELDS)
 CHECKPOINT_TOPIC = Topic(
     "/checkpoint",
@@ -65,5 +69,13 @@ CHECKPOINT_TOPIC = Topic(
     ),
 )
 
-TOPICS = (TICK_TOPIC, LOOP_TOPIC, CHECKPOINT_TOPIC)  # beside the raw ones and /log
+TOPICS = (TICK_TOPIC, LOOP_TOPIC, CHECKPOINT_TOPIC, UPDATE_TOPIC)  # beside the raw ones and /log
 TICK, CHECKPOINT = TICK_TOPIC.name, CHECKPOINT_TOPIC.name
+
+
+def messages_of(tick: TickRow) -> Iterator[tuple[str, int, TickRow]]:
+    """What is recorded of a tick, itself and the update it made: topic, log time [ns], values."""
+    stamp = int(tick[0])
+    yield TICK, stamp, tick
+    if (update := update_of(tick)) is not None:
+        yield UPDATE_TOPIC.name, stamp, update

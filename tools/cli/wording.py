@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from gritd.estimator.filter.tuning import TRUST
+
 NOTHING = "–"
 PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
 SHOWN = {  # unit inside -> unit shown, factor
@@ -21,6 +23,7 @@ COVARIATES = {  # inside -> unit shown, factor; the others by their unit
     "speed": ("mm/s", 1e3),
     "position": ("m", 1.0),
 }
+TOO_SMALL, TOO_LARGE = 0.5, 2.0  # mean normalised innovation squared, of about 40: 1 is honest
 SCIENTIFIC = (1e-4, 1e6)
 
 
@@ -86,3 +89,14 @@ def spaced(value: float | None, unit: str, digits: int = 3) -> str:
 def listed(names: list[str]) -> str:
     """a; a and b; a, b and c."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def honesty(consistency: float | None) -> str:
+    """What the mean normalised innovation squared means for σ. It is 1 where σ is honest."""
+    if consistency is None or not math.isfinite(consistency):
+        return "no innovations yet"
+    if consistency > TRUST.mismatch:
+        return "model disagrees"
+    if consistency > TOO_LARGE:
+        return "σ too small"
+    return "σ as it should be" if consistency > TOO_SMALL else "σ on the safe side"

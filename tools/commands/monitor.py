@@ -15,6 +15,7 @@ from typing import Any
 
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.terminal import control
+from gritd.tools.cli.wording import honesty
 from gritd.tools.commands.status import disagreement
 from gritd.tools.service.client import Report, add_socket, connected, reports, told
 
@@ -179,7 +180,7 @@ def _belief(tick: Report) -> Iterator[str]:
     separability = _number(tick["separability"], 1.0, 3)
     yield f"separability  {separability}  (1: the weakest direction is as unknown as at the start)"
     yield (
-        f"consistency   {_number(tick['consistency'], 1.0, 2)}  (1 where σ is honest)"
+        f"consistency   {_number(tick['consistency'], 1.0, 2)}  {honesty(tick['consistency'])}"
         f"  {tick['updates']} updates, {tick['resets']} resets"
     )
     yield (

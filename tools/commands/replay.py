@@ -22,7 +22,7 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.recording.topics import CHECKPOINT, TICK_TOPIC, TOPICS
+from gritd.estimator.recording.topics import CHECKPOINT, TOPICS, messages_of
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
@@ -182,7 +182,8 @@ def _every_tick(
         if writer is not None:
             for reading in tick.readings:
                 writer.reading(reading)
-            writer.message(TICK_TOPIC.name, tick.stamp, record)
+            for message in messages_of(record):
+                writer.message(*message)
 
     if writer is not None:
         writer.close()

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.filter.tuning import TRUST
 from gritd.estimator.messages.status import UPDATED, Flag, Status
+from gritd.tools.cli.wording import honesty
 
 Rows = NDArray[np.void]  # structured: fields of /tick, one row a tick or one a window
 SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
@@ -36,8 +38,9 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"  k          {last['shear_modulus'] * 1e3:.1f} ± "
             f"{last['shear_modulus_sigma'] * 1e3:.1f} mm",
             *_side_by_side(rows),
-            "  innovations squared over their variance, last 2 s: "
-            f"{last['consistency']:.2f} (1 when honest)",
+            f"  σ          {honesty(float(last['consistency']))}: innovations squared over their "
+            f"variance {last['consistency']:.2f} in the last 2 s (1 where σ is honest, above "
+            f"{TRUST.mismatch:g} the model disagrees)",
         ]
     )
 

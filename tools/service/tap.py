@@ -21,7 +21,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.playback import ticks_at
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
-from gritd.estimator.recording.topics import TICK, TOPICS
+from gritd.estimator.recording.topics import TOPICS, messages_of
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.cli.progress import Progress
 
@@ -115,7 +115,8 @@ def _record(
         for reading in tick.readings:
             writer.reading(reading)
         state, row = pipeline.step(state, tick.readings, tick.stamp)
-        writer.message(TICK, tick.stamp, row)
+        for message in messages_of(row):
+            writer.message(*message)
         taken, ticks = taken + len(tick.readings), ticks + 1
 
     writer.close()

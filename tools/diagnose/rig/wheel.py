@@ -23,12 +23,13 @@ from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates
-from gritd.tools.diagnose.rig.constants import UNITS, calibration_sigmas, wheel_constants
+from gritd.tools.diagnose.rig.constants import UNITS, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
+from gritd.tools.diagnose.rig.recorded import channels_of, filled, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.states import at_rest, states
+from gritd.tools.diagnose.rig.states import states
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import weights_of
 from gritd.tools.diagnose.tuning import TUNING
@@ -71,13 +72,13 @@ class WheelRig:
         self.new = [number >= reference for number in range(len(signals))]
         self.caveats = [s.left_out for s in signals if s.left_out]
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]
-        self.channels = _channels(signals, settings, [w.known for w in self._weights])
+        self.channels = channels_of(signals, settings, [w.known for w in self._weights])
         began = {
             new: min(s.start for s, n in zip(signals, self.new, strict=True) if n == new)
             for new in set(self.new)
         }
         self._motions = [
-            _motion(s, w.values, settings, s.start - began[new])
+            motion_of(s, w.values, settings, s.start - began[new])
             for s, w, new in zip(signals, self._weights, self.new, strict=True)
         ]
         self._sets = weight_sets([np.asarray(m.load) for m in self._motions])
@@ -274,7 +275,7 @@ class WheelRig:
 
     def _run(self, signals: Signals, number: int) -> Run:
         motion = self._motions[number]
-        measured = {c: _measured(signals, c, self._constant) for c in self.channels}
+        measured = {c: measured_of(signals, c, self._constant) for c in self.channels}
         covariates = self._covariates(signals, motion) | {"sinkage": self._depth(number)}
         driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
@@ -328,7 +329,7 @@ class WheelRig:
 
     def _covariates(self, signals: Signals, motion: Motion) -> dict[str, Array]:
         situation = situation_of(motion, self.settings.wheel)
-        current = _filled(signals.analogue.get("current", np.zeros(signals.time.size)))
+        current = filled(signals.analogue.get("current", np.zeros(signals.time.size)))
         speed = self.settings.wheel.radius * np.abs(motion.wheel_speed)
         step = float(np.median(np.diff(signals.time)))
         ones = np.ones(signals.time.size)
@@ -346,65 +347,3 @@ class WheelRig:
             "pass": motion.pass_number * ones,
             "constant": ones,
         }
-
-
-def _channels(
-    signals: Sequence[Signals], settings: Settings, weights_known: Sequence[bool]
-) -> tuple[str, ...]:
-    """Those that some recording has and that carry information."""
-    source = {"torque": "current"}
-    channels = []
-    for channel in ("torque", "axle_torque", "drawbar_pull", "sinkage", "load"):
-        there = any(_varies(s.analogue.get(source.get(channel, channel))) for s in signals)
-        if (
-            there
-            and calibration_sigmas(settings, channel)[1] < TUNING.rig.unknown_offset
-            and (channel != "load" or all(weights_known))
-        ):
-            channels.append(channel)
-
-    return tuple(channels)
-
-
-def _varies(values: Array | None) -> bool:
-    return values is not None and bool(np.nanmax(values) > np.nanmin(values))
-
-
-def _measured(signals: Signals, channel: str, constant: float) -> Array:
-    nothing = np.full(signals.time.size, np.nan)
-    if channel == "torque":
-        return constant * signals.analogue.get("current", nothing)
-    return signals.analogue.get(channel, nothing)
-
-
-def _motion(signals: Signals, weights: Array, settings: Settings, began: float) -> Motion:
-    angle, travel = (
-        _filled(signals.wheel_angle),
-        _filled(signals.carriage_angle) * settings.pulley_radius,
-    )
-    wheel_speed, carriage_speed = (
-        _filled(signals.wheel_speed),
-        _filled(signals.carriage_rate) * settings.pulley_radius,
-    )
-
-    rest = at_rest(settings.wheel.radius * wheel_speed, carriage_speed)
-    temperature = signals.analogue.get("temperature")
-
-    return Motion(
-        time=signals.time + began,
-        wheel_angle=angle,
-        wheel_speed=np.where(rest, 0.0, wheel_speed),
-        carriage_position=travel - travel[0],
-        carriage_speed=np.where(rest, 0.0, carriage_speed),
-        load=weights,
-        pass_number=float(signals.info.pass_number),
-        start_position=signals.info.start_position,
-        temperature=None if temperature is None else _filled(temperature),
-    )
-
-
-def _filled(values: Array) -> Array:
-    """NaN bridged by straight lines."""
-    good = np.isfinite(values)
-    at = np.arange(values.size)
-    return np.interp(at, at[good], values[good]) if good.any() else np.zeros(values.size)

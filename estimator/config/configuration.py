@@ -57,14 +57,21 @@ def load(
 
 
 def reload(path: str | os.PathLike[str]) -> Configuration:
-    """Read a configuration file that takes the place of another while the daemon runs: an editor
-    may not have written all of it, so it has to show its end. Raises ConfigError.
+    """Read a configuration file that takes the place of another while the daemon runs. Raises
+    ConfigError.
     """
-    text = read_text(Path(path))
-    configuration = loads(text, str(path), Path(path).resolve().parent)
-    if not configuration.ended:
+    return loads(whole_text(Path(path)), str(path), Path(path).resolve().parent)
+
+
+def whole_text(path: Path) -> str:
+    """The text of a configuration file that shows its end: an editor may not have written all of
+    it. Raises ConfigError.
+    """
+    text = read_text(path)
+    compose(text, str(path))
+    if not is_ended(text):
         raise Place(str(path), text.count("\n") + 1, "").error("no end", "'...' as the last line")
-    return configuration
+    return text
 
 
 def with_engine(configuration: Configuration, engine: str | None) -> Configuration:

@@ -16,6 +16,7 @@ import yaml
 from gritd.config import packaged
 from gritd.estimator.config.configuration import ConfigError, load, loads, reload
 from gritd.estimator.config.yamltree import dumped
+from gritd.tools.cli.configuration_file import edited, save
 from tests.estimator.config.rig import HOSTILE
 from tests.scenarios.rig import (
     TESTBED,
@@ -95,21 +96,30 @@ def test_a_hundred_bad_files_change_nothing(tmp_path, seed, figure):
 
 def test_a_file_cut_at_every_byte(tmp_path, figure):
     """The packaged file, one that `--apply` wrote and one by hand: no cut is taken for a whole."""
-    explained = dumped({**yaml.safe_load(TESTBED.text), "effects": {"bulldozing": {"share": 0.5}}})
+    path = tmp_path / "testbed.yaml"
+    shutil.copy(packaged().with_suffix(".dbc"), tmp_path)
     by_hand = TESTBED.text.removeprefix("---\n").removesuffix("...\n")
+    explained = applied(path, f"{by_hand}...\n")
     texts = {
         "reload": (packaged().read_text(), reload),
         "after --apply": (explained, load),
         "reload of a file by hand": (by_hand, reload),
     }
-    path = tmp_path / "testbed.yaml"
-    shutil.copy(packaged().with_suffix(".dbc"), tmp_path)
     for name, (text, take) in texts.items():
         data = text.encode()
         whole = None if take is reload and "by hand" in name else loads(text, "x", tmp_path).text
         wrong = sum(taken(path, data[:cut], take) not in (None, whole) for cut in range(len(data)))
         figure(CUT, "configuration reader", f"cuts, {name}", len(data))
         figure(CUT, "configuration reader", f"cuts taken for another file, {name}", wrong, limit=0)
+
+
+def applied(path, text):
+    """What `--apply` makes of the text."""
+    path.write_text(text)
+    document = edited(path)
+    document.set(("effects", "bulldozing", "share"), "0.5")
+    save(document.text(), path, path)
+    return path.read_text()
 
 
 def taken(path, data, take):

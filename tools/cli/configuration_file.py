@@ -10,20 +10,21 @@ import tempfile
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config.yamltree import read_text
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.cli.yaml_edit import EditedYaml
 
 
 def edited(path: Path) -> EditedYaml:
-    """The file, to be changed. Raises ConfigError."""
-    return EditedYaml(read_text(path), str(path))
+    """The file, to be changed. Raises ConfigError, also where it may be a part of another."""
+    return EditedYaml(config.whole_text(path), str(path))
 
 
 def target(source: Path, output: Path | None, in_place: bool, option: str) -> Path:
     """Where the changed file goes: `output`, or `source` itself with `in_place`. `option` names the
-    output in messages. Raises CommandError.
+    output in messages. Raises CommandError; ConfigError where the source may be cut short, since
+    what is made of a part would look whole.
     """
+    config.whole_text(source)
     if in_place and (output is None or output.resolve() == source.resolve()):
         return source
     if output is None:
@@ -44,11 +45,12 @@ def target(source: Path, output: Path | None, in_place: bool, option: str) -> Pa
 def save(text: str, source: Path, place: Path) -> Path | None:
     """Write the changed text of `source` at `place`; returns the backup, where `place` is `source`.
 
-    A relative path of a CAN database follows the file. A text that is no valid configuration is
+    A relative path of a CAN database follows the file. What is written begins with '---' and ends
+    with '...', so that no part of it passes for the whole. A text that is no valid configuration is
     not written. Raises ConfigError, CommandError.
     """
     own = place.resolve() == source.resolve()
-    text = text if own else _moved(text, source, place)
+    text = _begun(text if own else _moved(text, source, place))
     config.loads(text, str(place), place.resolve().parent)
 
     try:
@@ -58,6 +60,19 @@ def save(text: str, source: Path, place: Path) -> Path | None:
         reason = (error.strerror or "cannot be written").lower()
         raise CommandError(f"{error.filename or place}: {reason}", USAGE) from None
     return backup
+
+
+def _begun(text: str) -> str:
+    """The text with the mark '---' after its first comments."""
+    lines = text.splitlines(keepends=True)
+    first = next((i for i, line in enumerate(lines) if not _is_comment(line)), len(lines))
+    if "".join(lines[first : first + 1]).startswith(("---", "%")):
+        return text
+    return "".join([*lines[:first], "---\n", *lines[first:]])
+
+
+def _is_comment(line: str) -> bool:
+    return not line.strip() or line.lstrip().startswith("#")
 
 
 def _moved(text: str, source: Path, place: Path) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config import units
 from gritd.estimator.config.settings import Settings, Uncertain
+from gritd.estimator.config.yamltree import read_text
 from gritd.tools.calibrate import plot
 from gritd.tools.calibrate.live import Live
 from gritd.tools.calibrate.outcome import Outcome, written
@@ -34,7 +35,8 @@ def main(argv: Sequence[str]) -> int:
     place = None
     if arguments.apply is not None or arguments.in_place:
         place = configuration_file.target(source, arguments.apply, arguments.in_place, "--apply")
-    settings, before = config.load(source).settings, configuration_file.edited(source)
+    settings = config.load(source).settings
+    before = EditedYaml(read_text(source), str(source))
 
     outcome = PROCEDURES[arguments.what](arguments, settings)
     print(outcome.text(before))

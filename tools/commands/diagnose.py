@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config.configuration import ConfigError, read_text
+from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli import configuration_file
@@ -211,7 +211,7 @@ def _apply(
     """
     again = arguments.redo is not None
     source = arguments.redo if again else Path(arguments.config)
-    text = configuration.text if again else read_text(source)
+    text = configuration.text if again else config.whole_text(source)
 
     changed = rewritten(text, configuration, diagnosis)
     backup = configuration_file.save(changed, source, arguments.apply)

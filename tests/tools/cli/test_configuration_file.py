@@ -10,7 +10,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.cli.configuration_file import save, target
+from gritd.tools.cli.configuration_file import edited, save, target
 from gritd.tools.commands import init
 
 GOOD = packaged().read_text(encoding="utf-8")
@@ -38,6 +38,30 @@ def test_where_it_goes(rig: Path) -> None:
         with pytest.raises(CommandError, match=line) as error:
             target(rig, output, in_place, "--apply")
         assert error.value.code == USAGE
+
+
+def test_a_source_that_may_be_cut_short_is_refused(rig: Path) -> None:
+    """What is made of a part would look whole."""
+    for text in (GOOD.removesuffix("...\n"), GOOD.removeprefix("---\n").removesuffix("...\n")):
+        rig.write_text(text)
+        for source in (edited, lambda path: target(path, None, True, "--apply")):
+            with pytest.raises(ConfigError, match=r"'\.\.\.' as the last line"):
+                source(rig)
+
+
+def test_what_is_written_is_refused_when_it_is_cut(rig: Path) -> None:
+    """Of a file by hand that begins with comments, too."""
+    by_hand = "# ours\n\n# of March\n" + GOOD.removeprefix("---\n")
+    rig.write_text(by_hand)
+    save(edited(rig).text(), rig, rig)
+    written = rig.read_text()
+    assert written.startswith("# ours\n\n# of March\n") and written.endswith("...\n")
+    assert written.count("---\n") == 1
+    save(edited(rig).text(), rig, rig)
+    assert rig.read_text() == written
+    rig.write_text(written[: len(written) // 2])
+    with pytest.raises(ConfigError):
+        config.load(rig)
 
 
 def test_in_place_keeps_every_earlier_one(rig: Path) -> None:

@@ -312,3 +312,80 @@ def test_an_output_that_cannot_be_made_is_usage(tmp_path: Path, taken: str) -> N
         (tmp_path / taken).mkdir(parents=True)
     said = complaint("mgst", mgst_files(tmp_path), "-o", tmp_path / "out", code=2)
     assert said.startswith(f"{tmp_path / 'out'}")
+
+
+# --- the wheel of the flights ---
+
+
+def quantised(folder: Path, step: float) -> Path:
+    """The made-up trial with a rim speed in steps, as the motor's own quantum makes them."""
+    mgst_files(folder)
+    rows = (folder / RIG).read_text().splitlines()
+    lines = []
+    for number, row in enumerate(rows[1:]):
+        cells = row.split(",")
+        cells[2] = f"{step * (9 + number % 3):.4f}"
+        lines.append(",".join(cells))
+    (folder / RIG).write_text("\n".join([rows[0], *lines]))
+    return folder
+
+
+@pytest.mark.parametrize(("step", "radius"), [(1.96665, 0.075), (3.9333, 0.15)])
+def test_the_radius_is_that_of_the_wheel_whatever_the_file_is_called(
+    tmp_path: Path, step: float, radius: float
+) -> None:
+    """A file of the flights renamed to 1-g_…: its motor's quantum is twice as many mm/s."""
+    quantised(tmp_path, step)
+    assert main(["mgst", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+    settings = config.load(tmp_path / "out" / "mgst.yaml").settings
+    assert settings.wheel.radius == radius
+    ground = radius == 0.075
+    assert ("Earth gravity" in settings.testbed) == ground
+
+    rows = salvage.read(tmp_path / "out" / "mgst-20-165209.mcap").arrays("/raw/wheel_encoder")
+    seconds = (rows["stamp"][-1] - rows["stamp"][0]) * 1e-9
+    turned = (rows["count"][-1] - rows["count"][0]) * 0.26222e-3
+    assert turned / seconds * radius == pytest.approx(10 * step * 1e-3, rel=2e-3)
+
+
+def test_a_wheel_that_nobody_knows_is_refused(tmp_path: Path) -> None:
+    quantised(tmp_path, 2.6)
+    assert "found steps of 2.6 mm/s" in complaint("mgst", tmp_path, "-o", tmp_path / "out")
+
+
+# --- the published MATLAB file ---
+
+
+def test_the_trials_of_a_matlab_file_are_those_of_the_table(tmp_path: Path) -> None:
+    fields = ("avg_Fx", "std_Fx", "avg_Fy", "std_Fy", "avg_Fz", "std_Fz", "avg_Vx", "avg_Vry")
+    fields += ("avg_Z", "std_Z", "Vry", "beta")
+    rng = np.random.default_rng(1)
+    trials = rng.uniform(1.0, 2.0, (6, len(fields)))
+    trials[:, 4] = -20.0  # load
+    trials[:, 6:8], trials[:, 8] = (10.0, 20.0), -35.0
+    trials[:, 10], trials[:, 11] = 20.0, (0.0, 0.0, 15.0, 0.0, 30.0, 0.0)
+
+    lines = [",".join(fields), *(",".join(map(repr, row)) for row in trials.tolist())]
+    for folder in ("csv", "mat"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "csv" / "smooth_all_trials_steady_state.csv").write_text("\n".join(lines))
+    structures = np.array(
+        [tuple(row) for row in trials.tolist()], dtype=[(name, float) for name in fields]
+    )
+    savemat(tmp_path / "mat" / "all_smooth_data.mat", {"all_results": structures})
+
+    written = {}
+    for folder in ("csv", "mat"):
+        assert main(["cmu", str(tmp_path / folder), "-o", str(tmp_path / folder / "out")]) == 0
+        files = sorted((tmp_path / folder / "out").rglob("*.mcap"))
+        written[folder] = {
+            f.name: salvage.read(f).arrays("/raw/wrench")["fx"].tolist() for f in files
+        }
+    assert len(written["mat"]) == 4 and written["mat"] == written["csv"]
+
+
+def test_a_matlab_file_of_something_else_is_one_line(tmp_path: Path) -> None:
+    savemat(tmp_path / "all_smooth_data.mat", {"x": np.arange(5.0)})
+    assert "found no trials" in complaint("cmu", tmp_path, "-o", tmp_path / "out")
+    (tmp_path / "all_smooth_data.mat").write_text("text")
+    assert "cannot be read" in complaint("cmu", tmp_path, "-o", tmp_path / "out")

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +35,7 @@ from gritd.tools.importers.files import (
 from gritd.tools.importers.recording import NS, Stream, configuration, counts, stamps, write
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
+from gritd.tools.importers.series.binary import struct_lists
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"
@@ -45,7 +48,9 @@ REPEATABLE = 0.7e-3
 TRUSTED_MATCH = 0.4  # residual under which a log is known to belong to a table row
 CONTACT = 2.0  # [N] force at which a plate has met the sand
 
-TABLE = re.compile(r"(smooth|grouser)_(?:all_trials|first_trial)_steady_state\.csv")
+TABLE = re.compile(
+    r"(?:all_)?(smooth|grouser)_(?:(?:all_trials|first_trial)_steady_state\.csv|data\.mat)"
+)
 LOG = re.compile(r"gr\d+_(vx_10|grouser)__([\d-]+)__10_(\d+)_0_(\d+)\.txt(?:\.gz)?")
 INDEX = re.compile(r"beta0_trials_index\.csv")
 PRESSED = re.compile(
@@ -165,18 +170,40 @@ def _import_table(
 
 
 def _straight(path: Path) -> list[tuple[float, Condition]]:
-    """Commanded rim speed and condition of each row with steering angle 0."""
-    table = read_table(path, ("beta", "Vry", *COLUMNS))
-    straight = numbers(path, table, "beta") == 0.0
-    commanded = numbers(path, table, "Vry")[straight]
-    columns = {name: numbers(path, table, name)[straight] for name in COLUMNS}
-    rows = [
-        dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
-    ]
+    """Commanded rim speed and condition of each row with steering angle 0. Raises RigFileError."""
+    columns = _of_mat(path) if path.suffix == ".mat" else _of_csv(path)
+    straight = columns["beta"] == 0.0
+    chosen = {name: values[straight] for name, values in columns.items()}
+    rows = [dict(zip(chosen, values, strict=True)) for values in zip(*chosen.values(), strict=True)]
     if not rows:
         raise RigFileError(f"{path}: found no row with beta 0; expected straight driving")
     check_few(path, len(rows))
-    return [(float(speed), _condition(row)) for speed, row in zip(commanded, rows, strict=True)]
+    return [(float(row["Vry"]), _condition(row)) for row in rows]
+
+
+def _of_csv(path: Path) -> dict[str, Array]:
+    names = ("beta", "Vry", *COLUMNS)
+    table = read_table(path, names)
+    return {name: numbers(path, table, name) for name in names}
+
+
+def _of_mat(path: Path) -> dict[str, Array]:
+    """The columns of the published MATLAB file: one variable is a list of structures, one a trial,
+    whose fields are those of the table. Raises RigFileError.
+    """
+    names = ("beta", "Vry", *COLUMNS)
+    for trials in struct_lists(path):
+        if all(name in trials[0] for name in names):
+            return {name: _column(path, name, trials) for name in names}
+    raise RigFileError(f"{path}: found no trials; expected structures with {', '.join(names)}")
+
+
+def _column(path: Path, name: str, trials: Sequence[Mapping[str, Any]]) -> Array:
+    """One field of all trials as finite numbers. Raises RigFileError."""
+    texts = [str(trial.get(name)) for trial in trials]
+    return np.array(
+        [finite_number(path, f"trial {n}: {name}", t) for n, t in enumerate(texts, start=1)]
+    )
 
 
 def _condition(row: dict[str, float]) -> Condition:

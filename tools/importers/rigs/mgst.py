@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -29,8 +30,11 @@ SUMMARY = (
     "single wheel in GRC-1 simulant: motion, sinkage, current, load, drawbar pull, axle torque"
 )
 
-RADIUS = 0.075  # [m]
-WHEEL_COUNT = 1.96665e-3 * 0.01 / RADIUS  # [rad] quantum of the rim speed over one sample
+RADIUS = 0.075  # [m] of the wheel on the ground
+QUANTUM = 1.96665e-3  # [m/s] of its rim speed; the motor's own quantum times the radius
+RADII = (0.075, 0.15)  # [m] of the wheels on the ground and in flight
+ALIKE = 0.02  # relative difference of a radius that is one of these
+WHEEL_COUNT = QUANTUM * 0.01 / RADIUS  # [rad] quantum of the wheel's speed over one sample
 CARRIAGE_COUNT = 9.5367e-6 * 0.01  # [m] quantum of the carriage speed over one sample
 TORQUE_PER_AMPERE = 6.2  # [N·m/A]
 COUNTS_PER_MM = 132.24
@@ -57,6 +61,7 @@ class Rig:
     rim_speed: Array  # rω [m/s]
     carriage_speed: Array  # [m/s]
     sinkage: Array  # [counts] since rest
+    radius: float = RADIUS  # [m] of the wheel
 
 
 @dataclass(frozen=True)
@@ -119,9 +124,8 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         for name, text in known.items()
     }
     source = "motor_shunt" if "torque" in args.conceal else "wrench"
-    configured = configuration(
-        "rig_mgst.yaml", args.output, "mgst.yaml", torque_source=source, **sigmas
-    )
+    values = {"torque_source": source, **_wheel(trials), **sigmas}
+    configured = configuration("rig_mgst.yaml", args.output, "mgst.yaml", **values)
     written = [args.output / "mgst.yaml"]
 
     tell(HEADER)
@@ -140,6 +144,23 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         written.append(write(args.output / f"{trial.name}.mcap", streams, configured, info))
 
     return written
+
+
+def _wheel(trials: Sequence[Trial]) -> dict[str, str]:
+    """Radius of the one wheel of all trials, and what follows. Raises RigFileError."""
+    radius = trials[0].rig.radius
+    other = next((trial for trial in trials if trial.rig.radius != radius), None)
+    if other is not None:
+        raise RigFileError(
+            f"{other.name}: found a wheel of radius {other.rig.radius:g} m beside one of "
+            f"{radius:g} m; expected one wheel an import"
+        )
+    ground = radius == RADIUS
+    return {
+        "radius": f"{1e3 * radius:g}",
+        "where": "GRC-1, Earth gravity" if ground else "GRC-1, the wheel of the flights",
+        "static_sigma": "8" if ground else "20",
+    }
 
 
 # --- reading ---
@@ -176,14 +197,33 @@ def _read_rig(path: Path, date: str) -> Rig:
     table = read_table(path, RIG_COLUMNS)
     clock = increasing(path, "timestamp", _times(path, table["timestamp"]))
     counted = numbers(path, table, "sinkage")
+    rim_speed = numbers(path, table, "maxon_velmes") * 1e-3
     return Rig(
         start=_midnight(path, date) + round(clock[0] * 1e9),
         t=clock - clock[0],
         current=numbers(path, table, "maxon_current"),
-        rim_speed=numbers(path, table, "maxon_velmes") * 1e-3,
+        rim_speed=rim_speed,
         carriage_speed=-numbers(path, table, "akd_velmes") * 1e-3,
         sinkage=counted - np.mean(counted[:REST]),
+        radius=_radius(path, rim_speed),
     )
+
+
+def _radius(path: Path, rim_speed: Array) -> float:
+    """The wheel's radius from the quantum of its rim speed, whatever the file is called: the motor
+    tells its speed in the same steps with every wheel. Raises RigFileError.
+    """
+    values = np.unique(rim_speed.round(7))
+    if values.size < 3:
+        return RADIUS  # too few to tell a step
+    told = RADIUS * float(np.min(np.diff(values))) / QUANTUM
+    known = [radius for radius in RADII if abs(told / radius - 1.0) < ALIKE]
+    if not known:
+        raise RigFileError(
+            f"{path}: maxon_velmes: found steps of {1e3 * np.min(np.diff(values)):.4g} mm/s, as of "
+            f"a wheel of radius {told:.3g} m; expected one of {RADII[0]:g} or {RADII[1]:g} m"
+        )
+    return known[0]
 
 
 def _read_sensor(path: Path) -> Sensor:
@@ -268,7 +308,7 @@ def _streams(
     rig, sensor = trial.rig, trial.sensor
     shared = (rig.t >= begin) & (rig.t <= lag + sensor.t[-1])
     times = stamps(rig.start, rig.t)[shared]
-    wheel = counts(rig.t, rig.rim_speed / RADIUS, WHEEL_COUNT)
+    wheel = counts(rig.t, rig.rim_speed / rig.radius, WHEEL_COUNT)
     carriage = counts(rig.t, rig.carriage_speed, CARRIAGE_COUNT)
 
     logged = {

@@ -11,12 +11,11 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.tools.cli.command import number
 from gritd.tools.importers.files import (
@@ -39,7 +38,9 @@ SUMMARY = (
 
 CSV = re.compile(r".*\.csv(?:\.gz)?")
 CONSTANTS = ("source", "wheel_radius_m", "wheel_width_m", "soil_simulant", "soil_shear_modulus_k_m")
-MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m", "meas_torque_nm")
+MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m")
+TORQUE = "meas_torque_nm"  # a table may lack it
+ALIKE = 0.02  # relative difference of loads that were meant to be one
 SOIL = (
     "simulant",
     "n",
@@ -77,6 +78,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
 
     parser.add_argument(
+        "--load-sigma",
+        type=number(above=0.0),
+        metavar="SIGMA",
+        help="standard deviation of a tabulated load [N]; else their scatter and last digit",
+    )
+
+    parser.add_argument(
         "--soil-strength",
         choices=("unknown", "table"),
         default="unknown",
@@ -85,7 +93,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
-    """One recording and one configuration a table. Raises RigFileError, RecordingError."""
+    """One recording and one configuration for each wheel on each soil of a table. Raises
+    RigFileError, RecordingError.
+    """
     files = [file for file, _ in find(args.paths, CSV)]
     tables = [file for file in files if _has(file, "slip")]
     if not tables:
@@ -108,32 +118,68 @@ def _has(path: Path, column: str) -> bool:
 
 
 def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell) -> list[Path]:
-    table = read_table(path, CONSTANTS + MEASURED)
-    conditions = _conditions(path, table, args)
+    torque = [TORQUE] if _has(path, TORQUE) else []
+    whole = read_table(path, [*CONSTANTS, *MEASURED, *torque])
+    check_few(path, len(whole[MEASURED[0]]))
     stem = path.name.partition(".")[0]
 
-    configured = configuration(
-        "rig_table.yaml", args.output, f"{stem}.yaml", **_values(path, table, soils, args)
+    groups = list(_groups(whole))
+    written = []
+    for at, (rows, table) in enumerate(groups, start=1):
+        name = stem if len(groups) == 1 else f"{stem}-{at}"
+        written += _import_group(path, name, rows, table, soils, args)
+        tell(_told(name, table))
+    return written
+
+
+def _groups(table: Table) -> Iterator[tuple[list[int], Table]]:
+    """The rows of each wheel on each soil with their numbers in the file, in the file's order."""
+    keys = list(zip(*(table[name] for name in CONSTANTS), strict=True))
+    for key in dict.fromkeys(keys):
+        chosen = [at for at, each in enumerate(keys) if each == key]
+        rows = {name: [column[at] for at in chosen] for name, column in table.items()}
+        yield [at + 2 for at in chosen], rows
+
+
+def _told(name: str, table: Table) -> str:
+    """A group in one line."""
+    loads = np.array([float(text) for text in table["vertical_load_n"]])
+    without = "" if TORQUE in table else ", no torque"
+    return (
+        f"{name}: {loads.size} steady states, mean load {loads.mean():.1f} N, radius "
+        f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{without}"
     )
+
+
+def _import_group(
+    path: Path,
+    name: str,
+    rows: list[int],
+    table: Table,
+    soils: list[Path],
+    args: argparse.Namespace,
+) -> list[Path]:
+    conditions = _conditions(path, rows, table, args)
+    values = _values(path, table, soils, args)
+    configured = configuration("rig_table.yaml", args.output, f"{name}.yaml", **values)
 
     load = float(np.mean([condition.load.value for condition in conditions]))
-    info = RunInfo(
-        name=stem,
-        nominal_load=round(load, 2),
-        notes=f"{len(conditions)} steady states from a table",
-    )
-
-    tell(f"{stem}: {len(conditions)} steady states, mean load {load:.1f} N")
-    recording = write(args.output / f"{stem}.mcap", streams(conditions, COUNTING), configured, info)
-    return [args.output / f"{stem}.yaml", recording]
+    notes = f"{len(conditions)} steady states from a table"
+    info = RunInfo(name=name, nominal_load=round(load, 2), notes=notes)
+    made = streams(conditions, COUNTING)
+    recording = write(args.output / f"{name}.mcap", made, configured, info)
+    return [args.output / f"{name}.yaml", recording]
 
 
-def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Condition]:
-    check_few(path, len(table[MEASURED[0]]))
+def _conditions(
+    path: Path, rows: list[int], table: Table, args: argparse.Namespace
+) -> list[Condition]:
     columns = [numbers(path, table, name).tolist() for name in MEASURED]
+    torques = numbers(path, table, TORQUE).tolist() if TORQUE in table else [None] * len(rows)
+    sigma = args.load_sigma or load_scatter(table["vertical_load_n"])
     conditions = []
 
-    for row, (load, slip, pull, sinkage, torque) in enumerate(zip(*columns, strict=True), start=2):
+    for row, load, slip, pull, sinkage, torque in zip(rows, *columns, torques, strict=True):
         if not -1.0 <= slip <= 1.0 or load <= 0.0:
             raise RigFileError(
                 f"{path}: row {row}: found slip {slip:g}, load {load:g}; expected -1 … 1, above 0 N"
@@ -144,13 +190,27 @@ def _conditions(path: Path, table: Table, args: argparse.Namespace) -> list[Cond
                 rim_speed=args.speed * min(1.0, 1.0 + slip),
                 carriage_speed=args.speed * min(1.0, 1.0 - slip),
                 sinkage=scatter_of_mean(sinkage, args.sinkage_sigma),
-                load=Uncertain(load),
+                load=scatter_of_mean(load, sigma),
                 drawbar_pull=scatter_of_mean(pull, args.drawbar_pull_sigma),
-                current=scatter_of_mean(torque, args.torque_sigma),
+                current=None if torque is None else scatter_of_mean(torque, args.torque_sigma),
             )
         )
 
     return conditions
+
+
+def load_scatter(texts: Sequence[str]) -> float:
+    """Standard deviation [N] of tabulated loads: how those differ that were meant to be one, within
+    ALIKE of each other, and the rounding to their last digit at least.
+    """
+    loads = np.sort(np.array([float(text) for text in texts]))
+    last = min(10.0 ** -len(text.partition(".")[2]) for text in texts)
+    clusters = np.split(loads, np.flatnonzero(np.diff(loads) > ALIKE * loads[:-1]) + 1)
+
+    squares = sum(float(((each - each.mean()) ** 2).sum()) for each in clusters)
+    freedom = loads.size - len(clusters)
+    scatter = math.sqrt(squares / freedom) if freedom else 0.0
+    return max(scatter, last / math.sqrt(12.0))
 
 
 def _values(

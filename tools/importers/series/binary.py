@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -34,17 +35,34 @@ def read_mat(path: Path) -> SeriesTable:
     """The vectors of a MATLAB file up to version 7, also those inside structures, as `s.name`. All
     of the longest length make the table. Raises RigFileError.
     """
-    try:
-        loadmat = import_module("scipy.io").loadmat
-        content = loadmat(path, squeeze_me=True, simplify_cells=True)
-    except Exception as error:  # scipy raises a different one for each kind of damage
-        raise _unreadable(path, error, "a MATLAB file, version 7 or older") from None
-
+    content = _content(path)
     vectors = {name: values for name, values in _vectors("", content).items() if values.size > 1}
     if not vectors:
         raise RigFileError(f"{path}: found no vector; expected columns of time series")
     rows = max(values.size for values in vectors.values())
     return _table(path, {name: v for name, v in vectors.items() if v.size == rows})
+
+
+def struct_lists(path: Path) -> list[list[Mapping[str, Any]]]:
+    """The lists of structures in a MATLAB file, of one structure at least. Raises RigFileError."""
+    return [
+        list(value)
+        for value in _content(path).values()
+        if isinstance(value, list | np.ndarray) and len(value) and isinstance(value[0], Mapping)
+    ]
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """The variables of a MATLAB file. Raises RigFileError."""
+    scipy_io = import_module("scipy.io")
+    try:
+        _check_size(path, sum(math.prod(shape) for _, shape, _ in scipy_io.whosmat(path)))
+        found: dict[str, Any] = scipy_io.loadmat(path, squeeze_me=True, simplify_cells=True)
+    except RigFileError:
+        raise
+    except Exception as error:  # scipy raises a different one for each kind of damage
+        raise _unreadable(path, error, "a MATLAB file, version 7 or older") from None
+    return found
 
 
 def _vectors(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,7 +81,8 @@ def _vectors(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _unreadable(path: Path, error: Exception, expected: str) -> RigFileError:
-    return RigFileError(f"{path}: cannot be read: {error}; expected {expected}")
+    reason = " ".join(str(error).split())
+    return RigFileError(f"{path}: cannot be read: {reason}; expected {expected}")
 
 
 def _check_size(path: Path, values: int) -> None:

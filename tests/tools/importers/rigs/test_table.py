@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.commands.import_rig import main
+from gritd.tools.importers.rigs.table import load_scatter
 from tests.real_recordings import REAL, Physical, needs
 
 
@@ -24,7 +25,7 @@ def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
         rim = trial.settings.wheel.radius * trial.speed("wheel_encoder", begin, begin + 6.0)
         slip = 1.0 - trial.speed("carriage_encoder", begin, begin + 6.0) / rim
         found.append((slip, trial.force("fx")[inside].mean(), torque[inside].mean()))
-        assert trial.force("fz")[inside] == pytest.approx(80.0)
+        assert trial.force("fz")[inside].mean() == pytest.approx(80.0)
 
     with (REAL / "ding" / "ding2011_smooth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
@@ -49,3 +50,61 @@ def test_the_soils_strength_is_hidden_unless_asked_for(tmp_path: Path) -> None:
             (cohesion, tan_phi), rel=1e-6
         )
         assert soil.pressure_sinkage.second == pytest.approx(2407.4e3)
+
+
+# --- made-up tables ---
+
+HEADER = (
+    "source,wheel_radius_m,wheel_width_m,soil_simulant,soil_shear_modulus_k_m,"
+    "vertical_load_n,slip,meas_drawbar_pull_n,meas_sinkage_m"
+)
+SOILS = (
+    "simulant,n,k_c_kN_per_m_n_plus_1,k_phi_kN_per_m_n_plus_2,cohesion_kPa,friction_angle_deg\n"
+    "sand,1.1,0.9,1500,0.5,30\nclay,0.7,10,800,5,20\n"
+)
+
+
+def rows_of(radius: float, soil: str, torque: str = "") -> list[str]:
+    return [
+        f"me,{radius},0.1,{soil},0.02,{40 + at / 100:.2f},{slip},{10 * slip},0.01{torque}"
+        for at, slip in enumerate((0.1, 0.2, 0.4))
+    ]
+
+
+def test_several_wheels_and_soils_without_torque(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [*rows_of(0.1, "sand"), *rows_of(0.15, "sand"), *rows_of(0.1, "clay")]
+    (tmp_path / "many.csv").write_text("\n".join([HEADER, *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.count("no torque") == 3
+
+    known = {}
+    for path in sorted((tmp_path / "out").glob("*.mcap")):
+        trial = Physical(path)
+        soil = trial.settings.soil
+        known[path.stem] = (trial.settings.wheel.radius, soil.exponent.value)
+        assert not trial.recording.counts["/raw/motor_shunt"]
+    assert known == {"many-1": (0.1, 1.1), "many-2": (0.15, 1.1), "many-3": (0.1, 0.7)}
+
+
+def test_loads_that_were_meant_to_be_one_do_not_differ_by_more_than_their_scatter(
+    tmp_path: Path,
+) -> None:
+    """40.00, 40.01 and 40.02 N are one load: no signal is to be read from their differences."""
+    (tmp_path / "one.csv").write_text(
+        "\n".join([f"{HEADER},meas_torque_nm", *rows_of(0.1, "sand", ",2.0")])
+    )
+    (tmp_path / "soils.csv").write_text(SOILS)
+    main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
+    load = Physical(tmp_path / "out" / "one.mcap").force("fz").reshape(3, -1)
+    uncertain = load.std(axis=1) / 60**0.5
+    assert uncertain == pytest.approx(0.01, rel=0.05)
+    assert np.ptp(load.mean(axis=1)) <= 2.01 * uncertain[0]
+
+
+def test_the_scatter_of_loads(tmp_path: Path) -> None:
+    assert load_scatter(["80.0", "80.0"]) == pytest.approx(0.1 / 12**0.5)
+    assert load_scatter(["40.1", "39.9", "80.2", "79.8"]) == pytest.approx(0.2236, rel=0.01)
+    assert load_scatter(["40", "80", "120"]) == pytest.approx(1 / 12**0.5)

@@ -15,7 +15,7 @@ class Verdict:
     stretches: int = tuned(24, "stretches", "of all runs, at least", "run time")
     stretches_of_a_run: int = tuned(3, "stretches", "at least", "run time")
     best_stretches: int = tuned(2, "stretches", "where an effect gains most: they do not count")
-    broad: float = tuned(3.0, "nats", "that an effect must gain in all others: twenty to one")
+    broad: float = tuned(2.0, "nats", "that an effect must gain in all others: seven to one")
     tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
 
     # --- decide.py ---

@@ -32,15 +32,14 @@ class Breadth:
         self._less: dict[tuple[Model, str], Model] = {}
 
     def evidence(self) -> Mapping[Model, float]:
-        """Of every model of the search, its evidence beyond what a reference shows; a model with an
-        effect that is not broad has no more than without that effect.
+        """Of every model of the search, its evidence beyond what a reference shows; minus infinity
+        for a model with an effect that is not broad.
         """
         counted = {model: self._search.news(model) for model in self._search.models}
         for model in sorted(self._search.models[1:], key=lambda m: -self._search.weight(m)):
-            if self._matters(model, counted):
-                narrow = [name for name in model.names if not self.broad(model, name)]
-                less = [self._counted(counted, self.without(model, name)) for name in narrow]
-                counted[model] = min([counted[model], *less])
+            tested = self._matters(model, counted)
+            if tested and not all(self.broad(model, name) for name in model.names):
+                counted[model] = -np.inf
         return counted
 
     def broad(self, model: Model, name: str) -> bool:
@@ -64,10 +63,6 @@ class Breadth:
         search = self._search
         best = max(search.weight(m) - search.news(m) + counted[m] for m in search.models[1:])
         return search.weight(model) > best - TUNING.verdict.tested
-
-    def _counted(self, counted: Mapping[Model, float], model: Model) -> float:
-        """Of a model that may not have been part of the search."""
-        return counted.get(model, self._search.news(model))
 
     def _predicted(self, model: Model) -> Array:
         if model not in self._density:

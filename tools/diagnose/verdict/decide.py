@@ -59,7 +59,8 @@ def weigh(
     functions without a name in the place of effects, and beside the best ones.
     """
     bare = search.bare.evidence
-    every = [Weighed(m, m.names, False, evidence[m] - bare) for m in search.models[1:]]
+    standing = [m for m in search.models[1:] if np.isfinite(evidence[m])]
+    every = [Weighed(m, m.names, False, evidence[m] - bare) for m in standing]
     if alone is not None:
         every.append(Weighed(alone.model, (), True, alone.gain))
     if beside is not None and best.names:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,8 @@ from scipy.special import expit, logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.verdict.calibration import Calibration
+from gritd.tools.proof.blind.groups import alike
+from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
 # ln temperature; log odds: listed, more, nameless; logit of the lapse
 START = np.array([np.log(1.5), 1.1, -1.9, 0.0, -3.5])
@@ -46,10 +48,19 @@ class Case:
 
 
 def case_of(
-    weighed: Sequence[dict[str, Any]], truth: Sequence[str], stranger: bool, candidates: int
+    weighed: Sequence[dict[str, Any]],
+    truth: Sequence[str],
+    stranger: bool,
+    candidates: int,
+    held: Collection[str] = (),
 ) -> Case:
-    """From the explanations of a diagnosis and the effects that were at work."""
-    right = [_true(w["names"], [] if stranger else truth) for w in weighed]
+    """From the explanations of a diagnosis and the effects that were at work; held: names that are
+    true of the rig itself, which are neither asked for nor wrong. Where no explanation holds a
+    true name, the right answer is that none is known.
+    """
+    right = [_true(w["names"], [] if stranger else truth, held) for w in weighed]
+    if not any(right):
+        right = [_true(w["names"], [], held) for w in weighed]
     return Case(
         np.array([w["evidence"] for w in weighed]),
         np.array([len(w["names"]) for w in weighed]),
@@ -59,11 +70,17 @@ def case_of(
     )
 
 
-def _true(names: Sequence[str], truth: Sequence[str]) -> float:
-    """How much of a set of effects is right: what both share over all that either holds."""
-    if not names or not truth:
-        return float(not names and not truth)
-    return len(set(names) & set(truth)) / len(set(names) | set(truth))
+def _true(names: Sequence[str], truth: Sequence[str], held: Collection[str]) -> float:
+    """How much of a set of effects is right: what both share over all that either holds. Effects
+    that say the same in most campaigns count as one.
+    """
+    asked = {alike(name) for name in truth}
+    own = {alike(name) for name in held}
+    said = {alike(name) for name in names}
+    said = {group for group in said if group in asked or group not in own}
+    if not said or not asked:
+        return float(not said and not asked)
+    return len(said & asked) / len(said | asked)
 
 
 def log_truth(case: Case, by: Calibration) -> float:
@@ -119,10 +136,10 @@ def _batch(folder: Path) -> list[Case]:
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
         if diagnosis["explanations"] and answers["effects"]:
             stranger = answers["stratum"] == "unlisted"
+            held = () if answers.get("bed") else HELD[answers.get("world", PAPER)]
+            count = diagnosis["candidates"]
             cases.append(
-                case_of(
-                    diagnosis["explanations"], answers["effects"], stranger, diagnosis["candidates"]
-                )
+                case_of(diagnosis["explanations"], answers["effects"], stranger, count, held)
             )
     return cases
 

@@ -70,7 +70,8 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
     held = replace(
         alone,
         u=np.zeros_like(fit.u),
-        jacobian=np.zeros_like(alone.jacobian),
+        own=np.zeros_like(alone.own),
+        allowance=alone.allowance.without_size(),
         residual=alone.residual
         - screening.problem.tolerance @ fit.slack[: screening.problem.tolerance.shape[1]],
     )

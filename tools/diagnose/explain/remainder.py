@@ -75,7 +75,7 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
     """Of each channel, the standard deviation that the learnt discrepancy of form has there."""
     stack, rig, fitted = problem.stack, problem.stack.rig, model.fitted
     count = problem.tolerance.shape[1]
-    spread = np.sqrt(np.sum(fitted.carried**2, axis=1))
+    spread = np.sqrt(np.sum(fitted.allowance.carried**2, axis=1))
     source = "reference" if stack.referred else "recordings"
     learnt = source if fitted.slack.size > count else "prior"
     found = {}

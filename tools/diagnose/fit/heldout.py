@@ -68,9 +68,9 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     """Density and prediction of every fold by the model fitted to the others; the discrepancies
     that it learnt are predicted too.
     """
-    own = fitted.carried
-    last = fitted.jacobian.shape[1] - own.shape[1]
+    own = fitted.allowance.carried
     j, r = fitted.jacobian, fitted.residual
+    last = j.shape[1] - own.shape[1]
     size = len(fitted.u) + len(fitted.x)
     centre = np.concatenate(
         (fitted.u, fitted.x, np.zeros_like(fitted.slack))

@@ -55,7 +55,7 @@ class Marginal:
     def __init__(self, fitted: Fitted, tolerance: Array, freedoms: Sequence[Freedom]) -> None:
         """tolerance: (N, t) whitened columns of unit prior that every fit has."""
         self.freedoms, known = tuple(freedoms), len(fitted.u) + len(fitted.x)
-        columns = [fitted.jacobian[:, :known], tolerance, *(f.whitened for f in freedoms)]
+        columns = [fitted.own, tolerance, *(f.whitened for f in freedoms)]
         every = np.column_stack([*columns, fitted.residual])
         self._products = every.T @ every
         self._ends = np.cumsum([c.shape[1] for c in columns])

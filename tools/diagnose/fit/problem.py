@@ -42,28 +42,65 @@ class Free:
         return 1.0 / TUNING.fit.strength_prior if self.parameter.role == "strength" else 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Allowance:
+    """What a fit may be off by beside constants and effects: columns of unit normal weights.
+
+    They are many, and most are shared between fits: so they are put together when asked for.
+    parts: columns (N, m) in the channels' units, the same whitened, and their size; fixed: how many
+    parts every fit has; those after them are predicted elsewhere too.
+    """
+
+    parts: tuple[tuple[Array, Array, float], ...]
+    fixed: int
+
+    def with_parts(self, more: Sequence[tuple[Array, Array, float]]) -> Allowance:
+        return replace(self, parts=(*self.parts, *more))
+
+    def without_size(self) -> Allowance:
+        """The same columns, all nought."""
+        return replace(self, parts=tuple((c, w, 0.0) for c, w, _ in self.parts))
+
+    @property
+    def columns(self) -> Array:
+        """(N, t) in the channels' units."""
+        return np.column_stack([size * columns for columns, _, size in self.parts])
+
+    @property
+    def whitened(self) -> Array:
+        """(N, t)."""
+        return np.column_stack([size * whitened for _, whitened, size in self.parts])
+
+    @property
+    def carried(self) -> Array:
+        """(N, m) in the channels' units: those that are predicted elsewhere too."""
+        none = self.parts[0][0][:, :0]
+        return np.column_stack(
+            [none, *(size * columns for columns, _, size in self.parts[self.fixed :])]
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Fitted:
     """An optimum of the posterior. x: constants in prior σ, then effect parameters in expected
-    sizes, then tolerance.
+    sizes, then the weights of what is allowed.
     """
 
     effects: tuple[Maker, ...]
     free: tuple[Free, ...]
     u: Array  # (q,)
     x: Array  # (p,)
-    predicted: Array  # (N,), tolerance not included
-    residual: Array  # (N,) whitened, tolerance not included
-    jacobian: Array  # (N, q + p + tolerance) whitened
+    predicted: Array  # (N,), what is allowed not included
+    residual: Array  # (N,) whitened, what is allowed not included
+    own: Array  # (N, q + p) whitened derivatives by constants and effect parameters
     raw: Array  # (N, q + p) the same in the channels' units
-    penalty: Array  # (q + p + tolerance,) square root of the prior precision
-    slack: Array  # fitted tolerance (t,)
+    penalty: Array  # (q + p + t,) square root of the prior precision
+    slack: Array  # (t,) fitted weights of what is allowed
     objective: float  # whitened squares and prior strain at the optimum
-    carried: (
-        Array  # (N, m) in the channels' units: the last of the tolerance, predicted elsewhere too
-    )
+    allowance: Allowance
+    gradient: Array  # (q + p,) of `nats`, what is allowed fitted to each
+    curvature: Array  # (q + p, q + p) likewise
     held: Bools  # (q + p,) stands at its bound and wants out
-    root: Array  # (t, t) Cholesky root of the tolerance's products and its prior
     converged: bool = False
 
     @property
@@ -83,25 +120,14 @@ class Fitted:
     def nats(self) -> float:
         return 0.5 * self.objective
 
-    @cached_property
-    def gradient(self) -> Array:
-        """Of `nats` by constants and effect parameters (q + p,), the tolerance fitted to each."""
-        own = self.jacobian[:, : self.raw.shape[1]]
-        left = self.residual - self.jacobian[:, own.shape[1] :] @ self.slack
-        return np.asarray(self.penalty[: own.shape[1]] ** 2 * self.centre - own.T @ left)
-
-    @cached_property
-    def curvature(self) -> Array:
-        """Of `nats` (q + p, q + p), the tolerance fitted to each."""
-        count = self.raw.shape[1]
-        own, tolerance = self.jacobian[:, :count], self.jacobian[:, count:]
-        inside = solve_triangular(self.root, tolerance.T @ own, lower=True, check_finite=False)
-        taken = inside.T @ inside
-        return np.asarray(own.T @ own - taken + np.diag(self.penalty[:count] ** 2))
+    @property
+    def jacobian(self) -> Array:
+        """(N, q + p + t) whitened."""
+        return np.column_stack((self.own, self.allowance.whitened))
 
     def covariance(self) -> Array:
-        gram = self.jacobian.T @ self.jacobian + np.diag(self.penalty**2)
-        return np.asarray(np.linalg.inv(gram))
+        jacobian = self.jacobian
+        return np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(self.penalty**2)))
 
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
@@ -118,16 +144,21 @@ def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Eff
 
 
 class Problem:
-    """The recordings, their noise and the tolerance, for any set of effects."""
+    """The recordings, their noise and what the model may be off by, for any set of effects."""
 
     def __init__(self, stack: Stack, noise: Noise, tolerance: Array) -> None:
         """tolerance: (N, t) smooth columns, each one standard deviation of what the model may be
         off by.
         """
-        self.stack, self.noise, self.allowed = stack, noise, tolerance
-        self.tolerance = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
-        self.carried = np.zeros((stack.size, 0))
+        self.stack, self.noise = stack, noise
+        whitened = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
+        self.allowance = Allowance(((tolerance, whitened, 1.0),), 1)
         self.measured = whiten(noise, stack.measured)
+
+    @cached_property
+    def tolerance(self) -> Array:
+        """All that is allowed (N, t), whitened."""
+        return self.allowance.whitened
 
     @cached_property
     def root(self) -> Array:
@@ -140,24 +171,22 @@ class Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
         """
-        return self._with(columns, whiten(self.noise, columns))
+        return self._with([(columns, whiten(self.noise, columns), 1.0)])
 
     def with_freedoms(self, freedoms: Sequence[Freedom], sizes: Sequence[float]) -> Problem:
         """The same with freedoms of given sizes."""
-        sized = [(f, size) for f, size in zip(freedoms, sizes, strict=True) if size > 0.0]
-        if not sized:
-            return self
-        return self._with(
-            np.column_stack([f.columns * size for f, size in sized]),
-            np.column_stack([f.whitened * size for f, size in sized]),
-        )
+        sized = [
+            (f.columns, f.whitened, size)
+            for f, size in zip(freedoms, sizes, strict=True)
+            if size > 0.0
+        ]
+        return self._with(sized) if sized else self
 
-    def _with(self, columns: Array, whitened: Array) -> Problem:
+    def _with(self, parts: Sequence[tuple[Array, Array, float]]) -> Problem:
         other = copy(self)
-        other.__dict__.pop("root", None)
-        other.tolerance = np.column_stack((self.tolerance, whitened))
-        other.allowed = np.column_stack((self.allowed, columns))
-        other.carried = np.column_stack((self.carried, columns))
+        other.allowance = self.allowance.with_parts(parts)
+        for stale in ("tolerance", "root"):
+            other.__dict__.pop(stale, None)
         return other
 
     def descend(
@@ -232,28 +261,34 @@ class _Ground:
 
     def moved(self, here: Fitted, tried: _Tried) -> Fitted:
         """There, with the derivatives of a fit that stands next to it."""
-        return self._fitted(tried, here.raw, here.jacobian[:, : here.raw.shape[1]])
+        return self._fitted(tried, here.raw, here.own)
 
-    def _fitted(self, tried: _Tried, raw: Array, whitened: Array) -> Fitted:
+    def _fitted(self, tried: _Tried, raw: Array, own: Array) -> Fitted:
         problem, centre = self._problem, tried.centre
-        jacobian = np.column_stack((whitened, problem.tolerance))
-        fitted = Fitted(
+        left = tried.residual - problem.tolerance @ tried.slack
+        precision = self._penalty[: centre.size] ** 2
+        gradient = np.asarray(precision * centre - own.T @ left)
+
+        shared = problem.tolerance.T @ own
+        inside = solve_triangular(problem.root, shared, lower=True, check_finite=False)
+        curvature = np.asarray(own.T @ own - inside.T @ inside + np.diag(precision))
+        return Fitted(
             self._effects,
             self._free,
             centre[: self._count],
             centre[self._count :],
             tried.predicted,
             tried.residual,
-            jacobian,
+            own,
             raw,
             self._penalty,
             tried.slack,
             tried.objective,
-            problem.carried,
-            np.zeros(centre.size, bool),
-            problem.root,
+            problem.allowance,
+            gradient,
+            curvature,
+            self.bounds.held(centre, gradient),
         )
-        return replace(fitted, held=self.bounds.held(centre, fitted.gradient))
 
     def _predicted(self, centre: Array) -> Array:
         acting = build(self._effects, self._free, centre[self._count :])

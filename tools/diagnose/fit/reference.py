@@ -45,8 +45,8 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
 def left(base: BaseFit) -> Array:
     """What a fit leaves (N,), its freedoms counted, in the channels' units."""
     fitted = base.fitted
-    count = fitted.carried.shape[1]
-    freedoms = fitted.carried @ fitted.slack[-count:] if count else 0.0
+    carried = fitted.allowance.carried
+    freedoms = carried @ fitted.slack[fitted.slack.size - carried.shape[1] :]
     return np.asarray(base.problem.stack.measured - fitted.predicted - freedoms)
 
 

@@ -68,7 +68,11 @@ class OpenNoise:
         stack = problem.stack
         centre = np.concatenate((fitted.u, fitted.x))
         base = np.column_stack(
-            (fitted.raw / fitted.penalty[: len(centre)], problem.allowed, fitted.carried)
+            (
+                fitted.raw / fitted.penalty[: len(centre)],
+                problem.allowance.columns,
+                fitted.allowance.carried,
+            )
         )
         y = stack.measured - fitted.predicted + fitted.raw @ centre
         columns = np.column_stack((base, *(s.columns for s in signatures), y))

@@ -24,7 +24,6 @@ from gritd.tools.diagnose.screen.ripples import loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
 from gritd.tools.diagnose.screen.screen import (
     Screen,
-    WhitenedSignature,
     screen_signatures,
     tail_chance,
     whitened,
@@ -61,7 +60,7 @@ class Screening:
 
 def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     """Everything that screens of any model share."""
-    noise, unknowns = base.problem.noise, base.fitted.jacobian.shape[1]
+    noise, unknowns = base.problem.noise, base.fitted.penalty.size
     residuals = whiten(noise, surrogates(noise, TUNING.screen.nulls, rng))
     drawn = Surrogates(residuals, rng.standard_normal((unknowns, TUNING.screen.nulls)))
 
@@ -107,21 +106,19 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     effects = _signatures(problem, model, None, everywhere=True)
     both = whitened(problem.noise, [*effects, *smooth_signatures(stack, everywhere=True)])
 
-    acting = np.where(stack.new, 1.0, 0.0)[:, None]
-    new = [
-        WhitenedSignature(
-            replace(s.signature, columns=s.signature.columns * acting), s.columns * acting
-        )
-        for s in both
-    ]
+    usual = habits(projection, both, stack)
+
+    for s in both:  # in their place: together they are large
+        s.signature.columns[~stack.new] = 0.0
+        s.columns[~stack.new] = 0.0
     searched = {family.shape: family.average(projection) for family in screening.families}
-    screen = screen_signatures(projection, new, searched)
+    screen = screen_signatures(projection, both, searched)
 
     of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
     shapes: dict[Candidate, float] = {
         f.shape: float(f.average(projection)[0]) for f in of_reference
     }
-    return screen.beside_reference({**shapes, **habits(projection, both, stack)})
+    return screen.beside_reference({**shapes, **usual})
 
 
 def chance_of(

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
-from gritd.tools.diagnose.fit.problem import Fitted, free_of
+from gritd.tools.diagnose.fit.problem import Allowance, Fitted, free_of
 
 N = 40
 SIZES = Sizes((0.0, 0.3, 1.0, 4.0), (0.1, 0.2, 0.3, 0.4))
@@ -33,14 +33,15 @@ def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
         np.abs(at[1:]),
         np.zeros(N),
         residual,
-        np.column_stack((jacobian, tolerance)),
+        jacobian,
         jacobian,
         np.ones(jacobian.shape[1] + 2),
         np.zeros(2),
         0.0,
-        np.zeros((N, 0)),
+        Allowance((), 0),
+        np.zeros(jacobian.shape[1]),
+        np.eye(jacobian.shape[1]),
         np.zeros(jacobian.shape[1], bool),
-        np.eye(2),
     )
     return Marginal(fitted, tolerance, freedoms), (jacobian, tolerance, columns, residual, at)
 

@@ -17,7 +17,7 @@ from gritd.tools.diagnose.fit.bending import bending_sizes
 from gritd.tools.diagnose.fit.evidence import strength_sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
-from gritd.tools.diagnose.fit.problem import Fitted, free_of
+from gritd.tools.diagnose.fit.problem import Allowance, Fitted, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screen import Screen
@@ -150,9 +150,10 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
         penalty,
         np.zeros(0),
         objective,
-        np.zeros((30, 0)),
+        Allowance((), 0),
+        np.zeros(2),
+        np.eye(2),
         np.zeros(2, bool),
-        np.zeros((0, 0)),
     )
 
     constant, strength = np.linspace(-4.0, 5.0, 300), np.linspace(0.0, 8.0, 400)

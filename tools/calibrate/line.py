@@ -13,6 +13,7 @@ from gritd.tools.cli.command import FAILED, CommandError
 
 SCATTER = 3.0  # residuals so many times what is expected, or more, are told
 BEND = 4.0  # [σ] at which a bend is told
+FLAT = 5.0  # [σ] of the slope, below which the readings do not follow the known values
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,9 @@ def fitted(points: Sequence[Point]) -> Line:
     off = raw - zero - slope * known
     excess = _excess(off / sigma)
     spread = np.sqrt(np.diag(covariance)) * max(excess, 1.0)
+    warnings = _warnings(known, raw, sigma, excess)
+    if abs(slope) < FLAT * spread[1]:
+        warnings.insert(0, "the readings do not follow the known values")
 
     return Line(
         tuple(points),
@@ -80,7 +84,7 @@ def fitted(points: Sequence[Point]) -> Line:
         Uncertain(-zero / slope, float(spread[0]) / abs(slope)),
         -off / slope,
         sigma / abs(slope),
-        tuple(_warnings(known, raw, sigma, excess)),
+        tuple(warnings),
     )
 
 

@@ -31,6 +31,8 @@ def test_a_good_line_warns_of_nothing_and_a_bad_one_says_what_is_wrong() -> None
     scattered = fitted(points(known, [0.0, 1.2, 1.8, 3.1, 3.9]))
     assert any("times what noise" in line for line in scattered.warnings)
     assert scattered.scale.sigma > 3.0 * good.scale.sigma
+    idle = fitted(points(known, [2.60, 2.61, 2.59, 2.605, 2.60]))
+    assert idle.warnings[0] == "the readings do not follow the known values"
     assert "a third" in fitted(points([0.0, 1.0], [0.0, 1.0])).warnings[0]
 
 

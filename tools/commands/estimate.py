@@ -36,10 +36,10 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 where no run could be used; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
     recordings = [files.recording(path) for path in arguments.files]
-    configurations = [_configuration(each, arguments.config) for each in recordings]
+    configurations = [configuration_of(each, arguments.config) for each in recordings]
     repeatability = _repeatability(configurations[0].settings.bed.repeatability, arguments)
 
-    given = [_settings(c, r) for c, r in zip(configurations, recordings, strict=True)]
+    given = [settings_of(c, r) for c, r in zip(configurations, recordings, strict=True)]
     check_same_rig(given, recordings)
     try:
         runs = _estimated(list(zip(given, recordings, strict=True)), repeatability)
@@ -66,7 +66,7 @@ def _estimated(
     return runs
 
 
-def _configuration(recording: Recording, path: str | None) -> Configuration:
+def configuration_of(recording: Recording, path: str | None) -> Configuration:
     """The given configuration, or the recording's own. Raises CommandError, ConfigError."""
     if path is not None:
         return load(path)
@@ -77,7 +77,7 @@ def _configuration(recording: Recording, path: str | None) -> Configuration:
     return loads(recording.config_yaml, f"{recording.path}: gritd.config")
 
 
-def _settings(configuration: Configuration, recording: Recording) -> Settings:
+def settings_of(configuration: Configuration, recording: Recording) -> Settings:
     return settings_of_run(without_absent(configuration.settings, recording), recording.run)
 
 

@@ -36,6 +36,10 @@ COMMANDS = {
         "what runs on one bed know together of its soil",
     ),
     "bed": ("gritd.tools.commands.bed", "the bed on which the daemon's runs add up: show, new"),
+    "report": (
+        "gritd.tools.commands.report",
+        "a page for the lab book: forces beside the equations, estimates, sensors",
+    ),
     "diagnose": (
         "gritd.tools.commands.diagnose",
         "where model and recordings differ, and which physics was left out",

@@ -100,8 +100,8 @@ def table(
     return tag("table", title, tag("thead", tag("tr", top)), tag("tbody", body), class_=narrow)
 
 
-def section(title: str, *content: Child) -> Markup:
-    return tag("section", tag("h2", title), *content)
+def section(title: str, *content: Child, class_: str | None = None) -> Markup:
+    return tag("section", tag("h2", title), *content, class_=class_)
 
 
 def page(title: str, *body: Child) -> str:

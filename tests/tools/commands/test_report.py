@@ -1,0 +1,79 @@
+"""`gritd report`: what a run or a campaign shows without a diagnosis."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config.configuration import load
+from gritd.estimator.config.settings import settings_of_run
+from gritd.estimator.offline.bed_runs import bed_runs
+from gritd.estimator.recording.salvage import read
+from gritd.tools import main as cli
+from gritd.tools.commands import simulate
+from gritd.tools.report import lab
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("campaign")
+    made = []
+    for load_ in (45, 90):
+        slips = "".join(
+            f"  - {{duration: 3 s, load: {load_} N, slip: {slip}, speed: 20 mm/s}}\n"
+            for slip in (0.1, 0.3, 0.5)
+        )
+        (folder / "s.yaml").write_text(f"segments:\n{slips}")
+        made.append(folder / f"at{load_}.mcap")
+        command = ["--schedule", str(folder / "s.yaml"), "--seed", str(load_), "-o", str(made[-1])]
+        assert simulate.main(command) == 0
+    return made
+
+
+@pytest.fixture(scope="module")
+def of(runs: list[Path]) -> list[lab.LabRun]:
+    settings = load(packaged()).settings
+    given = [(settings_of_run(settings, r.run), r) for r in map(read, runs)]
+    return lab.lab_runs(list(bed_runs(given, settings.bed.repeatability)))
+
+
+def test_the_original_equations_are_what_a_simulated_run_obeys(of: list[lab.LabRun]) -> None:
+    """The simulator is Eqs. (1)-(10): they fit within the noise, the closed form does not."""
+    for run in of:
+        assert run.beside is not None
+        for channel in ("torque", "drawbar_pull"):
+            assert run.beside.off(channel, "original") < 0.02
+        assert run.beside.off("torque", "closed") > 2.0 * run.beside.off("torque", "original")
+
+
+def test_the_table_has_load_slips_duration_and_hash(of: list[lab.LabRun], runs: list[Path]) -> None:
+    rows = lab.table_of(of)
+    assert [row[0] for row in rows] == ["at45", "at90"]
+    assert [row[2] for row in rows] == ["45", "90"]
+    assert rows[0][3] == "10 … 50" and rows[0][4] == "9.0"
+    assert rows[0][5] == hashlib.sha256(runs[0].read_bytes()).hexdigest()[:12]
+
+
+def test_the_page_is_whole_and_says_what_all_runs_know(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "page.html"
+    assert cli.main(["report", *map(str, runs), "-o", str(out)]) == 0
+    page = out.read_text(encoding="utf-8")
+    ElementTree.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
+    for words in ("2 runs together know the soil as c", "differs from the original equations by",
+                  "at45", "wheel_encoder", "SHA-256"):  # fmt: skip
+        assert words in page
+    assert np.count_nonzero([line == str(out) for line in capsys.readouterr().out.split()]) == 1
+
+
+def test_an_output_that_cannot_be_written_is_one_line(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["report", str(runs[0]), "-o", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

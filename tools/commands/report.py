@@ -1,0 +1,87 @@
+"""`gritd report FILE…`: a page for the lab book on a run or a campaign, without a diagnosis."""
+
+from __future__ import annotations
+
+import shlex
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from gritd.estimator.offline.bed_runs import bed_runs
+from gritd.estimator.recording.mcapfile import RecordingError
+from gritd.estimator.recording.metadata import versions
+from gritd.tools.cli import files
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.progress import Progress
+from gritd.tools.commands.estimate import check_same_rig, configuration_of, settings_of
+from gritd.tools.report import campaign, lab
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0; 3 where a recording is damaged. Raises CommandError."""
+    arguments = _parser().parse_args(argv)
+    if not arguments.output.parent.is_dir() or arguments.output.is_dir():
+        raise CommandError(f"{arguments.output}: expected the name of a file to write", USAGE)
+
+    told = _campaign(arguments, ["gritd", "report", *argv])
+    try:
+        arguments.output.write_text(campaign.render(told), encoding="utf-8")
+    except OSError as error:
+        raise CommandError(f"{arguments.output}: {(error.strerror or '').lower()}", USAGE) from None
+    print(arguments.output)
+    return DAMAGED if any(run.run.recording.damage for run in told.runs) else DONE
+
+
+def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign:
+    """The runs on one bed, with what their filter says. Raises CommandError."""
+    recordings = [files.recording(path) for path in arguments.files]
+    configurations = [configuration_of(each, arguments.config) for each in recordings]
+    given = [settings_of(c, r) for c, r in zip(configurations, recordings, strict=True)]
+    check_same_rig(given, recordings)
+
+    repeatability = configurations[0].settings.bed.repeatability
+    runs = []
+    with Progress("report", len(given)) as progress:
+        try:
+            for run in bed_runs(zip(given, recordings, strict=True), repeatability):
+                runs.append(run)
+                progress.advance()
+        except RecordingError as error:
+            raise CommandError(error, DAMAGED) from None
+
+    if not any(len(run.carried.rows) for run in runs):
+        raise CommandError(f"{recordings[0].path}: holds no readings", DAMAGED)
+    made = lab.lab_runs(runs)
+    return campaign.Campaign(
+        given[0].testbed,
+        made,
+        {
+            "command": shlex.join(command),
+            "files": {str(run.run.recording.path): run.sha256 for run in made},
+            "configuration": configurations[0].text,
+            "versions": versions(),
+        },
+        [f"{r.path.name}: {line}" for r in recordings for line in r.damage],
+    )
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="gritd report",
+        description=(
+            "Write a page on runs of one bed: forces beside the equations, estimates, sensors."
+        ),
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
+    parser.add_argument(
+        "--config", metavar="F", help="for all runs, instead of the recorded configurations"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("report.html"),
+        metavar="OUT.html",
+        help="default: report.html",
+    )
+    return parser

@@ -1,0 +1,332 @@
+"""The report of a campaign without a diagnosis: what was driven, forces beside the equations, the
+estimates with their bands, and the state of the sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from gritd.estimator.filter.estimate import KPA, TAN_PHI, C, Estimate
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.wording import honesty, listed, percent
+from gritd.tools.report import figures, lab, plot, redo
+from gritd.tools.report.html import Child, Markup, page, section, table, tag
+from gritd.tools.report.lab import Beside, LabRun
+from gritd.tools.report.words import counted, held, sentence, uncertain
+
+FORCES = {"torque": "T [N·m]", "drawbar_pull": "DP [N]"}
+SOIL = {  # field -> label, factor
+    "cohesion": ("c [Pa]", 1.0),
+    "tan_phi": ("tan φ", 1.0),
+    "shear_modulus": ("k [mm]", 1e3),
+}
+HEIGHT, TOP, BOTTOM = 220.0, 22.0, 182.0  # [px] of a picture and its axes
+CURVE = 40  # points of a curve over slip
+ELLIPSES = 5  # of one run, over its time
+KEY = {"prior": "recorded", "before": "original, Eqs. 1–10", "after": "closed form, Eqs. 20–22"}
+LATE = 5.0  # usual distances of two messages: what is farther is a gap
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is told of a campaign."""
+
+    testbed: str
+    runs: Sequence[LabRun]
+    redo: Mapping[str, Any]
+    notes: Sequence[str] = field(default_factory=list)
+
+    @property
+    def estimate(self) -> Estimate:
+        """What all runs know of the soil."""
+        return self.runs[-1].run.known.estimate
+
+
+def render(campaign: Campaign) -> str:
+    """The whole document."""
+    return page(
+        f"gritd report: {campaign.testbed}",
+        _title(campaign),
+        _runs(campaign),
+        _forces(campaign),
+        _estimates(campaign),
+        _ellipses(campaign),
+        _sensors(campaign),
+        _notes(campaign),
+        section("To redo it", redo.content(campaign.redo), class_="appendix"),
+    )
+
+
+# --- the first page ---
+
+
+def _title(campaign: Campaign) -> Markup:
+    count = counted(len(campaign.runs), "run")
+    return tag(
+        "header",
+        tag("p", f"gritd report · {campaign.testbed} · {count}", class_="kicker"),
+        tag("h1", campaign.testbed),
+        tag("p", held(_summary(campaign)), class_="summary"),
+        class_="verdict explained",
+    )
+
+
+def _summary(campaign: Campaign) -> str:
+    """Soil, and how far both forms of the equations are off."""
+    x, P, _ = campaign.estimate
+    c, tan_phi = (x[i] for i in (C, TAN_PHI))
+    sigma_c, sigma_t = (sqrt(P[i][i]) for i in (C, TAN_PHI))
+    together = "together know" if len(campaign.runs) > 1 else "knows"
+    soil = (
+        f"{counted(len(campaign.runs), 'run')} {together} the soil as "
+        f"c {uncertain(c * KPA, sigma_c * KPA)} Pa, tan φ {uncertain(tan_phi, sigma_t)}."
+    )
+    return f"{soil} {_differences(campaign)}".strip()
+
+
+def _differences(campaign: Campaign) -> str:
+    """Of both forms from what was measured, over all runs, weighted by their windows."""
+    parts = []
+    for channel, label in FORCES.items():
+        off = {which: _off(campaign, channel, which) for which in ("original", "closed")}
+        if isfinite(off["original"]):
+            parts.append(
+                f"{label.split(' ')[0]} differs from the original equations by "
+                f"{off['original']:.1%} and from the closed form by {off['closed']:.1%}"
+            )
+    return sentence(listed(parts)) if parts else ""
+
+
+def _off(campaign: Campaign, channel: str, which: str) -> float:
+    found = [
+        (run.beside.off(channel, which), len(run.beside.slip))
+        for run in campaign.runs
+        if run.beside and isfinite(run.beside.off(channel, which))
+    ]
+    if not found:
+        return float("nan")
+    return sum(off * count for off, count in found) / sum(count for _, count in found)
+
+
+def _runs(campaign: Campaign) -> Markup:
+    remarks = [
+        tag("li", f"{run.name}: {run.run.recording.run.notes}")
+        for run in campaign.runs
+        if run.run.recording.run.notes
+    ]
+    return section(
+        "Runs",
+        table(lab.HEAD, lab.table_of(campaign.runs)),
+        tag("ul", remarks) if remarks else None,
+    )
+
+
+# --- forces ---
+
+
+def _forces(campaign: Campaign) -> Markup | None:
+    of = [run for run in campaign.runs if run.beside is not None]
+    if not of:
+        return None
+    note = (
+        "Both forms at the measured entry angle, slip and load, with the soil that all runs "
+        "together know. A percentage is the mean difference, of the mean measured size."
+    )
+    return section("Drawbar pull and torque against slip", tag("p", note), _drawn_forces(of))
+
+
+def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
+    for channel, label in FORCES.items():
+        drawn = [
+            figures.panel(run.name, _over_slip(run.beside, channel, label), _share(run, channel))
+            for run in of
+            if run.beside is not None and isfinite(run.beside.off(channel, "original"))
+        ]
+        if drawn:
+            name = label.split(" ")[0]
+            caption = f"{name} against slip, original and closed form beside what was recorded."
+            yield figures.figure(caption, figures.panels(drawn), legend=figures.legend(KEY))
+
+
+def _share(run: LabRun, channel: str) -> str:
+    """Load, and how far both forms are off."""
+    assert run.beside is not None
+    off = [f"{run.beside.off(channel, which):.1%}" for which in ("original", "closed")]
+    return f"{run.run.settings.load.nominal.value:g} N, {off[0]} | {off[1]}"
+
+
+def _over_slip(of: Beside, channel: str, label: str) -> Markup:
+    """Recorded windows as dots, both forms as curves of their means over slip."""
+    slip, measured = of.slip * 100.0, of.measured[channel]
+    computed = {"before": of.original[channel], "after": of.closed[channel]}
+    at = plot.axes(plot.limits(slip), plot.limits(measured, *computed.values()), TOP, BOTTOM)
+    curves = [
+        plot.line(at, *_mean_over(slip, values), f"line {kind}")
+        for kind, values in computed.items()
+    ]
+    frame = plot.frame(at, label, below="slip [%]")
+    dots = plot.dots(at, slip, measured, "dots prior")
+    return plot.picture(HEIGHT, f"{label} against slip", frame, dots, *curves)
+
+
+def _mean_over(x: Array, y: Array) -> tuple[Array, Array]:
+    """Means of y (n,) in bins of x, at the bins' mean x."""
+    edges = np.linspace(np.min(x), np.max(x), CURVE + 1)
+    which = np.clip(np.digitize(x, edges) - 1, 0, CURVE - 1)
+    filled = [at for at in range(CURVE) if np.any(which == at)]
+    means = [(np.mean(x[which == at]), np.mean(y[which == at])) for at in filled]
+    xs, ys = np.array(means).T
+    return xs, ys
+
+
+# --- estimates ---
+
+
+def _estimates(campaign: Campaign) -> Markup:
+    note = (
+        "Each run begins with what the runs before it know. The band is ± 1σ."
+        if len(campaign.runs) > 1
+        else "The band is ± 1σ."
+    )
+    panels = (
+        figures.panel(label, _over_time(campaign, name, label, factor))
+        for name, (label, factor) in SOIL.items()
+    )
+    caption = "Cohesion, tan φ and shear modulus over the time of all runs, one after the other."
+    return section(
+        "The estimates", tag("p", note), figures.figure(caption, figures.panels(panels), small=True)
+    )
+
+
+def _over_time(campaign: Campaign, name: str, label: str, factor: float) -> Markup:
+    """Value and band over the driven time of all runs."""
+    value = np.concatenate([run.rows[name] for run in campaign.runs]) * factor
+    sigma = np.concatenate([run.rows[f"{name}_sigma"] for run in campaign.runs]) * factor
+    time, begins = _time(campaign)
+    at = plot.axes(plot.limits(time), plot.limits(value - sigma, value + sigma), TOP, BOTTOM)
+    edges = [plot.line(at, time, value + sign * sigma, "line thin prior") for sign in (-1, 1)]
+    return plot.picture(
+        HEIGHT,
+        f"{label} over time",
+        plot.frame(at, label, below="time [s]"),
+        plot.uprights(at, begins[1:], "change"),
+        *edges,
+        plot.line(at, time, value, "line after"),
+    )
+
+
+def _time(campaign: Campaign) -> tuple[Array, list[float]]:
+    """Time [s] of every window, the runs one after the other, and where each begins."""
+    pieces, begins, passed = [], [], 0.0
+    for run in campaign.runs:
+        stamps = run.rows["evaluated"]
+        time = (stamps - stamps[0]) * lab.NS if len(stamps) else np.zeros(0)
+        begins.append(passed)
+        pieces.append(time + passed)
+        passed += float(time[-1]) if len(time) else 0.0
+    return np.concatenate(pieces), begins
+
+
+def _ellipses(campaign: Campaign) -> Markup:
+    """1σ ellipses of c and tan φ: some of each run, and the last."""
+    chosen = [
+        _outline(row)
+        for run in campaign.runs
+        for row in run.rows[np.linspace(0, len(run.rows) - 1, ELLIPSES).astype(int)]
+    ]
+    last = chosen.pop()
+    at = plot.axes(
+        plot.limits(*(c for c, _ in chosen), last[0]),
+        plot.limits(*(t for _, t in chosen), last[1]),
+        TOP,
+        BOTTOM,
+    )
+    drawn = [plot.line(at, *outline, "line thin prior") for outline in chosen]
+    picture = plot.picture(
+        HEIGHT,
+        "ellipses of c and tan φ",
+        plot.frame(at, "tan φ", below="c [Pa]"),
+        *drawn,
+        plot.line(at, *last, "line after"),
+    )
+    key = figures.legend({"prior": "on the way", "after": "at the end"})
+    caption = "What is known of c and tan φ together: ellipses of 1σ over the time of all runs."
+    panel = figures.panels([figures.panel("c and tan φ", picture)])
+    return section(
+        "Cohesion and friction together", figures.figure(caption, panel, legend=key, small=True)
+    )
+
+
+def _outline(row: np.void) -> tuple[Array, Array]:
+    """The 1σ ellipse of c [Pa] and tan φ at one window."""
+    covariance = np.array(
+        [
+            [row["cohesion_sigma"] ** 2, row["cov_c_tan_phi"]],
+            [row["cov_c_tan_phi"], row["tan_phi_sigma"] ** 2],
+        ]
+    )
+    scale = np.sqrt(np.diag(covariance)) + 1e-300
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    angle = np.linspace(0.0, 2.0 * np.pi, 61)
+    circle = np.vstack([np.cos(angle), np.sin(angle)])
+    ring = (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle * scale[:, None]
+    return row["cohesion"] + ring[0], row["tan_phi"] + ring[1]
+
+
+# --- sensors ---
+
+
+def _sensors(campaign: Campaign) -> Markup:
+    """Rate, gaps and longest silence of every channel, over all runs; what the filter said."""
+    rows = [
+        [
+            run.name,
+            topic.topic.removeprefix("/raw/"),
+            f"{topic.rate:.4g}",
+            str(topic.gaps),
+            f"{topic.longest * 1e3:.0f}",
+        ]
+        for run in campaign.runs
+        for topic in run.summary.topics
+        if topic.topic.startswith("/raw/")
+    ]
+    said = [
+        tag(
+            "li",
+            f"{run.name}: updated in {percent(_tracked(run))} of its windows, "
+            f"{honesty(float(run.rows['consistency'][-1]))}{_lateness(run)}",
+        )
+        for run in campaign.runs
+    ]
+    head = ("run", "channel", "rate [Hz]", "gaps", "longest [ms]")
+    note = f"A gap is more than {LATE:g} times the usual distance of two readings."
+    return section(
+        "The sensors and the filter",
+        tag("ul", said),
+        table(head, rows, numbers=2),
+        tag("p", note, class_="note"),
+    )
+
+
+def _tracked(run: LabRun) -> float:
+    return 0.0 if run.beside is None else len(run.beside.slip) / max(len(run.rows), 1)
+
+
+def _lateness(run: LabRun) -> str:
+    """Of the daemon's loop, where it was recorded."""
+    recording = run.run.recording
+    if not recording.counts["/loop"]:
+        return ""
+    late = np.quantile(recording.arrays("/loop")["lateness"], (0.99, 1.0)) * 1e3
+    return f", ticks late by {late[0]:.2f} ms (99 %), {late[1]:.2f} ms (max)"
+
+
+def _notes(campaign: Campaign) -> Child:
+    if not campaign.notes:
+        return None
+    return section("Notes", tag("ul", (tag("li", sentence(note)) for note in campaign.notes)))

@@ -1,0 +1,171 @@
+"""Runs as a lab book has them: what was driven, and what the equations say beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.measurement import soil as soil_of
+from gritd.estimator.messages.status import Status
+from gritd.estimator.offline.bed_runs import BedRun
+from gritd.estimator.recording.recording import Recording
+from gritd.estimator.terramechanics import linear, original
+from gritd.estimator.terramechanics.soil import Array, Soil
+from gritd.tools.cli.wording import NOTHING, fixed
+from gritd.tools.recordings.summary import RunSummary, summary
+
+NS = 1e-9
+PIECE = 1 << 20  # [bytes] that are hashed at once
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Measured beside the equations at the windows (n,) at which the filter was updated."""
+
+    slip: Array
+    load: Array  # [N]
+    measured: dict[str, Array]  # torque [N·m], drawbar_pull [N]
+    original: dict[str, Array]  # by Eqs. (1)-(10), with the modulus that carries the load
+    closed: dict[str, Array]  # by Eqs. (20)-(22)
+
+    def off(self, channel: str, which: str) -> float:
+        """Mean |difference| from what was measured, as a share of the mean measured size; NaN where
+        the channel was not measured.
+        """
+        measured, computed = self.measured[channel], getattr(self, which)[channel]
+        good = np.isfinite(measured)
+        if not good.any():
+            return float("nan")
+        size = np.mean(np.abs(measured[good]))
+        return float(np.mean(np.abs(computed[good] - measured[good])) / size)
+
+
+@dataclass(frozen=True)
+class LabRun:
+    """One run."""
+
+    run: BedRun
+    summary: RunSummary
+    sha256: str
+    beside: Beside | None  # None where the filter was never updated
+
+    @property
+    def name(self) -> str:
+        return self.run.recording.run.name or self.run.recording.path.stem
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Windows (n,), fields of /tick."""
+        return self.run.carried.rows
+
+
+def lab_runs(runs: Sequence[BedRun]) -> list[LabRun]:
+    """The runs of a bed, their equations at what all of them know of its soil."""
+    final = runs[-1].known.estimate
+    return [
+        LabRun(run, summary([run.recording]), sha256(run.recording), beside(run, final))
+        for run in runs
+    ]
+
+
+def sha256(recording: Recording) -> str:
+    """Of the file."""
+    digest = hashlib.sha256()
+    with recording.path.open("rb") as file:
+        while piece := file.read(PIECE):
+            digest.update(piece)
+    return digest.hexdigest()
+
+
+def beside(run: BedRun, estimate: Estimate) -> Beside | None:
+    """Both forms of the equations at the windows of a run, at an estimate of the soil."""
+    rows = run.carried.rows
+    rows = rows[(rows["status"] == Status.TRACKING) & (rows["theta_1"] > 0.0)]
+    if not len(rows):
+        return None
+
+    slip, load, theta_1 = (np.asarray(rows[name]) for name in ("slip", "load", "theta_1"))
+    measured = {name: np.asarray(rows[name]) for name in ("torque", "drawbar_pull")}
+    return Beside(
+        slip,
+        load,
+        measured,
+        _original(run.settings, estimate, theta_1, slip, load),
+        _closed(run.settings, estimate, theta_1, slip, load),
+    )
+
+
+def _original(
+    settings: Settings, estimate: Estimate, theta_1: Array, slip: Array, load: Array
+) -> dict[str, Array]:
+    """T and DP (n,) of Eqs. (8)-(10). Both follow the sinkage modulus in a straight line, so it is
+    taken as that which carries the load at the measured entry angle.
+    """
+    c, tan_phi, k = soil_of(estimate)
+    modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
+    none, stated = (
+        original.forces(
+            settings.wheel,
+            Soil(c, tan_phi, k, settings.soil.exponent.value, value),
+            theta_1,
+            slip,
+        )
+        for value in (0.0, modulus)
+    )
+    share = (load - none.load) / (stated.load - none.load)
+
+    def at_load(name: str) -> Array:
+        low, high = getattr(none, name), getattr(stated, name)
+        return np.asarray(low + share * (high - low))
+
+    return {name: at_load(name) for name in ("torque", "drawbar_pull")}
+
+
+def _closed(
+    settings: Settings, estimate: Estimate, theta_1: Array, slip: Array, load: Array
+) -> dict[str, Array]:
+    """T and DP (n,) of Eqs. (20) and (22) with σₘ from (21), without any correction."""
+    c, tan_phi, k = soil_of(estimate)
+    states = zip(theta_1.tolist(), slip.tolist(), load.tolist(), strict=True)
+    at = [
+        linear.forces_under_load(settings.wheel, c, tan_phi, k, angle, i, weight)
+        for angle, i, weight in states
+    ]
+    return {name: np.array([getattr(f, name) for f in at]) for name in ("torque", "drawbar_pull")}
+
+
+# --- the table of runs ---
+
+HEAD = ("run", "date", "load [N]", "slip [%]", "duration [s]", "SHA-256")
+
+
+def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
+    """A row a run, as HEAD names the columns."""
+    return [
+        [
+            run.name,
+            _date(run.summary.start),
+            f"{run.run.settings.load.nominal.value:g}",
+            _slips(run.beside),
+            fixed(run.summary.duration, 1),
+            run.sha256[:12],
+        ]
+        for run in runs
+    ]
+
+
+def _date(stamp: int) -> str:
+    return time.strftime("%Y-%m-%d %H:%M", time.gmtime(stamp * NS)) if stamp else NOTHING
+
+
+def _slips(of: Beside | None) -> str:
+    if of is None:
+        return NOTHING
+    low, high = np.quantile(of.slip, (0.02, 0.98)) * 100.0
+    return f"{fixed(float(low), 0)} … {fixed(float(high), 0)}"

@@ -30,7 +30,7 @@ from gritd.estimator.recording.walk import Contents, Walk
 __all__ = ["Message", "Recording", "read"]
 
 # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
-MAX_KEPT = 64 << 20
+MAX_KEPT = 16 << 20
 MAX_LINES = 100
 MAX_WASTE = 128 << 20  # [bytes] read and unpacked in vain before giving up
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good

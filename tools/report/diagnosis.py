@@ -18,7 +18,7 @@ from gritd.tools.diagnose.explain.result import (
     Trace,
 )
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.report import figures, hypotheses, record, redo, tables
+from gritd.tools.report import effect_notes, figures, hypotheses, record, redo, tables
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
     counted,
@@ -77,6 +77,7 @@ def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
         _caveats(diagnosis),
         _next(diagnosis),
         _redo(diagnosis, name),
+        effect_notes.notes(hypotheses.named(diagnosis.hypotheses)),
     )
 
 

@@ -8,11 +8,13 @@ from collections.abc import Sequence
 
 from gritd.tools.cli.wording import listed, number, percent
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis
+from gritd.tools.report.effect_notes import linked
 from gritd.tools.report.html import Child, Markup, table, tag
 from gritd.tools.report.words import counted, held, name_of, nats
 
 UNLIKELY = 0.01  # hypotheses below this are folded away
 MOST = 8  # groups in view
+TIE = 2  # decimals of a probability: effects that differ by less are as probable
 
 
 def introduction(diagnosis: Diagnosis) -> str:
@@ -21,6 +23,8 @@ def introduction(diagnosis: Diagnosis) -> str:
     return (
         f"{tried} considered together with {beside} in all channels, "
         "scored on runs and conditions not fitted to. "
+        "A probability is the share of an effect among all that was weighed: each effect alone, "
+        "sets of them, no effect at all, and something that is not in the list. "
         "A gain is in nats: 3 nats make an effect twenty times as probable."
     )
 
@@ -28,9 +32,7 @@ def introduction(diagnosis: Diagnosis) -> str:
 def groups(of: Sequence[Hypothesis]) -> Markup:
     """Likely ones as bars, the rest in a folded table."""
     grouped = together(of)
-    likely = [g for g in grouped if g[0].accepted or max(h.probability for h in g) >= UNLIKELY][
-        :MOST
-    ]
+    likely = [g for g in grouped if _likely(g)][:MOST]
     rest = [h for g in grouped if g not in likely for h in g]
     return tag("div", (_group(g) for g in likely), _rest(rest, bool(likely)), class_="hypotheses")
 
@@ -50,10 +52,25 @@ def together(of: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         groups = [g for g in groups if g not in joined]
         groups.append([o for g in joined for o in g] + [h])
 
-    order = {h.effect: (not h.accepted, i) for i, h in enumerate(of)}
+    order = {h.effect: _rank(h, place) for place, h in enumerate(of)}
     for group in groups:
         group.sort(key=lambda h: order[h.effect])
     return sorted(groups, key=lambda g: order[g[0].effect])
+
+
+def _rank(h: Hypothesis, place: int) -> tuple[bool, float, int, int]:
+    """Accepted ones first, then the likelier; in a tie the simpler, which has fewer parameters."""
+    return not h.accepted, -round(h.probability, TIE), len(h.parameters), place
+
+
+def named(of: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Those that stand in view as bars."""
+    likely = [group for group in together(of) if _likely(group)][:MOST]
+    return [h for group in likely for h in group]
+
+
+def _likely(group: Sequence[Hypothesis]) -> bool:
+    return group[0].accepted or max(h.probability for h in group) >= UNLIKELY
 
 
 def _group(group: Sequence[Hypothesis]) -> Markup:
@@ -77,7 +94,7 @@ def _bar(h: Hypothesis) -> Markup:
     width = f"width:{100.0 * min(max(h.probability, 0.0), 1.0):.1f}%"
 
     label = tag(
-        "p", tag("b", name_of(h.effect)), " accepted" if h.accepted else None, class_="effect"
+        "p", tag("b", linked(h.effect)), " accepted" if h.accepted else None, class_="effect"
     )
     value = tag(
         "p",

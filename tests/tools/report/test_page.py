@@ -55,11 +55,9 @@ def test_page_needs_nothing_from_outside(page: str) -> None:
         "base",
     }
     assert not [
-        a
-        for e in root.iter()
-        for a in e.attrib
-        if a in ("src", "href", "action") or a.startswith("on")
+        a for e in root.iter() for a in e.attrib if a in ("src", "action") or a.startswith("on")
     ]
+    assert all(e.get("href", "#").startswith("#") for e in root.iter())
 
     style = "".join(e.text or "" for e in root.iter("style"))
     assert "url(" not in style and "@import" not in style and "@font-face" not in style
@@ -293,3 +291,20 @@ def test_one_error_where_nothing_was_explained() -> None:
     root = parsed(diagnosis.render(replace(cases.consistent(), fit=same)))
     heads = [[th.text for th in table.findall("thead/tr/th")] for table in root.iter("table")]
     assert ["channel", "error", "noise floor", "error ÷ floor"] in heads
+
+
+def test_in_a_tie_the_simpler_effect_stands_first_and_every_name_leads_to_its_formula() -> None:
+    one, two = Quantity(1.0, 0.1, "N·m"), Quantity(0.1, 0.01, "-")
+    tied = [
+        Hypothesis("stribeck_friction", 0.402, 9.0, {"loss": one, "speed": two}),
+        Hypothesis("coulomb_friction", 0.398, 9.0, {"loss": one}),
+    ]
+    assert [h.effect for h in hypotheses.named(tied)] == ["coulomb_friction", "stribeck_friction"]
+
+    found = diagnosis.render(replace(cases.ALL["explained"](), hypotheses=tuple(tied)))
+    root = parsed(found)
+    targets = {e.get("id") for e in root.iter() if e.get("id")}
+    links = {e.get("href") for e in root.iter("a")}
+    assert links == {"#effect-coulomb_friction", "#effect-stribeck_friction"}
+    assert all(link[1:] in targets for link in links if link)
+    assert "A probability is the share of an effect among all that was weighed" in words(found)

@@ -157,6 +157,7 @@ class McapFile:
         self._metadata_index: list[MetadataIndex] = []
         self._chunk_indexes = ChunkIndexes(self._compression)
         self._counts: Counter[int] = Counter()
+        self._indexed = True  # whether the index knows every chunk
         self._span: tuple[int, int] | None = None  # first and last log_time [ns]
         self._length = 0
         self._crc = 0
@@ -231,16 +232,22 @@ class McapFile:
         span = int(heads["log_time"].min()), int(heads["log_time"].max())
         chunk = record_bytes(self._chunk(content, span))
         indexes = [_message_index(int(c), heads, offsets) for c in np.unique(heads["channel"])]
-        start = self._length
-        self._append(chunk + b"".join(index for _, index in indexes))
         lengths = [(channel, len(index)) for channel, index in indexes]
-        self._chunk_indexes.add(start, len(chunk), span, len(content), lengths)
-        self._counts.update(heads["channel"].tolist())
-        self._span = (
-            span
-            if self._span is None
-            else (min(self._span[0], span[0]), max(self._span[1], span[1]))
-        )
+        counts = self._counts + Counter(heads["channel"].tolist())
+        whole = self._span or span
+        whole = min(whole[0], span[0]), max(whole[1], span[1])
+
+        before = self._length, self._crc
+        self._append(chunk + b"".join(index for _, index in indexes))
+        try:
+            self._chunk_indexes.add(before[0], len(chunk), span, len(content), lengths)
+        except MemoryError:
+            # as if it had not been written: who wrote it tries again, in another file
+            self._indexed = False
+            self._length, self._crc = before
+            self._rewind()
+            raise
+        self._counts, self._span = counts, whole
 
     def sync(self) -> None:
         """Ask the kernel to put everything written on the medium, and wait for it."""
@@ -259,6 +266,8 @@ class McapFile:
 
     def finish(self) -> None:
         """Write index and summary; nothing may be added then. The medium may not have them yet."""
+        if not self._indexed:
+            raise RecordingError(f"{self.path}: without an index, since memory was short")
         before = self._length, self._crc
         try:
             for piece in self._ending():
@@ -274,16 +283,17 @@ class McapFile:
             self._file.close()
 
     def _append(self, data: bytes) -> None:
-        view = memoryview(data)
+        # before anything is written: memory may be short
+        view, length = memoryview(data), self._length + len(data)
+        crc = zlib.crc32(data, self._crc)
         try:
             with reported(self.path, "write"):
                 while view:
                     view = view[self._file.write(view) :]
-        except RecordingError:
+        except (RecordingError, MemoryError):
             self._rewind()
             raise
-        self._length += len(data)
-        self._crc = zlib.crc32(data, self._crc)
+        self._length, self._crc = length, crc
 
     def _rewind(self) -> None:
         with suppress(OSError):

@@ -82,8 +82,10 @@ class RunWriter:
         process.
         """
         if self._pending.starts:
+            # made before: once the chunk is written, nothing may fail
+            following = _Pending()
             self._file.add_chunk(self._pending.records, self._pending.starts)
-            self._pending = _Pending()
+            self._pending = following
 
     def flush(self) -> None:
         """`write_out`, and wait until the medium has it: from here on it survives the loss of
@@ -142,8 +144,13 @@ class _Pending:
         self.starts: list[int] = []
 
     def add(self, record: bytes) -> None:
+        """Raises MemoryError, and nothing has changed."""
         self.starts.append(len(self.records))
-        self.records += record
+        try:
+            self.records += record
+        except MemoryError:
+            self.starts.pop()
+            raise
 
 
 class _Encoder:

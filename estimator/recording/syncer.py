@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from pathlib import Path
+from queue import SimpleQueue
 
 from gritd.estimator.recording.mcapfile import RecordingError, sync
 from gritd.estimator.threads.waiting import wait_until
@@ -18,7 +19,8 @@ class Syncer:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._wake = threading.Event()
+        # not an Event: where memory is short its lock can stay held, and all wait for ever
+        self._wake: SimpleQueue[None] = SimpleQueue()
         self._files: dict[tuple[int, int], int] = {}  # device and inode -> a descriptor of our own
         self._error: OSError | None = None
         self._stopped = False
@@ -37,7 +39,7 @@ class Syncer:
         disk may hang.
         """
         self._stopped = True
-        self._wake.set()
+        self._wake.put(None)
         if self._thread.ident is None:
             self._sync()
         wait_until(lambda: not self.alive, timeout)
@@ -51,7 +53,7 @@ class Syncer:
                     self._files[status.st_dev, status.st_ino] = os.dup(fileno)
                 except OSError as error:
                     self._error = error
-        self._wake.set()
+        self._wake.put(None)
 
     def raise_error(self, path: Path) -> None:
         """Raises RecordingError if a sync failed since the last call: the medium may lack what it
@@ -70,8 +72,7 @@ class Syncer:
     def _run(self) -> None:
         last = False
         while not last:
-            self._wake.wait()
-            self._wake.clear()
+            self._wake.get()
             last = self._stopped  # what was asked for until then is still synced
             self._sync()
 

@@ -16,11 +16,11 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -254,11 +254,17 @@ class WriterThread:
 
     def _finish(self) -> None:
         try:
-            self._write_out()
+            self._write_last()
         finally:
             self._queue.drop_all()
             self._parts.writer.finish(self._sync.request)
         self._state = "closed"
+
+    def _write_last(self) -> None:
+        try:
+            self._write_out()
+        except MemoryError:  # there is no later attempt: once more
+            self._write_out()
 
 
 class _Queue:
@@ -275,15 +281,24 @@ class _Queue:
         self._starts = 0  # PartStarts waiting
 
     def put(self, items: list[Item]) -> None:
+        """Raises MemoryError, and nothing has changed."""
         with self._lock:
-            self._items.extend(items)
-            self._accepted += len(items)
-            self._starts += isinstance(items[0], PartStart) if items else 0
-            excess = max(0, len(self._items) - self._capacity)
-            for _ in range(excess):
-                self._drop(self._items.popleft())
-            self._dropped += excess
-            self._overflow += excess
+            accepted, before = self._accepted + len(items), len(self._items)
+            starts = self._starts + (isinstance(items[0], PartStart) if items else 0)
+            try:
+                self._items.extend(items)
+            except MemoryError:
+                while len(self._items) > before:
+                    self._items.pop()
+                raise
+            self._accepted, self._starts = accepted, starts
+            self._drop_oldest(max(0, len(self._items) - self._capacity))
+
+    def _drop_oldest(self, excess: int) -> None:
+        for _ in range(excess):
+            self._drop(self._items.popleft())
+            self._dropped += 1
+            self._overflow += 1
 
     def _drop(self, item: Item) -> None:
         if isinstance(item, PartStart):
@@ -299,26 +314,28 @@ class _Queue:
         configuration of a PartStart among those. A PartStart comes first in its batch.
         """
         with self._lock:
-            batch = list(self._leading())
-            self._taken += len(batch)
-            lost, self._overflow = self._overflow, 0
-            config, self._config = self._config, ""
+            batch = list(islice(self._items, self._leading()))
+            taken = self._taken + len(batch)
+            lost, config = self._overflow, self._config
+            # from here on nothing may fail: what is taken is counted
+            for _ in batch:
+                self._items.popleft()
+            if batch and isinstance(batch[0], PartStart):
+                self._starts -= 1
+            self._taken, self._overflow, self._config = taken, 0, ""
         return batch, lost, config
 
-    def _leading(self) -> Iterator[Item]:
-        for number in range(min(BATCH, len(self._items))):
-            if isinstance(self._items[0], PartStart):
-                if number:
-                    return
-                self._starts -= 1
-            yield self._items.popleft()
+    def _leading(self) -> int:
+        """How many to take: up to the next PartStart, which is the first of its own batch."""
+        following = islice(self._items, 1, BATCH)
+        starts = (at for at, item in enumerate(following, 1) if isinstance(item, PartStart))
+        return next(starts, min(BATCH, len(self._items)))
 
     def settle(self, dropped: int) -> None:
         """What was taken is written, but for those that could not be encoded."""
         with self._lock:
-            self._written += self._taken - dropped
-            self._dropped += dropped
-            self._taken = 0
+            written, dropped = self._written + self._taken - dropped, self._dropped + dropped
+            self._written, self._dropped, self._taken = written, dropped, 0
 
     def drop_all(self) -> None:
         """Give up what is still here."""

@@ -83,6 +83,7 @@ ROWS = (
     "second daemon on a socket, too many readers",
     "silence, garbage, counter jumps, a stopped process",
     "ten crashes in a minute",
+    "every allocation of the hot path fails once",
 )
 
 Figure = dict[str, Any]

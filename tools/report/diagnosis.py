@@ -41,6 +41,7 @@ VERDICTS = {  # verdict -> its name, and what it means
     "insufficient": ("Not decided", "These recordings cannot tell."),
 }
 NOISE_SIZES = ("sigma", "configured", "configured_sigma")
+RUNS = "runs"  # of what it takes to redo it: the table of runs
 FEW = 3  # runs; of fewer, thirds are held out
 RUNS_HELD = "Every run is predicted by a fit to the other runs: none of its own samples were used."
 THIRDS_HELD = (
@@ -66,6 +67,7 @@ def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
     return page(
         f"gritd diagnosis: {VERDICTS[diagnosis.verdict][0].lower()}",
         _verdict(diagnosis),
+        _runs(diagnosis),
         _simulation(diagnosis),
         _misfit(diagnosis),
         _hypotheses(diagnosis),
@@ -103,6 +105,17 @@ def _verdict(diagnosis: Diagnosis) -> Markup:
         tag("dl", (_figure(*figure) for figure in _figures(diagnosis)), class_="figures"),
         class_=f"verdict {diagnosis.verdict}",
     )
+
+
+def _runs(diagnosis: Diagnosis) -> Markup | None:
+    """What was driven, and what was noted of it."""
+    runs = diagnosis.redo.get(RUNS)
+    if not runs:
+        return None
+    head = [name for name in runs[0] if name != "notes"]
+    remarks = [tag("li", f"{run['run']}: {run['notes']}") for run in runs if run.get("notes")]
+    rows = ([run[name] for name in head] for run in runs)
+    return section("Runs", table(head, rows), tag("ul", remarks) if remarks else None)
 
 
 def explanation(diagnosis: Diagnosis) -> str:
@@ -363,8 +376,9 @@ def _redo(diagnosis: Diagnosis, name: str) -> Markup:
         (name_of(channel), _noise(diagnosis, channel, values))
         for channel, values in diagnosis.noise.items()
     ]
+    needed = {key: value for key, value in diagnosis.redo.items() if key != RUNS}
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
-    return section("To redo it", _again(diagnosis, name), redo.content(diagnosis.redo), noise_table)
+    return section("To redo it", _again(diagnosis, name), redo.content(needed), noise_table)
 
 
 def _again(diagnosis: Diagnosis, name: str) -> list[Markup] | None:

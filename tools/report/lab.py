@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.estimator.config.settings import Settings
+from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.measurement import soil as soil_of
-from gritd.estimator.messages.status import Status
-from gritd.estimator.offline.bed_runs import BedRun
+from gritd.estimator.messages.status import UPDATED
+from gritd.estimator.offline.bed_runs import BedRun, bed_runs
+from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.terramechanics import linear, original
 from gritd.estimator.terramechanics.soil import Array, Soil
@@ -86,7 +87,7 @@ def sha256(recording: Recording) -> str:
 def beside(run: BedRun, estimate: Estimate) -> Beside | None:
     """Both forms of the equations at the windows of a run, at an estimate of the soil."""
     rows = run.carried.rows
-    rows = rows[(rows["status"] == Status.TRACKING) & (rows["theta_1"] > 0.0)]
+    rows = rows[np.isin(rows["status"], UPDATED) & (rows["theta_1"] > 0.0)]
     if not len(rows):
         return None
 
@@ -169,3 +170,13 @@ def _slips(of: Beside | None) -> str:
         return NOTHING
     low, high = np.quantile(of.slip, (0.02, 0.98)) * 100.0
     return f"{fixed(float(low), 0)} … {fixed(float(high), 0)}"
+
+
+def records(recordings: Sequence[Recording], settings: Settings) -> list[dict[str, str]]:
+    """The same rows, and the notes of each run, by the names of the columns."""
+    given = ((settings_of_run(without_absent(settings, r), r.run), r) for r in recordings)
+    runs = lab_runs(list(bed_runs(given, settings.bed.repeatability)))
+    return [
+        {**dict(zip(HEAD, row, strict=True)), "notes": run.run.recording.run.notes}
+        for run, row in zip(runs, table_of(runs), strict=True)
+    ]

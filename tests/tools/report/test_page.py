@@ -308,3 +308,14 @@ def test_in_a_tie_the_simpler_effect_stands_first_and_every_name_leads_to_its_fo
     assert links == {"#effect-coulomb_friction", "#effect-stribeck_friction"}
     assert all(link[1:] in targets for link in links if link)
     assert "A probability is the share of an effect among all that was weighed" in words(found)
+
+
+def test_the_runs_stand_before_the_pictures_with_their_notes() -> None:
+    rows = [
+        {"run": name, "load [N]": load, "SHA-256": "0123456789ab", "notes": note}
+        for name, load, note in (("r1", "40", "raked twice"), ("r2", "70", ""))
+    ]
+    found = cases.explained()
+    said = words(diagnosis.render(replace(found, redo={**found.redo, "runs": rows})))
+    assert said.index("raked twice") < said.index("Simulation against recording")
+    assert said.count("0123456789ab") == 2

@@ -301,7 +301,7 @@ def test_a_scheduler_that_does_not_prove_who_it_is(tmp_path, figure):
             "diagnose": ("--campaigns", tmp_path, *given),
             "prove": ("--cases", "1", "--output", tmp_path / "proof", *given),
         }
-        said = {name: gritd(name, *more, timeout=60) for name, more in commands.items()}
+        said = {name: gritd(name, *more, timeout=600) for name, more in commands.items()}
         connections = 0
         with suppress(TimeoutError):
             while hostile.accept():

@@ -26,7 +26,7 @@ import numpy as np
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli.command import CommandError, Parser
 from gritd.tools.cli.progress import Progress
-from gritd.tools.diagnose.explain.explanation import averaged_soil
+from gritd.tools.diagnose.explain.soil import averaged_soil
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.interface import Rig

@@ -21,9 +21,9 @@ from gritd.tools.diagnose.explain.result import (
     Hypothesis,
     Location,
     Quantity,
-    SoilFit,
     Test,
 )
+from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import label
 from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
@@ -53,7 +53,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
-        soil=_soil(rig, base.fitted, decision),
+        soil=soil_of(rig, base.fitted, decision),
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
@@ -62,7 +62,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         remaining=remainders(problem, accepted),
         remaining_words=_remaining(decision),
         discrepancy=discrepancies(problem, accepted),
-        nuisance=_constants(rig, accepted.fitted, soil=False),
+        nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
         reference=None,
         explanations=tuple(
@@ -160,59 +160,7 @@ def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
     }
 
 
-# ---- constants, fit and noise ------------------------------------------------------------------
-
-
-def _constants(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
-    sigma = np.sqrt(np.diag(fitted.covariance()))
-    return {
-        k.name: Quantity(k.of(float(u)), k.spread(float(u), float(s)), k.unit)
-        for k, u, s in zip(rig.constants, fitted.u, sigma, strict=False)
-        if k.soil == soil
-    }
-
-
-def _soil(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
-    soil = [k for k in rig.constants if k.soil]
-    if not soil:
-        return None
-    strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
-    prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
-    return SoilFit(prior, _constants(rig, before, True), averaged_soil(rig, decision), strain)
-
-
-def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
-    """The soil of one explanation. What stands at its bound is not known better than before."""
-    mean, spread = model.constants()
-    sigma, held = np.sqrt(np.diag(spread)), model.fitted.held
-    return {
-        k.name: Quantity(
-            k.of(float(u)), k.sigma if at_bound else k.spread(float(u), float(s)), k.unit
-        )
-        for k, u, s, at_bound in zip(rig.constants, mean, sigma, held, strict=False)
-        if k.soil
-    }
-
-
-def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
-    """The soil, averaged over all explanations by their probabilities: which of them is true is
-    part of what is not known.
-    """
-    every = [
-        (w.model, w.probability)
-        for w in decision.weighed
-        if w.probability > TUNING.explain.slight_explanation
-    ]
-    told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
-    total = sum(share for _, share in told)
-    out = {}
-    for name, first in told[0][0].items():
-        mean = sum(share * soil[name].value for soil, share in told) / total
-        square = sum(
-            share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
-        )
-        out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
-    return out
+# ---- fit and noise -- ------------------------------------------------------------------
 
 
 def _fit(problem: Problem, before: HeldOut, after: HeldOut) -> Fit:

@@ -29,6 +29,7 @@ class Constant:
 
     log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept
         inside low … high.
+    changes: the constant whose value in the new campaign is e^this times that in the reference.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Constant:
     log: bool = False
     low: float = -np.inf
     high: float = np.inf
+    changes: str = ""
 
     def of(self, u: float) -> float:
         if self.log:

@@ -88,7 +88,10 @@ class WheelRig:
         self._prepared = TUNING.rig.prepared if reference and bed == "prepared" else {}
         self.constants = (
             *wheel_constants(settings, self.channels, self._sets, stated, self.caveats),
-            *(Constant(f"new_{name}", 0.0, sigma) for name, sigma in self._prepared.items()),
+            *(
+                Constant(f"new_{name}", 0.0, sigma, changes=name)
+                for name, sigma in self._prepared.items()
+            ),
         )
 
         out = {*LEFT_OUT, *(b.name for b in self.baseline)}

@@ -1,0 +1,84 @@
+"""What is told of the soil: averaged over all explanations, of the new campaign where there is a
+reference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.result import Quantity, SoilFit
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.tools.diagnose.rig.interface import Constant, Rig
+from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.verdict.decision import Decision
+
+
+def soil_of(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
+    """Prior, fit of the exact model, average over the explanations, and strain; None without
+    soil.
+    """
+    soil = [k for k in rig.constants if k.soil]
+    if not soil:
+        return None
+    strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
+    prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
+    return SoilFit(prior, constants_of(rig, before, True), averaged_soil(rig, decision), strain)
+
+
+def constants_of(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
+    """Constants of one fit: of the soil, or all others."""
+    count = len(fitted.u)
+    spread = fitted.covariance()[:count, :count]
+    return {k.name: _told(rig, k, fitted.u, spread) for k in rig.constants if k.soil == soil}
+
+
+def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
+    """The soil, averaged over all explanations by their probabilities: which of them is true is
+    part of what is not known.
+    """
+    every = [
+        (w.model, w.probability)
+        for w in decision.weighed
+        if w.probability > TUNING.explain.slight_explanation
+    ]
+    told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
+    total = sum(share for _, share in told)
+    out = {}
+    for name, first in told[0][0].items():
+        mean = sum(share * soil[name].value for soil, share in told) / total
+        square = sum(
+            share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
+        )
+        out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
+    return out
+
+
+def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
+    """The soil of one explanation. What stands at its bound is not known better than before."""
+    mean, spread = model.constants()
+    told = {}
+    for constant, held in zip(rig.constants, model.fitted.held, strict=False):
+        if constant.soil:
+            found = _told(rig, constant, mean, spread)
+            sigma = constant.sigma if held else found.sigma
+            told[constant.name] = Quantity(found.value, sigma, found.unit)
+    return told
+
+
+def _told(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:
+    """Value and σ of a constant from the mean (q,) and covariance (q, q) of all, in prior σ; of a
+    bed that was prepared anew, in the new campaign.
+    """
+    place = rig.constants.index(constant)
+    u = float(mean[place])
+    value, slope = constant.of(u), np.zeros(len(mean))
+    slope[place] = constant.spread(u, 1.0)
+
+    for number, change in enumerate(rig.constants):
+        if change.changes == constant.name:
+            factor = float(np.exp(change.of(float(mean[number]))))
+            value, slope = factor * value, factor * slope
+            slope[number] = value * change.sigma
+    return Quantity(value, float(np.sqrt(slope @ spread @ slope)), constant.unit)

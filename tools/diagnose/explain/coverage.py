@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.estimator.model.discrepancy import features_of
 from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.screen.covered import covered
 from gritd.tools.diagnose.tuning import TUNING
 
 NAMED = ("slip", "load", "speed", "position")
@@ -24,15 +24,9 @@ class Coverage:
 
 def coverage(stack: Stack) -> Coverage:
     """Of a rig with a reference campaign."""
-    source = stack.rig.forms[0]
-    new = np.array(stack.rig.new)
-    pairs = list(zip(source.conditions, source.weight, new, strict=True))
-    known, asked = (
-        np.vstack([c[w != 0.0] for c, w, n in pairs if n == which]) for which in (False, True)
-    )
-    features = features_of(known, TUNING.explain.coverage_points, TUNING.explain.coverage_left)
-    left = 1.0 - np.sum(features.at(asked) ** 2, axis=1)
-    return Coverage(float(np.mean(left < TUNING.explain.reference_open)), _outside(stack))
+    asked = stack.new & (stack.covariate("speed") > 0.0)
+    share = float(np.mean(covered(stack)[asked])) if asked.any() else 0.0
+    return Coverage(share, _outside(stack))
 
 
 def _outside(stack: Stack) -> str:

@@ -38,11 +38,6 @@ class Explain:
     change_range: Range = tuned((0.01, 0.99), "quantile", "of a covariate, where changes are tried")
 
     # --- coverage.py ---
-    reference_open: float = tuned(
-        0.3, "share", "of the discrepancy's variance that the reference may leave open"
-    )
-    coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
-    coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
     beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
     beyond_floor: float = tuned(0.02, "-", "of a covariate's mean: its range counts as no less")
     beyond_share: float = tuned(0.02, "-", "of the values that must be outside to be told")

@@ -1,0 +1,27 @@
+"""Where a reference campaign tells what this rig does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.model.discrepancy import features_of
+from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.tuning import TUNING
+
+
+def covered(stack: Stack) -> Bools:
+    """Marks the values (N,) at whose conditions the reference leaves little of δ open; all others
+    could be anything that this rig does elsewhere. A wheel that stands is covered.
+    """
+    source = stack.rig.forms[0]
+    pairs = list(zip(source.conditions, source.weight, stack.rig.new, strict=True))
+    known = np.vstack([c[w != 0.0] for c, w, new in pairs if not new])
+    features = features_of(known, TUNING.screen.coverage_points, TUNING.screen.coverage_left)
+
+    inside = []
+    for conditions, weight, _ in pairs:
+        left = 1.0 - np.sum(features.at(conditions) ** 2, axis=1)
+        inside.append((left < TUNING.screen.reference_open) | (weight == 0.0))
+    joined = stack.joined([dict.fromkeys(stack.rig.channels, i.astype(float)) for i in inside])
+    marks: Bools = joined > 0.5
+    return marks

@@ -16,7 +16,7 @@ class Verdict:
     stretches_of_a_run: int = tuned(3, "stretches", "at least", "run time")
     best_stretches: int = tuned(2, "stretches", "where an effect gains most: they do not count")
     broad: float = tuned(2.0, "nats", "that an effect must gain in all others: seven to one")
-    tested: float = tuned(12.0, "nats", "a model so far behind the best is not tested", "run time")
+    tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
 
     # --- decide.py ---
     alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be told apart")

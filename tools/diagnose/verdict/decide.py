@@ -73,29 +73,26 @@ def judged(
     search: Search, weighed: Sequence[Weighed], beside: Nameless | None, calibration: Calibration
 ) -> Decision:
     """The decision from the evidence of all explanations."""
-    best = max(w.evidence for w in weighed)
-    weights = np.array(
-        [calibration.weight(best - w.evidence, len(w.names), w.nameless) for w in weighed]
-    )
+    weights = np.array([calibration.weight(w.evidence, len(w.names), w.nameless) for w in weighed])
     shares = np.exp(weights - logsumexp(weights)) * (1.0 - calibration.lapse)
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    likeliest = _best(every)
+    best = _best(every)
     unlisted = sum(w.probability for w in every if not w.names)
-    share = taken_share(search, likeliest) if likeliest.names else 0.0
+    share = taken_share(search, best) if best.names else 0.0
     named = (
-        bool(likeliest.names)
+        bool(best.names)
         and unlisted < 0.5 * (1.0 - calibration.lapse)
         and share > TUNING.verdict.explained_share
     )
     return Decision(
         "explained" if named else "unlisted",
-        likeliest if named else search.bare,
+        best if named else search.bare,
         share,
-        beside if named or not likeliest.names else nameless_beside(search.screening, search.bare),
+        beside if named or not best.names else nameless_beside(search.screening, search.bare),
         _probabilities(every),
         unlisted,
-        _groups(every, likeliest),
+        _groups(every, best),
         every,
     )
 

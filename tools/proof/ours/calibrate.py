@@ -2,7 +2,7 @@
 trusted.
 
 Each PATH is a file of trials (`python -m gritd.tools.proof.ours.trials --out FILE`) or the folder
-of an opened batch of blind trials (`gritd prove --output FOLDER`). The scale and the odds are
+of an opened batch of blind trials (`gritd prove --output FOLDER`). The temperature and the odds are
 those that give the truth of every case the largest probability, on average: the logarithmic score,
 which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps
 what few cases do not tell. The truth of a case is any set of effects that holds a true one,
@@ -28,9 +28,9 @@ from gritd.tools.diagnose.verdict.calibration import Calibration
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
-# ln scale; log odds: listed, more, nameless; logit of the lapse
-START = np.array([np.log(3.0), 1.1, -1.9, 0.0, -3.5])
-PRIOR = np.array([1.0, 1.0, 1.0, 1.0, 0.5])  # standard deviations about START
+# ln temperature; log odds: listed, more, nameless; logit of the lapse
+START = np.array([np.log(1.5), 1.1, -1.9, 0.0, -3.5])
+PRIOR = np.array([0.5, 1.0, 1.0, 1.0, 0.5])  # standard deviations about START
 # where the formula is the diagnosis' own, names come too easily
 LEARNT_FROM = ("cousin", "pair", "unlisted")
 OTHERS = 30  # names among which a lapse spreads
@@ -87,17 +87,15 @@ def log_truth(case: Case, by: Calibration) -> float:
     """Log probability of the truth of a case."""
     listed = np.where(case.count > 0, by.listed, 0.0)
     more = by.more * np.maximum(case.count - 1, 0) - case.count * np.log(case.candidates)
-    behind = case.evidence.max() - case.evidence
-    tails = -by.scale * np.log1p(behind / by.scale)
-    weight = tails + listed + more + by.nameless * case.nameless
+    weight = case.evidence / by.temperature + listed + more + by.nameless * case.nameless
     given_truth = float(np.sum(np.exp(weight - logsumexp(weight)) * case.right))
     return float(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * given_truth))
 
 
 def calibration(x: Array) -> Calibration:
     """From the unknowns of the search (5,)."""
-    scale, listed, more, nameless, lapse = x.tolist()
-    return Calibration(float(np.exp(scale)), listed, more, nameless, float(expit(lapse)))
+    temperature, listed, more, nameless, lapse = x.tolist()
+    return Calibration(float(np.exp(temperature)), listed, more, nameless, float(expit(lapse)))
 
 
 def learn(cases: Sequence[Case]) -> tuple[Calibration, float]:

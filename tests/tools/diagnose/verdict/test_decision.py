@@ -70,11 +70,11 @@ def test_another_published_form_keeps_its_name() -> None:
 
 
 def test_the_calibration_is_learnt_from_what_was_true() -> None:
-    """Rivals of which the truth has the tail of a scale of two: that scale comes out."""
+    """Rivals whose evidence is three times too large: the temperature comes out as three."""
     rng, cases = np.random.default_rng(0), []
-    for _ in range(1500):
-        evidence = rng.normal(20.0, 12.0, 3)
-        share = (1.0 + (evidence.max() - evidence) / 2.0) ** -2.0
+    for _ in range(400):
+        evidence = rng.normal(20.0, 6.0, 3)
+        share = np.exp((evidence - evidence.max()) / 3.0)
         truth = rng.choice(["a", "b", "c"], p=share / share.sum())
         weighed = [
             {"names": [n], "nameless": False, "evidence": e}
@@ -82,8 +82,8 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
         ]
         cases.append(case_of(weighed, [str(truth)], False, 3))
     by, score = learn(cases)
-    assert by.scale == pytest.approx(2.0, rel=0.25)
-    overconfident = replace(by, scale=20.0)
+    assert by.temperature == pytest.approx(3.0, rel=0.25)
+    overconfident = replace(by, temperature=0.5)
     assert score > np.mean([log_truth(case, overconfident) for case in cases])
 
 
@@ -104,7 +104,7 @@ def _judged(listed: float, nameless: float, share: float, monkeypatch: pytest.Mo
 def test_the_verdict_is_that_of_the_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
     named = _judged(300.0, 200.0, 1.0, monkeypatch)
     assert named.verdict == "explained" and named.best.names == ("a",)
-    assert named.probability["a"] == pytest.approx(1.0 - learnt().lapse, abs=0.03)
+    assert named.probability["a"] == pytest.approx(1.0 - learnt().lapse, abs=1e-6)
 
     strange = _judged(200.0, 300.0, 1.0, monkeypatch)
     assert strange.verdict == "unlisted" and strange.best.names == ()
@@ -120,7 +120,7 @@ def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(
 
 def test_the_learnt_table_is_sound() -> None:
     by = learnt()
-    assert 0.3 < by.scale < 50.0
+    assert 0.5 < by.temperature < 50.0
     assert max(by.more, by.nameless) < 3.0 and by.listed > -5.0
     assert 0.0 < by.lapse < 0.2
 

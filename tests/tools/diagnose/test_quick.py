@@ -17,7 +17,7 @@ def test_a_first_answer_names_the_strongest_and_says_so() -> None:
     rig = WheelRig(record(drawn, acting), drawn.settings)
     found = diagnose(rig, redo={"quick": True}, quick=True)
 
-    assert [h.effect for h in found.hypotheses if h.accepted] == ["sinkage_datum"]
+    assert found.hypotheses[0].effect == "sinkage_datum"
     assert max(len(e.names) for e in found.explanations) == 1
     assert any("--quick" in note for note in found.caveats)
     assert before == TUNING.search

@@ -199,7 +199,9 @@ class Problem:
     ) -> Fitted:
         """The nearest optimum within bounds from constants u and effect parameters x."""
         ground = _Ground(self, tuple(effects), tuple(free))
-        start = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))[0]
+        start, nats = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))
+        if not np.isfinite(nats):  # an effect that runs away: begin with none of it
+            start = ground.tried(ground.bounds.clipped(np.concatenate((u, np.zeros_like(x)))))[0]
         here = ground.linearised(start)
         most = TUNING.fit.rounds if rounds is None else rounds
         fitted, converged = descent.descend(ground, here, most) if most else (here, False)
@@ -245,7 +247,8 @@ class _Ground:
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():
-            return _Tried(centre, predicted, predicted, np.zeros(0), np.inf), np.inf
+            nothing = np.zeros(problem.tolerance.shape[1])
+            return _Tried(centre, predicted, predicted, nothing, np.inf), np.inf
         residual = problem.measured - whiten(problem.noise, predicted)
 
         tolerance = problem.tolerance

@@ -29,8 +29,8 @@ from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
 # ln temperature; log odds: listed, more, nameless; logit of the lapse
-START = np.array([np.log(1.5), 1.1, -1.9, 0.0, -3.5])
-PRIOR = np.array([0.5, 1.0, 1.0, 1.0, 0.5])  # standard deviations about START
+START = np.array([np.log(3.0), 1.1, -1.9, 0.0, -3.5])
+PRIOR = np.array([1.0, 1.0, 1.0, 1.0, 0.5])  # standard deviations about START
 # where the formula is the diagnosis' own, names come too easily
 LEARNT_FROM = ("cousin", "pair", "unlisted")
 OTHERS = 30  # names among which a lapse spreads
@@ -55,12 +55,9 @@ def case_of(
     held: Collection[str] = (),
 ) -> Case:
     """From the explanations of a diagnosis and the effects that were at work; held: names that are
-    true of the rig itself, which are neither asked for nor wrong. Where no explanation holds a
-    true name, the right answer is that none is known.
+    true of the rig itself, which are neither asked for nor wrong.
     """
     right = [_true(w["names"], [] if stranger else truth, held) for w in weighed]
-    if not any(right):
-        right = [_true(w["names"], [], held) for w in weighed]
     return Case(
         np.array([w["evidence"] for w in weighed]),
         np.array([len(w["names"]) for w in weighed]),
@@ -134,7 +131,7 @@ def _batch(folder: Path) -> list[Case]:
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
-        if diagnosis["explanations"] and answers["effects"]:
+        if diagnosis["explanations"] and answers["effects"] and not answers.get("bed"):
             stranger = answers["stratum"] == "unlisted"
             held = () if answers.get("bed") else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]

@@ -68,9 +68,19 @@ def write_parquet(
     rows = [row for block in _blocks(topic, recordings, start) for row in block]
     names = [TIME, *topic.names]
 
-    columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+    columns = {
+        name: _column(pyarrow, [row[place] for row in rows]) for place, name in enumerate(names)
+    }
     parquet.write_table(pyarrow.table(columns), path)
     advance(len(rows))
+
+
+def _column(pyarrow: Any, values: list[Any]) -> Any:
+    """As pyarrow takes it; counts beyond 63 bits are unsigned."""
+    try:
+        return pyarrow.array(values)
+    except OverflowError:
+        return pyarrow.array(values, type=pyarrow.uint64())
 
 
 def write_columns(path: Path, topics: Sequence[Topic], suffix: str) -> None:

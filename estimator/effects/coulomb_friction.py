@@ -18,7 +18,7 @@ class CoulombFriction(Effect):
     Source: Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083-1138, section 2.
     """
 
-    loss: float = strength("torque consumed, T_C", "N·m", typical=0.8, low=0.0, high=10.0)
+    loss: float = strength("torque consumed, T_C", "N·m", typical=0.8, low=0.0, high=100.0)
 
     stage = "drivetrain"
     fingerprint = Fingerprint(

@@ -105,7 +105,14 @@ def with_soil(text: str, diagnosis: dict[str, Any]) -> str:
     document["soil"]["k_phi"] = f"{modulus['value'] / 1e3:.6g} kN/m^(n+2)"
     document["soil"]["modulus_sigma"] = f"{100.0 * modulus['sigma'] / modulus['value']:.4g} %"
 
-    return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
+    return yaml.safe_dump(
+        document,
+        sort_keys=False,
+        allow_unicode=True,
+        width=120,
+        explicit_start=True,
+        explicit_end=True,
+    )
 
 
 def _written(value: float, unit: str) -> Any:

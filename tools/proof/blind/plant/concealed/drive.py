@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,7 +16,7 @@ STANDING = 1e-4  # [rad/s] below which the direction is not taken to have change
 
 
 @dataclass(frozen=True)
-class GearTeeth(Effect):
+class GearTeeth(Effect, ABC):
     """A ripple at the order of a tooth mesh; its forms give the wave."""
 
     order: int = 24
@@ -29,8 +30,9 @@ class GearTeeth(Effect):
         phase, second = float(rng.uniform(0.0, 2.0 * np.pi)), float(rng.uniform(0.0, 0.4))
         return cls(0.3 * facts.torque, int(rng.integers(6, 75)), phase, second)
 
+    @abstractmethod
     def wave(self, angle: Array) -> Array:
-        raise NotImplementedError
+        """Ripple of unit size at a phase (n,) [rad] of the teeth."""
 
     def loss(self, scene: Scene) -> Array:
         angle = self.order * scene.motion.turn + self.phase
@@ -59,16 +61,16 @@ class CatchingTeeth(GearTeeth):
 
 
 @dataclass(frozen=True)
-class Play(Effect):
+class Play(Effect, ABC):
     """The gear has play b at the axle: after a reversal the motor turns b before it drives; its
     forms say how it takes up the load.
     """
 
     name, most = "backlash", 0.25
 
+    @abstractmethod
     def taken_up(self, turned: Array) -> Array:
         """Share of the load that the motor feels, b times `turned` after a reversal."""
-        raise NotImplementedError
 
     def loss(self, scene: Scene) -> Array:
         if not self.strength:

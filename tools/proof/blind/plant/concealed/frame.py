@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -59,7 +60,7 @@ class LeaningAxis(Effect):
 
 
 @dataclass(frozen=True)
-class InclinedBed(Effect):
+class InclinedBed(Effect, ABC):
     """The bed rises against the rail, by α at first; its forms give how it goes on. The
     potentiometer reads z − rise, and W sin of the grade goes from the pull. Geometry and statics.
     """
@@ -72,13 +73,13 @@ class InclinedBed(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most * cls.sign(rng), facts.length)
 
+    @abstractmethod
     def grade(self, place: Array) -> Array:
         """Rise of the surface per way, at places on the bed (n,) [m]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def rise(self, place: Array) -> Array:
         """Height of the surface over where the bed begins [m]."""
-        raise NotImplementedError
 
     def forces(self, scene: Scene) -> Scene:
         climb = scene.carried * np.sin(np.arctan(self.grade(scene.motion.travel)))
@@ -152,7 +153,7 @@ class RollingContacts(Effect):
 
 
 @dataclass(frozen=True)
-class StickingAxis(Effect):
+class StickingAxis(Effect, ABC):
     """The axis holds back by F h, −1 ≤ h ≤ 1 along the path of z; its forms say how h follows. The
     wheel was lowered: h starts at 1.
     """
@@ -165,9 +166,9 @@ class StickingAxis(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(min(cls.most, 0.15 * facts.weight), float(rng.uniform(1e-4, 4e-4)))
 
+    @abstractmethod
     def follow(self, state: float, moved: float) -> float:
         """h after a step of z, given over δ."""
-        raise NotImplementedError
 
     def pressed(self, scene: Scene) -> Array | float:
         """By how much the guides hold more than F."""

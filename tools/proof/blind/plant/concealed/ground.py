@@ -4,6 +4,7 @@ slip.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -168,7 +169,7 @@ class ReeceSlipSinkage(Effect):
 
 
 @dataclass(frozen=True)
-class Stretch(Effect):
+class Stretch(Effect, ABC):
     """c (1 + a w), tan φ (1 + b w) on a stretch of the bed; its forms give w(x)."""
 
     friction: float = 0.3  # b over a
@@ -184,9 +185,9 @@ class Stretch(Effect):
         share, flank = rng.uniform(0.0, 0.5), rng.uniform(0.01, 0.04)
         return cls(cls.most * cls.sign(rng), float(share), float(middle), float(half), float(flank))
 
+    @abstractmethod
     def inside(self, place: Array) -> Array:
         """w at a place on the bed [m]."""
-        raise NotImplementedError
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
         change = self.strength * self.inside(scene.motion.travel)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -14,7 +15,7 @@ from gritd.tools.proof.blind.plant.scene import Scene
 
 
 @dataclass(frozen=True)
-class Lugs(Effect):
+class Lugs(Effect, ABC):
     """N lugs of height h; their forms give the force of each."""
 
     count: int = 16
@@ -31,9 +32,9 @@ class Lugs(Effect):
         turned = scene.motion.turn * scene.direction + self.phase + 2.0 * np.pi * lug / self.count
         return np.asarray(np.mod(-turned + np.pi, 2.0 * np.pi) - np.pi)
 
+    @abstractmethod
     def push(self, scene: Scene, theta: Array) -> Array:
         """Force of a lug at θ, along the rim [N]."""
-        raise NotImplementedError
 
     def depth(self, scene: Scene) -> Array | float:
         """By how much the wheel rides deeper for its lugs [m]."""

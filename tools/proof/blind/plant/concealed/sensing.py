@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
@@ -114,7 +115,7 @@ def _unseen(felt: Felt, creep: Array) -> Felt:
 
 
 @dataclass(frozen=True)
-class Latency(Effect):
+class Latency(Effect, ABC):
     """One channel is late; its forms say how."""
 
     channel: str = "sinkage"
@@ -125,8 +126,9 @@ class Latency(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, str(rng.choice(("sinkage", "current", "force"))))
 
+    @abstractmethod
     def late(self, values: Array, time: Array) -> Array:
-        raise NotImplementedError
+        """The readings (n,) as they come late, at times (n,) [s]."""
 
     def sensed(self, felt: Felt) -> Felt:
         if not self.strength:

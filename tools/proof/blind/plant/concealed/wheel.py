@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -161,7 +162,7 @@ class DentedRim(OffsetAxle):
 
 
 @dataclass(frozen=True)
-class Hub(Effect):
+class Hub(Effect, ABC):
     """The hub runs out: it lifts the axle and drops it again, and the rim stays round. Only the
     potentiometer sees it; its forms give the wave.
     """
@@ -174,8 +175,9 @@ class Hub(Effect):
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
 
+    @abstractmethod
     def wave(self, angle: Array) -> Array:
-        raise NotImplementedError
+        """Lift of unit size at an angle (n,) [rad] of the wheel."""
 
     def sensed(self, felt: Felt) -> Felt:
         lifted = self.strength * self.wave(felt.scene.motion.turn + self.phase)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
@@ -125,7 +126,7 @@ class LoadedPotentiometer(Effect):
 
 
 @dataclass(frozen=True)
-class Drift(Effect):
+class Drift(Effect, ABC):
     """The zero of one channel creeps with time, by `strength` over a run; its forms say how. Each
     run begins where the last one ended.
     """
@@ -143,9 +144,9 @@ class Drift(Effect):
         size, pace = sizes[channel] * cls.sign(rng), float(rng.uniform(2.0, 8.0)) * facts.duration
         return cls(size, channel, facts.duration, pace)
 
+    @abstractmethod
     def crept(self, time: Array) -> Array:
         """Share of `strength` that the zero has crept, at times since the campaign began [s]."""
-        raise NotImplementedError
 
     def sensed(self, felt: Felt) -> Felt:
         crept = self.strength * self.crept(felt.scene.motion.time)

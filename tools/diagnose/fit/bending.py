@@ -6,10 +6,11 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
     S(x) (1 + h(x)),   h(x) = Σ aⱼ φⱼ(x),   aⱼ ~ N(0, ρ²/m)
 
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
-along the bed, as another formula for it would have it. A ripple may also have other harmonics. ρ is
-how far published forms differ; its prior is over 0 to 40 %. Our own form may be the best one to
-name an effect by, but the soil is never told as if it were exact: where the soil can absorb most
-of an effect, another form of it changes the soil and hardly the fit.
+along the bed, as another formula for it would have it. Beside h each channel has a factor of its
+own, since another formula shares the effect out among the channels in another way. A ripple may
+also have other harmonics. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own
+form may be the best one to name an effect by, but the soil is never told as if it were exact: where
+the soil can absorb most of an effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
     for number, effect in enumerate(fitted.acting):
         added = _added(stack, fitted, number)
         if np.any(added):
-            every = np.column_stack((functions, _harmonics(stack, fitted, number)))
+            harmonics = _harmonics(stack, fitted, number)
+            every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
             least = 0 if effect.stage in EXACT else 1
             found.append(freedom(effect.name, columns, noise, bending_sizes(), least))
@@ -52,6 +54,14 @@ def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)
     return fitted.predicted - stack.predict(fitted.u, others)
+
+
+def _by_channel(stack: Stack, added: Array) -> Array:
+    """Marks (N, m) of the channels in which an effect acts; (N, 0) where it is but one."""
+    marks = [stack.of(c) for c in stack.rig.channels if np.any(added[stack.of(c)])]
+    if len(marks) < 2:
+        return np.zeros((stack.size, 0))
+    return np.column_stack(marks).astype(float)
 
 
 def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Array:

@@ -61,9 +61,18 @@ def _columns(stack: Stack, source: FormSource) -> Array:
         for k in TUNING.fit.form_harmonics
         for wave in (np.cos, np.sin)
     ]
-    return np.asarray(
-        np.column_stack((smooth, *turning)) * weight[:, None] * _size(stack, source, acting)
-    )
+    size = _size(stack, source, acting) if source.size is None else source.size
+    columns = np.column_stack((smooth, *turning)) * weight[:, None] * size
+    return _without_levels(columns, weight) if source.drive else columns
+
+
+def _without_levels(columns: Array, weight: Array) -> Array:
+    """Columns (N, m) without what is constant or goes with the load: a drive's friction has names,
+    and a discrepancy that could be all of it would take their part (Plumlee 2017, J. Am. Stat.
+    Assoc. 112, 1274-1285).
+    """
+    levels = np.column_stack((weight, np.sign(weight)))
+    return np.asarray(columns - levels @ np.linalg.lstsq(levels, columns, rcond=None)[0])
 
 
 def _joined(stack: Stack, runs: list[Array] | tuple[Array, ...]) -> Array:

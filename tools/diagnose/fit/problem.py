@@ -129,6 +129,12 @@ class Fitted:
         jacobian = self.jacobian
         return np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(self.penalty**2)))
 
+    def allowed(self, allowance: Allowance) -> Fitted:
+        """The same point and slopes with another allowance, not fitted to it: for a projection."""
+        slack = np.zeros(sum(columns.shape[1] for columns, _, _ in allowance.parts))
+        penalty = np.concatenate((self.penalty[: self.centre.size], np.ones_like(slack)))
+        return replace(self, allowance=allowance, slack=slack, penalty=penalty)
+
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
         scaled = self.jacobian / self.penalty

@@ -105,6 +105,14 @@ class Projection:
             self.surrogates,
         )
 
+    def of_rows(self, rows: Bools) -> Projection:
+        """As the marked values (N,) alone tell it."""
+        mask = rows[:, None].astype(float)
+        drawn = self.surrogates
+        if drawn is not None:
+            drawn = Surrogates(drawn.residuals * mask, drawn.strains)
+        return Projection(self.jacobian * mask, self.residual * mask[:, 0], self.strain, drawn)
+
     def project(self, columns: Array) -> tuple[Array, Array]:
         """A (m, m) and b (m,) of whitened columns (N, m) for the recordings."""
         inside = self._inside(columns)

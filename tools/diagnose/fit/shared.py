@@ -8,14 +8,17 @@ with one strength,
     Σₑ aₑ Sₑ(x),   aₑ ~ N(0, 1) in expected sizes, times one size for all that is learnt,
 
 linear about the rough fit, reduced to the directions that the recordings can show. A ripple keeps
-its order and its size, but not its phase: each run has its own.
+its order and its size, but not its phase: each run has its own. It may be faster than the grid: the
+grid's values are means over an interval, which damp it, and what is left is an alias of known size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
@@ -25,7 +28,7 @@ from gritd.tools.diagnose.fit.signatures import (
     raw_signatures,
 )
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -69,63 +72,87 @@ def _reduced(columns: Array, whitened: Array) -> tuple[Array, Array]:
     return columns @ vectors[:, large], whitened @ vectors[:, large]
 
 
+@dataclass(frozen=True, eq=False)
+class _Waves:
+    """Every order tried, on the values of one run and channel.
+
+    wave:  e^(i order angle) (n, o), damped as means over the grid's interval damp it.
+    shown: half the sum of the squared damping (o,); 0 where the grid hardly shows the order.
+    """
+
+    index: Index
+    wave: NDArray[np.complex128]
+    shown: Array
+
+    def squares(self, values: Array) -> Array:
+        """That each order takes of values (N,): (o,)."""
+        part = values[self.index] - values[self.index].mean()
+        power = np.abs(part @ self.wave) ** 2
+        return np.asarray(power / np.where(self.shown > 0.0, self.shown, np.inf))
+
+    def without(self, values: Array, order: int) -> Array:
+        """Values (N,) less one order's part of them."""
+        out = values.copy()
+        if self.shown[order] > 0.0:
+            pair = np.column_stack((self.wave[:, order].real, self.wave[:, order].imag))
+            own = values[self.index]
+            out[self.index] = own - pair @ np.linalg.lstsq(pair, own, rcond=None)[0]
+        return out
+
+
 def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
     """Pairs (N, 2) of all channels, orders and runs."""
-    orders = np.arange(TUNING.fit.lowest_ripple, highest_order(stack), TUNING.fit.ripple_spacing)
+    orders = _orders(stack)
     moving = stack.covariate("speed") > 0.0
-    angle = stack.covariate("wheel_angle")
     for channel in stack.rig.channels if orders.size else ():
         own = stack.of(channel) & moving
-        for order, size in _standing(stack, angle, residual, own & ~stack.new, orders):
-            for number in range(len(stack.rig.runs)):
-                here = np.where(own & (stack.run == number), size, 0.0)
-                if here.any():
-                    waves = (np.cos(order * angle), np.sin(order * angle))
-                    yield np.column_stack([here * wave for wave in waves])
+        waves = {n: _waves(stack, own, n, orders) for n in np.unique(stack.run[own])}
+        of_reference = [w for n, w in waves.items() if not stack.rig.new[n]]
+        for order, size in _standing(of_reference, residual):
+            for wave in (w for w in waves.values() if w.shown[order] > 0.0):
+                pair = np.zeros((stack.size, 2))
+                pair[wave.index, 0] = size * wave.wave[:, order].real
+                pair[wave.index, 1] = size * wave.wave[:, order].imag
+                yield pair
 
 
-def _standing(
-    stack: Stack, angle: Array, residual: Array, own: Bools, orders: Array
-) -> Iterator[tuple[float, float]]:
-    """The strongest orders of the marked values, and the amplitude of each: those that gain more
-    than chance in any of so many.
+def _orders(stack: Stack) -> Array:
+    """Ripples a turn that are tried (o,); none where the wheel hardly turns."""
+    if highest_order(stack) == 0.0:
+        return np.zeros(0)
+    fit = TUNING.fit
+    return np.arange(fit.lowest_ripple, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
+
+
+def _waves(stack: Stack, own: Bools, number: int, orders: Array) -> _Waves:
+    """On the marked values of one run: sin(x)/x of what an interval turns damps a ripple and, where
+    it is an alias of what lies above the grid's rate, turns its sign.
     """
-    left = np.where(own, residual, 0.0)
-    for _ in range(TUNING.fit.strongest_orders):
-        squares, amplitudes = _spectrum(stack, angle, left, own, orders)
+    run = stack.rig.runs[number]
+    angle = run.covariates["wheel_angle"]
+    turned = np.gradient(angle) / (2.0 * np.pi)  # in one interval
+    index = np.flatnonzero(own & (stack.run == number))
+    time = stack.time[index]
+    damping = np.sinc(np.outer(np.interp(time, run.time, turned), orders))
+    wave = np.exp(1j * np.outer(np.interp(time, run.time, angle), orders)) * damping
+    seen = np.mean(damping**2, axis=0) > TUNING.fit.ripple_shown**2
+    return _Waves(index, wave, np.where(seen, 0.5 * np.sum(damping**2, axis=0), 0.0))
+
+
+def _standing(runs: Sequence[_Waves], residual: Array) -> Iterator[tuple[int, float]]:
+    """The strongest orders in the runs, and the amplitude of each: those that gain more than chance
+    in any of so many.
+    """
+    count = sum(w.index.size for w in runs)
+    left = residual
+    for _ in range(TUNING.fit.standing_orders if count >= TUNING.fit.ripple_values else 0):
+        squares = np.sum([w.squares(left) for w in runs], axis=0)
         best = int(np.argmax(squares))
-        rest = float(np.sum(left[own] ** 2)) - squares[best]
-        count = int(own.sum())
-        gain = 0.5 * count * np.log1p(squares[best] / max(rest, 1e-300))
-        if count < TUNING.fit.ripple_values or gain < TUNING.fit.standing_ripple:
+        whole = sum(float(np.sum(left[w.index] ** 2)) for w in runs)
+        gain = 0.5 * count * np.log1p(squares[best] / max(whole - squares[best], 1e-300))
+        if gain < TUNING.fit.standing_ripple:
             return
-        yield float(orders[best]), float(amplitudes[best])
-        left = left - _fitted(stack, angle, left, own, float(orders[best]))
-
-
-def _spectrum(
-    stack: Stack, angle: Array, values: Array, own: Bools, orders: Array
-) -> tuple[Array, Array]:
-    """Squares that each order takes (o,), with a phase for each run, and its amplitude (o,)."""
-    squares, count = np.zeros(orders.size), 0
-    for number in range(len(stack.rig.runs)):
-        index = np.flatnonzero(own & (stack.run == number))
-        if index.size:
-            part = values[index] - values[index].mean()
-            squares += (
-                2.0 * np.abs(part @ np.exp(1j * np.outer(angle[index], orders))) ** 2 / (index.size)
-            )
-            count += index.size
-    return squares, np.sqrt(2.0 * squares / max(count, 1))
-
-
-def _fitted(stack: Stack, angle: Array, values: Array, own: Bools, order: float) -> Array:
-    """The order's part of the values (N,), with a phase for each run."""
-    out = np.zeros(values.size)
-    for number in range(len(stack.rig.runs)):
-        index = np.flatnonzero(own & (stack.run == number))
-        if index.size:
-            turn = order * angle[index]
-            pair = np.column_stack((np.cos(turn), np.sin(turn)))
-            out[index] = pair @ np.linalg.lstsq(pair, values[index], rcond=None)[0]
-    return out
+        shown = sum(float(w.shown[best]) for w in runs)
+        yield best, float(np.sqrt(squares[best] / shown))
+        for w in runs:
+            left = w.without(left, best)

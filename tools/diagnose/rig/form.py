@@ -19,10 +19,15 @@ SOURCES = (  # name, channels that share one discrepancy, whether it turns with 
 
 
 def wheel_forms(
-    runs: Sequence[Run], channels: Sequence[str], radius: float
+    runs: Sequence[Run],
+    channels: Sequence[str],
+    radius: float,
+    driven: Sequence[Array] | None = None,
 ) -> tuple[FormSource, ...]:
-    """The sources of a wheel rig. Soil torque is shared by motor and axle; where both are measured
-    the drive between them has a discrepancy of its own.
+    """The sources of a wheel rig.
+
+    driven: the motor's torque (n,) of every run [N·m], where channel `torque` is what is lost
+    between motor and axle: no soil acts there, but the drive has a discrepancy of its own.
     """
     usual = usual_of(runs)
     if usual is None:
@@ -30,14 +35,22 @@ def wheel_forms(
     conditions = tuple(_conditions(run, usual, radius) for run in runs)
     forms = []
     for name, both, signed in SOURCES:
-        measured = tuple(c for c in both if c in channels)
+        lost = ("torque",) if driven is not None else ()
+        measured = tuple(c for c in both if c in channels and c not in lost)
         if measured:
             weight = tuple(_weight(run, usual, signed) for run in runs)
             forms.append(FormSource(name, measured, conditions, weight))
-    if {"torque", "axle_torque"} <= set(channels):
+    if driven is not None:
         weight = tuple(_weight(run, usual, True) for run in runs)
-        forms.append(FormSource("drive", ("torque",), conditions, weight, drive=True))
+        size = _mean_square([t[w != 0.0] for t, w in zip(driven, weight, strict=True)]) ** 0.5
+        forms.append(FormSource("drive", ("torque",), conditions, weight, size, drive=True))
     return tuple(forms)
+
+
+def _mean_square(parts: Sequence[Array]) -> float:
+    values = np.concatenate(parts)
+    values = values[np.isfinite(values)]
+    return float(np.mean(values**2)) if values.size else 0.0
 
 
 def usual_of(runs: Sequence[Run]) -> Usual | None:

@@ -101,7 +101,8 @@ class FormSource:
     of its channels.
 
     conditions: per run (n, d), each in units of the length over which the function changes.
-    weight:     per run (n,), how large the function is there, in the size of its last channel.
+    weight:     per run (n,), how large the function is there, in `size`.
+    size:       in the unit of its channels; None: the root mean square of its last channel.
     drive:      whether it is the drive's and not the soil's.
     """
 
@@ -109,6 +110,7 @@ class FormSource:
     channels: tuple[str, ...]
     conditions: tuple[Array, ...]
     weight: tuple[Array, ...]
+    size: float | None = None
     drive: bool = False
 
     @property

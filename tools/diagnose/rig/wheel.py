@@ -45,6 +45,11 @@ LAW_PREFIX = {
     "torque": "torque", "axle_torque": "torque", "drawbar_pull": "pull", "sinkage": "depth",
 }  # fmt: skip
 LAW_CHANNEL = {"torque": "torque", "pull": "drawbar_pull", "depth": "sinkage"}
+LAW_PREFIX_OF_LOSS = {c: prefix for c, prefix in LAW_PREFIX.items() if c != "torque"}
+LOSS_NOTE = (
+    "Motor current and axle torque are both measured, so channel torque is what is lost between"
+    " motor and axle. No soil acts there."
+)
 LAW_TERMS = {"constant": "1", "slip": "i", "slip_squared": "i²", "sinkage": "z/r", "speed": "ν"}
 LAW_NOTE = "ν = ln((rω + 1 mm/s)/(21 mm/s))"
 
@@ -77,6 +82,9 @@ class WheelRig:
             new: min(s.start for s, n in zip(signals, self.new, strict=True) if n == new)
             for new in set(self.new)
         }
+        self.loss_of_drive = {"torque", "axle_torque"} <= set(self.channels)
+        if self.loss_of_drive:
+            self.caveats.append(LOSS_NOTE)
         self._motions = [
             motion_of(s, w.values, settings, s.start - began[new])
             for s, w, new in zip(signals, self._weights, self.new, strict=True)
@@ -119,7 +127,13 @@ class WheelRig:
             self._inner[[part.start, part.stop - 1]] = False
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
-        self.forms = wheel_forms(self.runs, self.channels, settings.wheel.radius)
+        driven = [measured_of(s, "torque", self._constant) for s in signals]
+        self.forms = wheel_forms(
+            self.runs,
+            self.channels,
+            settings.wheel.radius,
+            driven if self.loss_of_drive else None,
+        )
 
     # ---- prediction ------------------------------------------------------------------------------
 
@@ -182,7 +196,17 @@ class WheelRig:
         read = true * (1.0 + scale) + offset
         before, after = np.roll(read, 1, axis=1), np.roll(read, -1, axis=1)
         rate, bend = (after - before) / (2.0 * self._step), after + before - 2.0 * read
-        return np.asarray(np.where(self._inner, read - delay * rate + blur * bend, read))
+        return self._compared(np.where(self._inner, read - delay * rate + blur * bend, read))
+
+    def _compared(self, read: Array) -> Array:
+        """Of what the channels read (channels, n): the loss of the drive where both its sides are
+        measured.
+        """
+        out = np.array(read)
+        if self.loss_of_drive:
+            motor, axle = (self.channels.index(name) for name in ("torque", "axle_torque"))
+            out[motor] -= read[axle]
+        return out
 
     def _baseline(self, value: Mapping[str, float]) -> tuple[Effect, ...]:
         return tuple(
@@ -249,16 +273,18 @@ class WheelRig:
             order=TUNING.rig.quadrature_order,
         ).sensed
 
-        read = {
-            c: sensed_as(sensed, c, self.settings) + value[f"{c}_offset"] for c in self.channels
-        }
-        return Foreseen(read, {c: driving(experiment) | (c == "torque") for c in self.channels})
+        read = [sensed_as(sensed, c, self.settings) + value[f"{c}_offset"] for c in self.channels]
+        compared = dict(zip(self.channels, self._compared(np.array(read)), strict=True))
+        return Foreseen(compared, {c: driving(experiment) | (c == "torque") for c in self.channels})
 
     # ---- what is said ----------------------------------------------------------------------------
 
     @property
     def law(self) -> LawForm:
         domain = {"slip": 1.0, "sinkage": self.settings.wheel.radius, "speed": 1.0}
+        if self.loss_of_drive:
+            channel = LAW_CHANNEL | {"torque": "axle_torque"}
+            return LawForm(EmpiricalLaw, LAW_PREFIX_OF_LOSS, channel, LAW_TERMS, LAW_NOTE, domain)
         return LawForm(EmpiricalLaw, LAW_PREFIX, LAW_CHANNEL, LAW_TERMS, LAW_NOTE, domain)
 
     @property
@@ -279,6 +305,8 @@ class WheelRig:
     def _run(self, signals: Signals, number: int) -> Run:
         motion = self._motions[number]
         measured = {c: measured_of(signals, c, self._constant) for c in self.channels}
+        if self.loss_of_drive:
+            measured["torque"] = measured["torque"] - measured["axle_torque"]
         covariates = self._covariates(signals, motion) | {"sinkage": self._depth(number)}
         driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}

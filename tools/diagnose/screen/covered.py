@@ -11,7 +11,8 @@ from gritd.tools.diagnose.tuning import TUNING
 
 def covered(stack: Stack) -> Bools:
     """Marks the values (N,) at whose conditions the reference leaves little of δ open; all others
-    could be anything that this rig does elsewhere. A wheel that stands is covered.
+    could be anything that this rig does elsewhere. A wheel that stands is covered as where it drove
+    last: its sinkage is from there.
     """
     source = stack.rig.forms[0]
     pairs = list(zip(source.conditions, source.weight, stack.rig.new, strict=True))
@@ -21,7 +22,16 @@ def covered(stack: Stack) -> Bools:
     inside = []
     for conditions, weight, _ in pairs:
         left = 1.0 - np.sum(features.at(conditions) ** 2, axis=1)
-        inside.append((left < TUNING.screen.reference_open) | (weight == 0.0))
+        inside.append(_held(left < TUNING.screen.reference_open, weight != 0.0))
     joined = stack.joined([dict.fromkeys(stack.rig.channels, i.astype(float)) for i in inside])
     marks: Bools = joined > 0.5
     return marks
+
+
+def _held(inside: Bools, driving: Bools) -> Bools:
+    """Marks (n,) of one run: where it does not drive those of where it drove last; before that
+    all.
+    """
+    last = np.maximum.accumulate(np.where(driving, np.arange(driving.size), -1))
+    held: Bools = np.where(last < 0, True, inside[last])
+    return held

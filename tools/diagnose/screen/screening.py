@@ -111,7 +111,8 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     effects = _signatures(problem, model, None, everywhere=True)
     both = whitened(problem.noise, [*effects, *smooth_signatures(stack, everywhere=True)])
 
-    usual = habits(projection, both, stack)
+    alone = projection.of_rows(~stack.new)  # what is new must not tell what is usual
+    usual = habits(alone, both, stack)
 
     elsewhere = ~screening.judged
     for s in both:  # in their place: together they are large
@@ -121,9 +122,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     screen = screen_signatures(projection, both, searched)
 
     of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
-    shapes: dict[Candidate, float] = {
-        f.shape: float(f.average(projection)[0]) for f in of_reference
-    }
+    shapes: dict[Candidate, float] = {f.shape: float(f.average(alone)[0]) for f in of_reference}
     return screen.beside_reference({**shapes, **usual})
 
 

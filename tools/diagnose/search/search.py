@@ -12,6 +12,7 @@ import numpy as np
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
+from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.projection import Projection
@@ -140,11 +141,25 @@ def _near(search: Search, model: Model) -> bool:
 
 @dataclass(frozen=True)
 class Promise:
-    """What an effect would gain beside a model by linear algebra [nats], and its start."""
+    """What an effect would gain beside a model by linear algebra [nats], where its fit begins, and
+    the sizes of the forms beside which it gains that.
+    """
 
     gain: float
     effect: type[Effect]
     start: Array  # of its parameters, in their units
+    sizes: Chosen
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A model with other sizes of its forms; cost: log evidence that the model alone loses by it
+    [nats].
+    """
+
+    sizes: Chosen
+    projection: Projection
+    cost: float
 
 
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
@@ -156,12 +171,16 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
 
 
 def promises(search: Search, model: Model) -> list[Promise]:
-    """Of every effect that is not in the model, the most promising first."""
+    """Of every effect that is not in the model, the most promising first.
+
+    A discrepancy of form that was learnt without an effect may have taken the effect's part. So
+    each effect is judged beside smaller discrepancies too, at what these cost.
+    """
     effects = search.problem.stack.rig.effects
-    habit, projection = search.first.habit, model.fitted.projection()
+    settings, habit = _settings(search, model), search.first.habit
     found = []
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
-        tried = list(_tried(search, model, effects[name], projection))
+        tried = list(_tried(search, model, effects[name], settings))
         if tried:
             best = max(tried, key=lambda promise: promise.gain)
             usual = TUNING.screen.habit * habit.get(name, 0.0)
@@ -169,18 +188,43 @@ def promises(search: Search, model: Model) -> list[Promise]:
     return sorted(found, key=lambda promise: -promise.gain)
 
 
+def _settings(search: Search, model: Model) -> list[Setting]:
+    """The model as it is, then with smaller forms."""
+    marginal, bends = model.marginal, model.chosen[len(model.sizes) :]
+    if marginal is None:
+        return [Setting(model.sizes, model.fitted.projection(), 0.0)]
+
+    found = []
+    for sizes in _smaller(model.sizes):
+        chosen = (*sizes, *bends)
+        values = [f.sizes.values[n] for f, n in zip(marginal.freedoms, chosen, strict=True)]
+        allowed = search.problem.with_freedoms(marginal.freedoms, values).allowance
+        cost = marginal.log_evidence(model.chosen) - marginal.log_evidence(chosen)
+        found.append(Setting(sizes, model.fitted.allowed(allowed).projection(), cost))
+    return found
+
+
+def _smaller(sizes: Chosen) -> list[Chosen]:
+    """Sizes as they are, all smaller by steps, and each alone at its smallest."""
+    steps = [tuple(max(n - k, 0) for n in sizes) for k in range(max(sizes, default=0) + 1)]
+    alone = [(*sizes[:i], 0, *sizes[i + 1 :]) for i in range(len(sizes))]
+    return list(dict.fromkeys([*steps, *alone]))
+
+
 def _tried(
-    search: Search, model: Model, effect: type[Effect], projection: Projection
+    search: Search, model: Model, effect: type[Effect], settings: Sequence[Setting]
 ) -> Iterator[Promise]:
-    """The promise of an effect for each of its likeliest signatures."""
+    """The promise of an effect for each of its likeliest signatures and each setting."""
     fitted, problem = model.fitted, search.problem
     for fixed in search.first.fixed[effect.name][: TUNING.search.again]:
         made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
         if made is None:
             continue
-        a, b = projection.project(whiten(problem.noise, made.columns))
-        gain = float(log_evidence(a, b, made.sign))
-        yield Promise(gain, effect, _start(effect, made, a, b))
+        columns = whiten(problem.noise, made.columns)
+        for setting in settings:
+            a, b = setting.projection.project(columns)
+            gain = float(log_evidence(a, b, made.sign)) - setting.cost
+            yield Promise(gain, effect, _start(effect, made, a, b), setting.sizes)
 
 
 def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
@@ -205,7 +249,7 @@ def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
     free = (*fitted.free, *free_of((promise.effect,)))
     begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
     screening = search.screening
-    return fit_model(screening.problem, screening.forms, effects, free, begins, model.sizes)
+    return fit_model(screening.problem, screening.forms, effects, free, begins, promise.sizes)
 
 
 def _retested(search: Search) -> Search:

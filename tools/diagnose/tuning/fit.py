@@ -127,6 +127,8 @@ class Fit:
     standing_ripple: float = tuned(
         15.0, "nats", "a ripple of the reference gains: some hundred orders are tried"
     )
+    standing_orders: int = tuned(6, "orders", "of a channel of the reference that may stand out")
+    ripple_shown: float = tuned(0.1, "-", "of a ripple that the grid must show", DAMPED)
 
     # --- signatures.py ---
     highest_order: float = tuned(200.0, "1/turn", "ripples")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gritd.tools.diagnose.tuning.field import tuned
 
-SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95)
+SLOW = (0.02, 0.06, 0.15, 0.3, 0.5, 0.75, 0.95, 0.99)
 CELLS = {"slip": 0.04, "speed": 0.08, "load": 0.05}
 DAMPED = "damping of a mean over an interval"
 

@@ -77,6 +77,8 @@ def stretches(stack: Stack) -> list[Bools]:
     found = []
     for number in runs:
         own = stack.run == number
+        if not own.any():
+            continue
         first, last = stack.time[own].min(), stack.time[own].max()
         share = (stack.time - first) / max(float(last - first), 1e-9)
         part = np.minimum((count * share).astype(int), count - 1)

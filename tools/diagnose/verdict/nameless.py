@@ -39,7 +39,8 @@ def nameless_beside(screening: Screening, model: Model) -> Nameless | None:
         return None
     fitted = [_fitted(screening, model, chosen, size) for size in TUNING.verdict.function_sizes]
     best = max(fitted, key=lambda m: m.evidence)
-    return Nameless(best, tuple(chosen), best.evidence - model.evidence + price)
+    gain = best.evidence - model.evidence + price
+    return Nameless(best, tuple(chosen), gain) if gain > 0.0 else None
 
 
 def nameless_functions(screening: Screening, model: Model) -> list[Signature]:

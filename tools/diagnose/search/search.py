@@ -174,7 +174,8 @@ def promises(search: Search, model: Model) -> list[Promise]:
     """Of every effect that is not in the model, the most promising first.
 
     A discrepancy of form that was learnt without an effect may have taken the effect's part. So
-    each effect is judged beside smaller discrepancies too, at what these cost.
+    each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
+    so it may do better than linear algebra by a share.
     """
     effects = search.problem.stack.rig.effects
     settings, habit = _settings(search, model), search.first.habit
@@ -223,7 +224,8 @@ def _tried(
         columns = whiten(problem.noise, made.columns)
         for setting in settings:
             a, b = setting.projection.project(columns)
-            gain = float(log_evidence(a, b, made.sign)) - setting.cost
+            gain = (1.0 + TUNING.search.curved) * float(log_evidence(a, b, made.sign))
+            gain -= setting.cost
             yield Promise(gain, effect, _start(effect, made, a, b), setting.sizes)
 
 

@@ -21,6 +21,9 @@ class Search:
     again: int = tuned(
         4, "signatures", "of an effect tried beside a model: the screen's likeliest", "run time"
     )
+    curved: float = tuned(
+        0.1, "share", "of an effect's linear evidence by which its fit may do better"
+    )
     behind: float = tuned(12.0, "nats", "a model so far behind the best starts nothing")
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")

@@ -53,5 +53,14 @@ def test_a_ripple_of_the_reference_is_of_its_size_in_both() -> None:
     assert 0.2 < loudest < 0.45
 
 
+def test_a_ripple_faster_than_the_grid_keeps_its_size() -> None:
+    """0.5 turns a second and 90 ripples a turn are 45 Hz; the grid has 10 Hz."""
+    ripple = make("gear_ripple", {"ripple_cos": 0.6, "ripple_sin": 0.0, "order": 90.0})
+    stack, columns = _columns((ripple,), 5)
+    torque = stack.of("torque")
+    assert columns.shape[1]
+    assert 0.0 < np.abs(columns[torque]).max() < 0.6
+
+
 def test_noise_does_not_ripple() -> None:
     assert _columns((), 7)[1].shape[1] == 0

@@ -5,12 +5,14 @@ not.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import make
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence
@@ -42,12 +44,19 @@ def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     assert _log_evidence(every.T @ every, precision) == pytest.approx(wanted)
 
 
-def begun(drawn: Plan, *acting: str) -> Search:
-    """The search after its first screen."""
+def begun(drawn: Plan, *acting: str, axle: bool = True) -> Search:
+    """The search after its first screen; axle: with the torque behind the drive measured too."""
     effects = [make(name, {"loss": 0.25}) for name in acting]
     rng = np.random.default_rng(0)
-    base = fit_base(WheelRig(record(drawn, effects), drawn.settings), rng)
+    signals = record(drawn, effects)
+    if not axle:
+        signals = [replace(s, analogue=_without(s.analogue, "axle_torque")) for s in signals]
+    base = fit_base(WheelRig(signals, drawn.settings), rng)
     return begin(prepare_screening(base, rng))
+
+
+def _without(channels: dict[str, Array], name: str) -> dict[str, Array]:
+    return {n: values for n, values in channels.items() if n != name}
 
 
 def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
@@ -64,9 +73,18 @@ def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
 def test_a_friction_stands_out_of_noise_of_any_colour() -> None:
     """Of slow noise too, and its evidence is hardly less than with the colour assumed."""
     for slow in (0.0, 0.3):
-        search = begun(plan(slow=slow, slow_time=1.0), "coulomb_friction")
+        search = begun(plan(slow=slow, slow_time=1.0), "coulomb_friction", axle=False)
         found = search.first
         assert found.alarmed
         friction = found.best["coulomb_friction"].signature
         gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
         assert gain > max(0.5 * found.evidence["coulomb_friction"], TUNING.screen.sure)
+
+
+def test_a_loss_of_the_drive_that_is_read_off_stands_out_too() -> None:
+    """A steady loss could in part be slow noise of the two torques' difference: never all."""
+    search = begun(plan(slow=0.3), "coulomb_friction")
+    assert search.first.alarmed
+    friction = search.first.best["coulomb_friction"].signature
+    gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
+    assert gain > 20.0 * TUNING.screen.sure

@@ -1,0 +1,66 @@
+"""Where motor and axle torque are both measured, what is lost between them is read off: the soil
+has no part in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects import make
+from gritd.tools.diagnose.fit.discrepancy import _columns
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.wheel import LOSS_NOTE, WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+LOSS = 0.8  # [N·m]
+
+
+def _rig(*acting: str) -> WheelRig:
+    effects = tuple(make(name, {"loss": LOSS}) for name in acting)
+    return WheelRig(record(plan(), effects), settings())
+
+
+def test_torque_is_what_is_lost() -> None:
+    rig = _rig("coulomb_friction")
+    assert {"torque", "axle_torque"} <= set(rig.channels)
+    assert LOSS_NOTE in rig.caveats
+    run = rig.runs[0]
+    driving = run.used["torque"] & (run.covariates["speed"] > 0.0)
+    assert float(np.median(run.measured["torque"][driving])) == pytest.approx(LOSS, rel=0.3)
+
+
+def test_soil_does_not_change_the_loss() -> None:
+    rig = _rig()
+    u = np.zeros(len(rig.constants))
+    names = [constant.name for constant in rig.constants]
+    before = rig.predict(u, ())
+    u[names.index("c")] = u[names.index("tan_phi")] = 2.0
+    after = rig.predict(u, ())
+    for was, now in zip(before, after, strict=True):
+        np.testing.assert_allclose(now["torque"], was["torque"], atol=1e-9)
+        assert np.abs(now["axle_torque"] - was["axle_torque"]).max() > 0.05
+
+
+def test_the_drives_discrepancy_is_no_friction() -> None:
+    stack = Stack(_rig())
+    drive = next(source for source in stack.rig.forms if source.drive)
+    assert drive.channels == ("torque",)
+    columns = _columns(stack, drive)
+    weight = stack.joined([dict.fromkeys(stack.rig.channels, w) for w in drive.weight])
+    own = stack.of("torque")
+    for friction in (weight[own], np.sign(weight[own])):
+        np.testing.assert_allclose(columns[own].T @ friction, 0.0, atol=1e-6)
+
+
+def test_without_axle_torque_the_motors_is_compared() -> None:
+    signals = [
+        replace(s, analogue={n: v for n, v in s.analogue.items() if n != "axle_torque"})
+        for s in record(plan(), ())
+    ]
+    rig = WheelRig(signals, settings())
+    assert LOSS_NOTE not in rig.caveats
+    assert not any(source.drive for source in rig.forms)

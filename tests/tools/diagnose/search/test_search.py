@@ -1,0 +1,44 @@
+"""An effect is judged beside smaller discrepancies of form too: one learnt without the effect may
+have taken its part.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gritd.estimator.effects import make
+from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import _bare, _settings, _smaller, _tried, begin, promises
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+SIZES = st.lists(st.integers(0, 5), max_size=4).map(tuple)
+
+
+@given(SIZES)
+def test_settings_are_smaller_and_begin_with_the_models_own(sizes: tuple[int, ...]) -> None:
+    found = _smaller(sizes)
+    assert found[0] == sizes
+    assert len(set(found)) == len(found)
+    assert all(0 <= a <= b for other in found for a, b in zip(other, sizes, strict=True))
+    assert tuple(0 for _ in sizes) in found
+
+
+def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
+    effect = make("bulldozing", {"share": 0.75})
+    rig = WheelRig(record(plan(), (effect,)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    bare = _bare(search, search.base)
+    assert max(bare.sizes) > 0
+
+    kind, every = rig.effects["bulldozing"], _settings(search, bare)
+    assert every[0].cost == 0.0
+    as_it_is = max(p.gain for p in _tried(search, bare, kind, every[:1]))
+    best = next(p for p in promises(search, bare) if p.effect is kind)
+    assert best.gain > as_it_is + 5.0
+    assert max(best.sizes) < max(bare.sizes)

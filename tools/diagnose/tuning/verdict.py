@@ -14,7 +14,9 @@ class Verdict:
     # --- breadth.py: learnt from an opened batch, whose plants have forms of their own ---
     stretches: int = tuned(24, "stretches", "of all runs, at least", "run time")
     stretches_of_a_run: int = tuned(3, "stretches", "at least", "run time")
-    best_stretches: int = tuned(2, "stretches", "where an effect gains most: they do not count")
+    stretches_apart: int = tuned(
+        2, "stretches", "where an effect gains most, and as many where it loses most: not counted"
+    )
     broad: float = tuned(2.0, "nats", "that an effect must gain in all others: seven to one")
     tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
 

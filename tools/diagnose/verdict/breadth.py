@@ -4,8 +4,9 @@ The evidence of an effect adds up over all values as if the rest of the model we
 and a peculiar stretch can pay for an effect that is not there. So each effect of a likely model is
 judged once more by prediction: every run is cut into stretches, each stretch is predicted by the
 model with and without the effect as the other stretches tell them, and the gains are added without
-those of the two stretches where the effect gains most. What is there gains elsewhere too
-(leave-one-group-out prediction: Vehtari, Gelman and Gabry 2017, Stat. Comput. 27, 1413-1432).
+those of the two stretches where the effect gains most and the two where it loses most. What is
+there gains elsewhere too, and no formula of it is right everywhere (leave-one-group-out prediction:
+Vehtari, Gelman and Gabry 2017, Stat. Comput. 27, 1413-1432).
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ class Breadth:
 
     def broad(self, model: Model, name: str) -> bool:
         """Whether an effect of a model gains in more than two stretches."""
-        gains = np.sort(self.gains(model, name))
-        rest = gains[: -TUNING.verdict.best_stretches]
+        gains, apart = np.sort(self.gains(model, name)), TUNING.verdict.stretches_apart
+        rest = gains[apart:-apart]
         return bool(rest.size == 0 or rest.sum() > TUNING.verdict.broad)
 
     def gains(self, model: Model, name: str) -> Array:

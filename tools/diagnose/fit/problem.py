@@ -195,6 +195,10 @@ class Problem:
             other.__dict__.pop(stale, None)
         return other
 
+    def ground(self, effects: Sequence[Maker], free: Sequence[Free]) -> Ground:
+        """What is descended for a set of effects."""
+        return Ground(self, tuple(effects), tuple(free))
+
     def descend(
         self,
         effects: Sequence[Maker],
@@ -204,7 +208,7 @@ class Problem:
         rounds: int | None = None,
     ) -> Fitted:
         """The nearest optimum within bounds from constants u and effect parameters x."""
-        ground = _Ground(self, tuple(effects), tuple(free))
+        ground = self.ground(effects, free)
         start, nats = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))
         if not np.isfinite(nats):  # an effect that runs away: begin with none of it
             start = ground.tried(ground.bounds.clipped(np.concatenate((u, np.zeros_like(x)))))[0]
@@ -215,7 +219,7 @@ class Problem:
 
     def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
         """The nearest optimum from a fit with other tolerances, whose slopes are a start."""
-        ground = _Ground(self, fitted.effects, fitted.free)
+        ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
         most = TUNING.fit.rounds if rounds is None else rounds
         found, converged = descent.descend(ground, ground.moved(fitted, start), most)
@@ -223,7 +227,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class _Tried:
+class Tried:
     """A prediction that was not linearised."""
 
     centre: Array
@@ -233,8 +237,11 @@ class _Tried:
     objective: float
 
 
-class _Ground:
-    """What is descended for one set of effects: see descent.Ground."""
+class Ground:
+    """What is descended for one set of effects: see descent.Ground.
+
+    penalty: (q + p + t,) square root of the prior precision.
+    """
 
     def __init__(
         self, problem: Problem, effects: tuple[Maker, ...], free: tuple[Free, ...]
@@ -243,39 +250,39 @@ class _Ground:
         constants = problem.stack.rig.constants
         self._count = len(constants)
         weights = (np.ones(self._count), [f.weight for f in free])
-        self._penalty = np.concatenate((*weights, np.ones(problem.tolerance.shape[1])))
+        self.penalty = np.concatenate((*weights, np.ones(problem.tolerance.shape[1])))
 
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
         self.bounds = descent.Bounds(low, high)
 
-    def tried(self, centre: Array) -> tuple[_Tried, float]:
+    def tried(self, centre: Array) -> tuple[Tried, float]:
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():
             nothing = np.zeros(problem.tolerance.shape[1])
-            return _Tried(centre, predicted, predicted, nothing, np.inf), np.inf
+            return Tried(centre, predicted, predicted, nothing, np.inf), np.inf
         residual = problem.measured - whiten(problem.noise, predicted)
 
         tolerance = problem.tolerance
         slack = cho_solve((problem.root, True), tolerance.T @ residual, check_finite=False)
         left = residual - tolerance @ slack
-        strain = np.sum((self._penalty[: centre.size] * centre) ** 2)
+        strain = np.sum((self.penalty[: centre.size] * centre) ** 2)
         objective = float(left @ left + slack @ slack + strain)
-        return _Tried(centre, predicted, residual, slack, objective), 0.5 * objective
+        return Tried(centre, predicted, residual, slack, objective), 0.5 * objective
 
-    def linearised(self, tried: _Tried) -> Fitted:
+    def linearised(self, tried: Tried) -> Fitted:
         raw = self._derivatives(tried.centre, tried.predicted)
         return self._fitted(tried, raw, whiten(self._problem.noise, raw))
 
-    def moved(self, here: Fitted, tried: _Tried) -> Fitted:
+    def moved(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with the derivatives of a fit that stands next to it."""
         return self._fitted(tried, here.raw, here.own)
 
-    def _fitted(self, tried: _Tried, raw: Array, own: Array) -> Fitted:
+    def _fitted(self, tried: Tried, raw: Array, own: Array) -> Fitted:
         problem, centre = self._problem, tried.centre
         left = tried.residual - problem.tolerance @ tried.slack
-        precision = self._penalty[: centre.size] ** 2
+        precision = self.penalty[: centre.size] ** 2
         gradient = np.asarray(precision * centre - own.T @ left)
 
         shared = problem.tolerance.T @ own
@@ -290,7 +297,7 @@ class _Ground:
             tried.residual,
             own,
             raw,
-            self._penalty,
+            self.penalty,
             tried.slack,
             tried.objective,
             problem.allowance,

@@ -1,0 +1,257 @@
+"""Every fit that decides, against a full bounded optimisation of the same function.
+
+    python -m gritd.tools.dev.fits [CAMPAIGNS …] [--drawn N] [--seed S] [--starts K]
+                                   [--jobs J] [--minutes M] [--out docs/fits.md]
+
+CAMPAIGNS are folders below which every folder with recordings and one configuration is a campaign
+(`gritd prove --keep` leaves such); N more are drawn from our own simulator, each with an effect or
+none. Of each search the bare model and the models within reach of the best one decide. Each is
+given to scipy's trust region reflective least squares (Branch, Coleman and Li 1999, SIAM J. Sci.
+Comput. 21, 1-23) with the same bounds and priors, from where our descent ended and from K points
+about it. A fit is off by what the best of these gains [nats].
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import sys
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.optimize import least_squares
+
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.command import CommandError, Parser
+from gritd.tools.cli.progress import Progress
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Ground, Problem
+from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.rig.adapter import rig_of
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.signals import read_all
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.proof.ours.cases import draw, record, scaled
+
+LIMIT = 0.5  # [nats] what a fit may be off by
+SPREAD = 0.3  # [prior σ, expected sizes] of the points about our optimum
+LARGEST = 1.5  # expected sizes of a drawn effect
+FAR = 1e6  # a residual where the model runs away
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One fit. nats: its objective; gain: what the best full optimisation gains, from where our
+    descent ended and from points about it.
+    """
+
+    case: str
+    names: tuple[str, ...]
+    nats: float
+    converged: bool
+    gain: float
+    gain_elsewhere: float
+
+
+# ---- one fit -----------------------------------------------------------------------------------
+
+
+def deciding(search: Search) -> list[Model]:
+    """The models whose evidence can change a verdict: the bare one and those near the best."""
+    if len(search.models) < 2:
+        return [search.base]
+    best = search.weight(search.best())
+    near = [m for m in search.models[1:] if search.weight(m) > best - TUNING.verdict.tested]
+    return list(dict.fromkeys([search.bare, *near]))
+
+
+def problem_of(search: Search, model: Model) -> Problem:
+    """The recordings, with what the model's fit was allowed."""
+    if model.marginal is None:
+        return search.problem
+    freedoms = model.marginal.freedoms
+    sizes = [f.sizes.values[n] for f, n in zip(freedoms, model.chosen, strict=True)]
+    return search.problem.with_freedoms(freedoms, sizes)
+
+
+def optimised(problem: Problem, model: Model, start: Array) -> float:
+    """The objective [nats] that scipy reaches from constants and effect parameters (q + p,)."""
+    ground = problem.ground(model.fitted.effects, model.fitted.free)
+    low, high = ground.bounds.low, ground.bounds.high
+    inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+    found = least_squares(
+        lambda centre: _residuals(ground, problem, centre),
+        inside,
+        lambda centre: _slopes(ground, problem, centre),
+        bounds=(low, high),
+        xtol=1e-10,
+        ftol=1e-10,
+        gtol=1e-10,
+        max_nfev=60,
+    )
+    return float(found.cost)
+
+
+def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
+    """All whose squares are the objective: values, what is allowed, and strains."""
+    tried, nats = ground.tried(centre)
+    weights = ground.penalty[: centre.size]
+    if not np.isfinite(nats):
+        return np.full(tried.residual.size + tried.slack.size + centre.size, FAR)
+    left = tried.residual - problem.tolerance @ tried.slack
+    return np.concatenate((left, tried.slack, weights * centre))
+
+
+def _slopes(ground: Ground, problem: Problem, centre: Array) -> Array:
+    """Their derivatives; what is allowed follows every move, so it is eliminated exactly."""
+    own = ground.linearised(ground.tried(centre)[0]).own
+    follows = cho_solve((problem.root, True), problem.tolerance.T @ own, check_finite=False)
+    left = own - problem.tolerance @ follows
+    return np.vstack((-left, -follows, np.diag(ground.penalty[: centre.size])))
+
+
+def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -> list[Compared]:
+    """Every fit of a search that decides, from where it ended and from so many points about it."""
+    found = []
+    for model in deciding(search):
+        problem, here = problem_of(search, model), model.fitted.centre
+        ours = problem.ground(model.fitted.effects, model.fitted.free).tried(here)[1]
+        near = optimised(problem, model, here)
+        moved = [here + SPREAD * rng.standard_normal(here.size) for _ in range(starts)]
+        elsewhere = min((optimised(problem, model, m) for m in moved), default=near)
+        row = (case, model.names, ours, model.fitted.converged, ours - near, ours - elsewhere)
+        found.append(Compared(*row))
+    return found
+
+
+# ---- campaigns ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign on disk, or one to be drawn from a seed."""
+
+    folder: Path | None
+    seed: int
+    starts: int
+
+
+def campaigns(roots: Sequence[Path]) -> Iterator[Path]:
+    """Folders that hold recordings and one configuration."""
+    for root in roots:
+        if not root.is_dir():
+            raise CommandError(f"{root}: no such folder")
+        for configuration in sorted(root.rglob("*.yaml")):
+            if any(configuration.parent.glob("*.mcap")):
+                yield configuration.parent
+
+
+def run_case(case: Case) -> list[Compared]:
+    """One campaign; one that cannot be diagnosed compares nothing."""
+    rng = np.random.default_rng(case.seed)
+    name = str(case.folder.parent.name) if case.folder else f"drawn {case.seed}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        try:
+            rig = _recorded(case.folder) if case.folder else _drawn(rng)
+            noise = np.random.default_rng(0)
+            search = search_models(prepare_screening(fit_base(rig, noise), noise))
+            return compared(name, search, case.starts, rng)
+        except CommandError:
+            return []
+
+
+def _recorded(folder: Path) -> Rig:
+    (configuration,) = folder.glob("*.yaml")
+    settings = config.load(configuration).settings
+    return rig_of(read_all(sorted(folder.glob("*.mcap"))), settings)[0]
+
+
+def _drawn(rng: np.random.Generator) -> Rig:
+    """One effect of the library in two cases of three, none in the third."""
+    plan = draw(config.load(packaged()).settings, rng)
+    name = str(rng.choice(sorted(EFFECTS)))
+    acting = [scaled(EFFECTS[name], LARGEST, rng)] if rng.random() < 2.0 / 3.0 else []
+    return WheelRig(record(plan, acting), plan.settings)
+
+
+# ---- the page ----------------------------------------------------------------------------------
+
+
+def page(rows: Sequence[Compared], asked: int, cases: int) -> str:
+    """The result in Markdown."""
+    off = [r for r in rows if max(r.gain, r.gain_elsewhere) > LIMIT]
+    near = [r for r in rows if r.gain > LIMIT]
+    lines = [
+        "# Fits that decide, against a full bounded optimisation",
+        "",
+        "Made by `python -m gritd.tools.dev.fits`; its first lines say how.",
+        "",
+        f"{cases} of {asked} campaigns, {len(rows)} fits that decide:",
+        "",
+        f"- off by more than {LIMIT} nats from where the descent ended: {len(near)};",
+        f"- off by more than {LIMIT} nats from there or from a point about it: {len(off)};",
+        f"- did not converge, and are told so: {sum(not r.converged for r in rows)}.",
+    ]
+    if off:
+        lines += ["", "| campaign | model | converged | gained there | elsewhere |"]
+        lines += ["|---|---|---|--:|--:|"]
+        lines += [
+            f"| {r.case} | {', '.join(r.names) or 'bare'} | {'yes' if r.converged else 'no'}"
+            f" | {r.gain:.2f} | {r.gain_elsewhere:.2f} |"
+            for r in sorted(off, key=lambda r: -max(r.gain, r.gain_elsewhere))
+        ]
+    return "\n".join([*lines, ""])
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command."""
+    arguments = _parser().parse_args(argv)
+    folders = list(campaigns(arguments.campaigns))
+    cases = [Case(folder, arguments.seed, arguments.starts) for folder in folders]
+    cases += [Case(None, arguments.seed + 1 + k, arguments.starts) for k in range(arguments.drawn)]
+    if not cases:
+        raise CommandError("nothing to compare: name campaigns, or --drawn N")
+
+    end, rows, done = time.monotonic() + 60.0 * arguments.minutes, list[Compared](), 0
+    with (
+        multiprocessing.get_context("fork").Pool(arguments.jobs, maxtasksperchild=1) as pool,
+        Progress("campaigns", len(cases)) as progress,
+    ):
+        for found in pool.imap_unordered(run_case, cases):
+            rows, done = [*rows, *found], done + 1
+            progress.advance()
+            if arguments.out:
+                arguments.out.write_text(page(rows, len(cases), done), encoding="utf-8")
+            if time.monotonic() > end:
+                pool.terminate()
+                break
+    print(page(rows, len(cases), done))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="python -m gritd.tools.dev.fits", description=__doc__)
+    parser.add_argument("campaigns", nargs="*", type=Path)
+    parser.add_argument("--drawn", type=int, default=0, help="campaigns of our own simulator")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--starts", type=int, default=1, help="points about each optimum")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--out", type=Path)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

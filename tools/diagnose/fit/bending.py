@@ -8,9 +8,11 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
 own, since another formula shares the effect out among the channels in another way. A ripple may
-also have other harmonics. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own
-form may be the best one to name an effect by, but the soil is never told as if it were exact: where
-the soil can absorb most of an effect, another form of it changes the soil and hardly the fit.
+also have other harmonics. What the parameters of the model's effects can do is taken out of all
+this, so that a strength is what its effect does on the whole. ρ is how far published forms differ;
+its prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
+never told as if it were exact: where the soil can absorb most of an effect, another form of it
+changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.fit.signatures import order_of
-from gritd.tools.diagnose.noise.colour import Noise
+from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -44,6 +46,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
+            columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
             found.append(freedom(effect.name, columns, noise, bending_sizes(), least))
     return tuple(found)
@@ -54,6 +57,13 @@ def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)
     return fitted.predicted - stack.predict(fitted.u, others)
+
+
+def _beside(noise: Noise, columns: Array, fitted: Fitted) -> Array:
+    """Columns (N, m) without what the parameters of a fit's effects can do."""
+    first = len(fitted.u)
+    share = np.linalg.lstsq(fitted.own[:, first:], whiten(noise, columns), rcond=1e-6)[0]
+    return np.asarray(columns - fitted.raw[:, first:] @ share)
 
 
 def _by_channel(stack: Stack, added: Array) -> Array:

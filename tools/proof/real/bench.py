@@ -62,12 +62,20 @@ class Bench:
         self._gritd("import", importer, *paths, "-o", str(self.folder / name), *arguments)
         return self.folder / name
 
-    def diagnosis(self, recordings: Sequence[Path], configuration: Path, name: str) -> DiagnosisRun:
+    def diagnosis(
+        self,
+        recordings: Sequence[Path],
+        configuration: Path,
+        name: str,
+        reference: Sequence[Path] = (),
+    ) -> DiagnosisRun:
         """One diagnosis, in a process that is given these files alone. Raises CommandError."""
         self.step(f"diagnosing {name}")
         result = self.folder / f"{name}.json"
         began = time.monotonic()
         given = [str(p.relative_to(self.folder)) for p in sorted(recordings)]
+        if reference:
+            given += ["--reference", *(str(p.relative_to(self.folder)) for p in sorted(reference))]
         given += ["--config", str(configuration.relative_to(self.folder))]
         outputs = ("--json", result.name, "--apply", f"{name}.yaml")
         printed = self._gritd("diagnose", *given, *outputs, "--jobs", "1")

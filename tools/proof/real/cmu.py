@@ -35,9 +35,8 @@ PLATE, DEPTHS = (
 
 def _run(bench: Bench) -> Finding:
     smooth = bench.imported("cmu", "cmu", *_speeds(DRIVEN), files=TABLES)
-    first = bench.diagnosis(
-        list((smooth / "smooth-table").glob("*.mcap")), smooth / "cmu.yaml", "cmu-smooth"
-    )
+    of_smooth = list((smooth / "smooth-table").glob("*.mcap"))
+    first = bench.diagnosis(of_smooth, smooth / "cmu.yaml", "cmu-smooth")
 
     learnt = bench.folder / "cmu-learnt.yaml"
     learnt.write_text(
@@ -50,7 +49,8 @@ def _run(bench: Bench) -> Finding:
         / "grouser-table"
         for name, speeds in (("cmu-fit", FIT), ("cmu-held", HELD))
     )
-    second = bench.diagnosis(list(fit.glob("*.mcap")), learnt, "cmu-grouser")
+    of_fit = list(fit.glob("*.mcap"))
+    second = bench.diagnosis(of_fit, smooth / "cmu.yaml", "cmu-grouser", of_smooth)
 
     seen, unseen = (
         _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.result) for f in (fit, held)

@@ -153,3 +153,16 @@ def _configured(settings: Settings) -> tuple[Constant, ...]:
                     )
                 )
     return tuple(constants)
+
+
+def preparation(settings: Settings) -> dict[str, float]:
+    """Relative standard deviation of each soil constant from one preparation of a bed to the next:
+    as `bed.repeatability` states it, else the usual one.
+    """
+    stated, soil = settings.bed.repeatability, settings.soil
+    known = {
+        "c": stated.cohesion / max(soil.cohesion.value, 1e-9),
+        "tan_phi": stated.tan_phi / max(soil.tan_phi.value, 1e-9),
+        "k": stated.shear_modulus,
+    }
+    return {name: known.get(name, 0.0) or usual for name, usual in TUNING.rig.prepared.items()}

@@ -23,7 +23,7 @@ from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates
-from gritd.tools.diagnose.rig.constants import UNITS, wheel_constants
+from gritd.tools.diagnose.rig.constants import UNITS, preparation, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
@@ -93,7 +93,7 @@ class WheelRig:
         self._set = np.concatenate(self._sets.label)  # (N,)
         self.baseline = configured(settings.effects)
         stated = all(w.known for w in self._weights)
-        self._prepared = TUNING.rig.prepared if reference and bed == "prepared" else {}
+        self._prepared = preparation(settings) if reference and bed == "prepared" else {}
         self.constants = (
             *wheel_constants(settings, self.channels, self._sets, stated, self.caveats),
             *(

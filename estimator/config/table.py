@@ -236,12 +236,13 @@ RUN = {
     "load": Key(Quantity("N", above=0), "nominal load of the run", ABSENT),
     "pass": Key(Integer(1, 1000), "how often the wheel goes over this track, from 1", "1"),
     "start": Key(Quantity("m"), "starting position of the wheel on the bed", "0 m"),
+    "operator": Key(Text(), "who runs it, for the lab book", "''"),
     "notes": Key(Text(), "anything worth keeping, one line", "''"),
 }
 
 
-def _run(name: str, load: float | None, start: float, notes: str, **values: int) -> RunInfo:
-    return RunInfo(name, load, values["pass"], start, notes)
+def _run(name: str, load: float | None, start: float, **values: Any) -> RunInfo:
+    return RunInfo(name, load, values["pass"], start, values["notes"], operator=values["operator"])
 
 
 def _rates(tick: float, update: float, horizon: float) -> Rates:

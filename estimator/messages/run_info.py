@@ -31,6 +31,7 @@ class RunInfo:
     part: int = 0
     lost_before: int = 0
     bed: str = ""  # whose earlier runs the estimate began with
+    operator: str = ""  # who ran it
 
     def entries(self) -> dict[str, str]:
         return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
@@ -61,6 +62,7 @@ class RunInfo:
             part=number("part", int, 0, 0, MOST),
             lost_before=number("lost_before", int, 0, 0, MOST_LOST),
             bed=entries.get("bed", ""),
+            operator=entries.get("operator", ""),
         )
         return run, wrong
 

@@ -14,6 +14,7 @@ from gritd.interface.runs import Place, Run, configured
 from gritd.tools.commands.diagnose import of_files
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.report import lab
 from gritd.tools.report import reference as references
 
 HEIGHT = 900  # [px] of the report in a notebook
@@ -69,6 +70,7 @@ def diagnose(
     bed: Literal["same", "prepared"] = "prepared",
     seed: int = 0,
     jobs: int = 1,
+    quick: bool = False,
     step: Callable[[str], None] = lambda what: None,
 ) -> Result:
     """Where runs and model differ, and which physics was left out.
@@ -76,15 +78,15 @@ def diagnose(
     runs: recordings or their files. config: the testbed and what is known of the soil.
     reference: recordings of the same rig with nothing new; then what is named is what is new.
     bed: with a reference, "same" or "prepared". seed: of the surrogates. jobs: processes that fit.
+    quick: a first answer, for which only the likeliest effects are fitted, each alone.
     step: is told what begins.
 
     Raises CommandError and ConfigError, one line.
     """
     given = references.given([_file(each) for each in reference], bed)
-    found, damage = of_files(
-        [_file(run) for run in runs], configured(config), seed, step, jobs, "", given
-    )
-    return Result(found, tuple(damage))
+    files, configuration = [_file(run) for run in runs], configured(config)
+    found, damage = of_files(files, configuration, seed, step, jobs, "", given, quick)
+    return Result(lab.with_runs(found, files, configuration), tuple(damage))
 
 
 def _file(run: Run | Place) -> Path:

@@ -39,7 +39,7 @@ class Run(Mapping[str, Table]):
 
     @property
     def info(self) -> RunInfo:
-        """Name, nominal load [N], pass, starting position [m], notes."""
+        """Name, nominal load [N], pass, starting position [m], operator, notes."""
         return self.recording.run
 
     @property

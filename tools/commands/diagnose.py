@@ -35,7 +35,7 @@ from gritd.tools.diagnose.explain.result import (
 )
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, is_drive, read_all
+from gritd.tools.diagnose.rig.signals import distinct, read_all
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -89,24 +89,23 @@ def main(argv: Sequence[str]) -> int:
             reference,
             arguments.quick,
         )
-    if arguments.report is not None:
-        diagnosis = _with_runs(diagnosis, arguments.files, configuration)
-    _write(arguments, diagnosis, configuration)
+    _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
     print(text(diagnosis))
     return DAMAGED if damage else DONE
 
 
-def _with_runs(
-    diagnosis: Diagnosis, paths: Sequence[Path], configuration: config.Configuration
+def _told(
+    arguments: argparse.Namespace,
+    diagnosis: Diagnosis,
+    files: Sequence[Path],
+    configuration: config.Configuration,
 ) -> Diagnosis:
-    """With the table of runs that the report begins with; a drive without soil has none."""
-    recordings = read_all(paths)
-    if is_drive(recordings):
+    """With what the first page of a report tells of the runs, where one is wanted."""
+    if arguments.report is None:
         return diagnosis
-    runs = importlib.import_module("gritd.tools.report.lab").records(
-        recordings, configuration.settings
-    )
-    return replace(diagnosis, redo={**diagnosis.redo, "runs": runs})
+    lab = importlib.import_module("gritd.tools.report.lab")
+    told: Diagnosis = lab.with_runs(diagnosis, files, configuration)
+    return told
 
 
 def _again(arguments: argparse.Namespace) -> int:
@@ -130,7 +129,7 @@ def _again(arguments: argparse.Namespace) -> int:
             then.reference,
             then.quick,
         )
-    _write(arguments, diagnosis, configuration)
+    _write(arguments, _told(arguments, diagnosis, list(then.files), configuration), configuration)
     differs = list(record.differences(then, record.Record.of(diagnosis)))
     print(text(diagnosis))
     for line in record.changed_versions(then):

@@ -81,6 +81,8 @@ def _run(recording: Recording) -> Iterator[str]:
         f"run            {run.name or 'without a name'}, {load}, pass {run.pass_number}, "
         f"start {run.start_position:g} m"
     )
+    if run.operator:
+        yield f"operator       {run.operator}"
     if run.notes:
         yield f"notes          {run.notes}"
     if made := ", ".join(f"{name} {text}" for name, text in recording.versions.items()):

@@ -134,6 +134,7 @@ def _run_info(run: RunInfo, arguments: object) -> RunInfo:
         "nominal_load": getattr(arguments, "load", None),
         "pass_number": getattr(arguments, "passes", None),
         "start_position": getattr(arguments, "start", None),
+        "operator": getattr(arguments, "operator", None),
         "notes": getattr(arguments, "notes", None),
     }
     return replace(run, **{key: value for key, value in given.items() if value is not None})
@@ -168,7 +169,8 @@ def _parser() -> Parser:
     parser.add_argument(
         "--start", type=number(), metavar="M", help="starting position on the bed [m]"
     )
-    parser.add_argument("--notes", help="free text kept with the run")
+    parser.add_argument("--operator", help="who runs it; the report names them")
+    parser.add_argument("--notes", help="free text kept with the run, for the report")
     parser.add_argument(
         "--status",
         type=number(low=0.0),

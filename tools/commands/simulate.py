@@ -88,7 +88,11 @@ def _motion(
 
     info = driven.run if driven else configuration.run
     info = replace(
-        info, pass_number=arguments.pass_number or info.pass_number, name=arguments.output.stem
+        info,
+        pass_number=arguments.pass_number or info.pass_number,
+        name=arguments.output.stem,
+        operator=arguments.operator or info.operator,
+        notes=arguments.notes or info.notes,
     )
 
     if driven:
@@ -171,6 +175,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="which pass over the soil",
     )
+    parser.add_argument("--operator", help="kept with the run; else the configuration's")
+    parser.add_argument("--notes", help="kept with the run; else the configuration's")
     parser.add_argument("--seed", type=whole(0), default=0, help="of the noise; default 0")
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="OUT.mcap", help="must not exist yet"

@@ -14,7 +14,7 @@ import numpy as np
 from gritd.estimator.filter.estimate import KPA, TAN_PHI, C, Estimate
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.wording import honesty, listed, percent
-from gritd.tools.report import figures, lab, plot, redo
+from gritd.tools.report import figures, lab, masthead, plot, redo
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.lab import Beside, LabRun
 from gritd.tools.report.words import counted, held, sentence, uncertain
@@ -52,13 +52,14 @@ def render(campaign: Campaign) -> str:
     return page(
         f"gritd report: {campaign.testbed}",
         _title(campaign),
-        _runs(campaign),
+        masthead.runs(lab.records_of(campaign.runs)),
         _forces(campaign),
         _estimates(campaign),
         _ellipses(campaign),
         _sensors(campaign),
         _notes(campaign),
         section("To redo it", redo.content(campaign.redo), class_="appendix"),
+        redo.appendix(campaign.redo),
     )
 
 
@@ -72,6 +73,7 @@ def _title(campaign: Campaign) -> Markup:
         tag("p", f"gritd report · {campaign.testbed} · {count}", class_="kicker"),
         tag("h1", campaign.testbed),
         tag("p", held(_summary(campaign)), class_="summary"),
+        masthead.masthead(campaign.testbed, lab.records_of(campaign.runs)),
         class_="verdict explained",
     )
 
@@ -111,19 +113,6 @@ def _off(campaign: Campaign, channel: str, which: str) -> float:
     if not found:
         return float("nan")
     return sum(off * count for off, count in found) / sum(count for _, count in found)
-
-
-def _runs(campaign: Campaign) -> Markup:
-    remarks = [
-        tag("li", f"{run.name}: {run.run.recording.run.notes}")
-        for run in campaign.runs
-        if run.run.recording.run.notes
-    ]
-    return section(
-        "Runs",
-        table(lab.HEAD, lab.table_of(campaign.runs)),
-        tag("ul", remarks) if remarks else None,
-    )
 
 
 # --- forces ---

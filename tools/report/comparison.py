@@ -107,7 +107,8 @@ def render(comparison: Comparison) -> str:
         section("Simulation against recording", tag("p", NOTE), _pictures(comparison)),
         _soil(comparison),
         _caveats(comparison),
-        section("To redo it", redo.content(comparison.redo)),
+        section("To redo it", redo.content(comparison.redo), class_="appendix"),
+        redo.appendix(comparison.redo),
     )
 
 

@@ -6,42 +6,25 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from gritd.tools.cli.wording import listed, number, percent, shown, spaced
+from gritd.tools.cli.wording import listed, percent, shown, spaced
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
-    Hypothesis,
     Scatter,
-    SoilFit,
     Trace,
 )
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.report import effect_notes, figures, hypotheses, record, redo, tables
+from gritd.tools.report import effect_notes, figures, front, hypotheses, record, redo, tables
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
-    counted,
-    held,
     name_of,
     nats,
-    probability,
-    quantity,
     sentence,
-    with_unit,
 )
 
-VERDICTS = {  # verdict -> its name, and what it means
-    "consistent": ("Consistent", "Model and recordings agree within the noise."),
-    "explained": ("Explained", "Model and recordings differ, and listed physics explains it."),
-    "unlisted": (
-        "Not in the list",
-        "Model and recordings differ, and no listed effect explains it.",
-    ),
-    "insufficient": ("Not decided", "These recordings cannot tell."),
-}
 NOISE_SIZES = ("sigma", "configured", "configured_sigma")
-RUNS = "runs"  # of what it takes to redo it: the table of runs
 FEW = 3  # runs; of fewer, thirds are held out
 RUNS_HELD = "Every run is predicted by a fit to the other runs: none of its own samples were used."
 THIRDS_HELD = (
@@ -65,9 +48,9 @@ def write(diagnosis: Diagnosis, path: Path) -> None:
 def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
     """The whole document; name: of the file it will be."""
     return page(
-        f"gritd diagnosis: {VERDICTS[diagnosis.verdict][0].lower()}",
-        _verdict(diagnosis),
-        _runs(diagnosis),
+        f"gritd diagnosis: {front.VERDICTS[diagnosis.verdict][0].lower()}",
+        front.verdict(diagnosis),
+        front.runs(diagnosis),
         _simulation(diagnosis),
         _misfit(diagnosis),
         _hypotheses(diagnosis),
@@ -78,130 +61,14 @@ def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
         tables.law(diagnosis),
         _caveats(diagnosis),
         _next(diagnosis),
-        _redo(diagnosis, name),
         effect_notes.notes(hypotheses.named(diagnosis.hypotheses)),
+        _redo(diagnosis, name),
+        redo.appendix(diagnosis.redo),
     )
 
 
 def paragraph(*content: Child) -> Markup:
     return tag("p", *content)
-
-
-# --- verdict ---
-
-
-def _verdict(diagnosis: Diagnosis) -> Markup:
-    name, meaning = VERDICTS[diagnosis.verdict]
-    effects = [_or_alike(h) for h in diagnosis.accepted]
-    title = f"{name}: {listed(effects)}" if diagnosis.verdict == "explained" and effects else name
-
-    runs = {trace.run for trace in diagnosis.traces}
-
-    return tag(
-        "header",
-        tag("p", f"gritd diagnose · {counted(len(runs), 'run')}", class_="kicker"),
-        tag("h1", title, tag("span", meaning)),
-        tag("p", held(tables.named(diagnosis, diagnosis.summary)), class_="summary"),
-        tag("dl", (_figure(*figure) for figure in _figures(diagnosis)), class_="figures"),
-        class_=f"verdict {diagnosis.verdict}",
-    )
-
-
-def _runs(diagnosis: Diagnosis) -> Markup | None:
-    """What was driven, and what was noted of it."""
-    runs = diagnosis.redo.get(RUNS)
-    if not runs:
-        return None
-    head = [name for name in runs[0] if name != "notes"]
-    remarks = [tag("li", f"{run['run']}: {run['notes']}") for run in runs if run.get("notes")]
-    rows = ([run[name] for name in head] for run in runs)
-    return section("Runs", table(head, rows), tag("ul", remarks) if remarks else None)
-
-
-def explanation(diagnosis: Diagnosis) -> str:
-    """What makes the difference between before and after, in words."""
-    if diagnosis.accepted:
-        return (
-            name_of(diagnosis.accepted[0].effect)
-            if len(diagnosis.accepted) == 1
-            else f"these {len(diagnosis.accepted)} effects"
-        )
-    return "the empirical law" if diagnosis.law else "it"
-
-
-def _or_alike(h: Hypothesis) -> str:
-    """An effect's name, and how many others the recordings cannot tell it from."""
-    others = len(h.indistinguishable_from)
-    rivals = (
-        f" or {name_of(h.indistinguishable_from[0])}"
-        if others == 1
-        else f" or one of {others} like it"
-    )
-    return name_of(h.effect) + (rivals if others else "")
-
-
-def _together(diagnosis: Diagnosis, h: Hypothesis) -> float:
-    """Probability that it is this effect or one like it."""
-    group = {h.effect, *h.indistinguishable_from}
-    return min(
-        sum(other.probability for other in diagnosis.hypotheses if other.effect in group), 1.0
-    )
-
-
-def _figure(term: str, value: str, detail: str) -> Markup:
-    return tag(
-        "div",
-        tag("dt", term),
-        tag("dd", held(value)),
-        tag("dd", held(detail), class_="detail") if detail else None,
-    )
-
-
-def _figures(diagnosis: Diagnosis) -> Iterator[tuple[str, str, str]]:
-    """The few numbers a hurried reader takes away: what, how much, beside what."""
-    test = diagnosis.test
-    alarm = f"alarm above {nats(test.threshold)}; p {probability(test.p)}"
-    yield "evidence of a mismatch", nats(test.statistic), alarm
-
-    for h in diagnosis.accepted:
-        parameters = [f"{name_of(name)} {quantity(q)}" for name, q in h.parameters.items()]
-        if h.indistinguishable_from:
-            parameters.append(f"together with its like {percent(_together(diagnosis, h))}")
-        yield name_of(h.effect), f"{percent(h.probability)} probable", "; ".join(parameters)
-
-    channel = _most_improved(diagnosis)
-    if channel:
-        change, floor = _change(diagnosis, channel)
-        yield f"{name_of(channel)} error, held out", change, f"noise {floor}"
-
-    for key in ("c", "tan_phi"):
-        if diagnosis.soil is not None and key in diagnosis.soil.after:
-            yield name_of(key), quantity(diagnosis.soil.after[key]), _without(diagnosis.soil, key)
-
-
-def _without(soil: SoilFit, key: str) -> str:
-    known = f"known before {quantity(soil.prior.get(key))}"
-    return (
-        known if soil.before == soil.after else f"{quantity(soil.before.get(key))} without; {known}"
-    )
-
-
-def _most_improved(diagnosis: Diagnosis) -> str | None:
-    """The channel whose held-out error fell most, as a share."""
-    fit = diagnosis.fit
-    known = [c for c in fit.before if c in fit.after and fit.before[c] > 0.0]
-    return min(known, key=lambda c: fit.after[c] / fit.before[c]) if known else None
-
-
-def _change(diagnosis: Diagnosis, channel: str) -> tuple[str, str]:
-    """Held-out error before and after, and the noise floor, with their unit."""
-    unit = diagnosis.fit.unit.get(channel, "")
-    seen, factor = shown(unit)
-    before, after = (
-        number(side[channel] * factor, 2) for side in (diagnosis.fit.before, diagnosis.fit.after)
-    )
-    change = before if before == after else f"{before} → {after}"
-    return f"{change} {seen}".rstrip(), with_unit(diagnosis.fit.noise_floor.get(channel), unit, 2)
 
 
 # --- pictures ---
@@ -247,12 +114,12 @@ def _error_words(diagnosis: Diagnosis, channel: str) -> str:
     """The channel with its held-out error, where one was computed."""
     if channel not in diagnosis.fit.before or channel not in diagnosis.fit.after:
         return name_of(channel)
-    change, floor = _change(diagnosis, channel)
+    change, floor = front.change(diagnosis, channel)
     return f"{name_of(channel)} with an error of {change} (noise {floor})"
 
 
 def _key(diagnosis: Diagnosis, of: Sequence[Trace]) -> Markup:
-    name = explanation(diagnosis)
+    name = front.explanation(diagnosis)
     series = {"before": f"simulated without {name}", "after": f"simulated with {name}"}
     if not any(figures.differs(trace) for trace in of):
         series = {"before": "simulated"}
@@ -287,7 +154,7 @@ def _scatter(diagnosis: Diagnosis, scatter: Scatter) -> Markup:
     )
 
     runs = list(dict.fromkeys(trace.run for trace in diagnosis.traces))
-    drawn = figures.scatter(scatter, explanation(diagnosis), runs, changes)
+    drawn = figures.scatter(scatter, front.explanation(diagnosis), runs, changes)
     return figures.figure(caption, drawn, legend=key, small=True)
 
 
@@ -324,8 +191,8 @@ def _fitted(diagnosis: Diagnosis) -> dict[str, str]:
     if diagnosis.soil is None or diagnosis.soil.before == diagnosis.soil.after:
         return {"after": "fitted"}
     return {
-        "before": f"fitted without {explanation(diagnosis)}",
-        "after": f"fitted with {explanation(diagnosis)}",
+        "before": f"fitted without {front.explanation(diagnosis)}",
+        "after": f"fitted with {front.explanation(diagnosis)}",
     }
 
 
@@ -376,9 +243,15 @@ def _redo(diagnosis: Diagnosis, name: str) -> Markup:
         (name_of(channel), _noise(diagnosis, channel, values))
         for channel, values in diagnosis.noise.items()
     ]
-    needed = {key: value for key, value in diagnosis.redo.items() if key != RUNS}
+    needed = {k: v for k, v in diagnosis.redo.items() if k not in (front.RUNS, front.RIG)}
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
-    return section("To redo it", _again(diagnosis, name), redo.content(needed), noise_table)
+    return section(
+        "To redo it",
+        _again(diagnosis, name),
+        redo.content(needed),
+        noise_table,
+        class_="appendix",
+    )
 
 
 def _again(diagnosis: Diagnosis, name: str) -> list[Markup] | None:

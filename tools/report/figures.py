@@ -20,6 +20,7 @@ BINS = 12  # of a scatter's running mean
 FEWEST = 4  # values in a bin
 COLUMN = 0.7  # width of a run's column, of the distance between runs
 MOST_LETTERS = 40  # of all names under a picture
+PRINTED = 6  # runs: of more, the folded ones are not printed
 SCATTERED = 1500  # dots a panel
 TURN = 2.0 * np.pi
 
@@ -95,7 +96,13 @@ def traces(of: Sequence[Trace], most: int) -> Markup:
     if not rest:
         return seen
     summary = tag("summary", f"{counted(len(rest), 'more run')}, with smaller errors")
-    return tag("div", seen, tag("details", summary, panels(trace_panel(of[i]) for i in rest)))
+    more = tag("details", summary, panels(trace_panel(of[i]) for i in rest), class_=_printed(of))
+    return tag("div", seen, more)
+
+
+def _printed(of: Sequence[Trace]) -> str | None:
+    """A campaign of many runs is printed with those in view alone."""
+    return "unprinted" if len(of) > PRINTED else None
 
 
 def channels(of: Sequence[Trace]) -> Markup:

@@ -6,6 +6,8 @@ The output is well-formed XML as well as HTML.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html
 import re
 from collections.abc import Iterable
@@ -19,7 +21,9 @@ VOID = frozenset(("meta", "br", "path", "line", "rect", "circle"))
 UNPRINTABLE = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
 )
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+POLICY = (  # of scripts the one in the page alone, by its hash
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{}'"
+)
 
 
 class Markup(str):
@@ -105,19 +109,23 @@ def section(title: str, *content: Child, class_: str | None = None) -> Markup:
 
 
 def page(title: str, *body: Child) -> str:
-    """The whole document, style included."""
-    style = resources.files("gritd.tools.report").joinpath("style.css").read_text(encoding="utf-8")
+    """The whole document, style and script included."""
+    style, script = _packaged("style.css"), _packaged("zoom.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
 
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY.format(digest)),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light dark"),
         tag("title", title),
         tag("style", Markup(style)),
     )
 
-    return (
-        "<!DOCTYPE html>\n" + tag("html", head, tag("body", tag("main", *body)), lang="en") + "\n"
-    )
+    whole = tag("body", tag("main", *body), tag("script", Markup(script)))
+    return "<!DOCTYPE html>\n" + tag("html", head, whole, lang="en") + "\n"
+
+
+def _packaged(name: str) -> str:
+    return resources.files("gritd.tools.report").joinpath(name).read_text(encoding="utf-8")

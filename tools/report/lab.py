@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.measurement import soil as soil_of
@@ -19,7 +21,10 @@ from gritd.estimator.recording.recording import Recording
 from gritd.estimator.terramechanics import linear, original
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.cli.wording import NOTHING, fixed
+from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.rig.signals import is_drive, read_all
 from gritd.tools.recordings.summary import RunSummary, summary
+from gritd.tools.report import front, masthead
 
 NS = 1e-9
 PIECE = 1 << 20  # [bytes] that are hashed at once
@@ -143,7 +148,7 @@ def _closed(
 
 # --- the table of runs ---
 
-HEAD = ("run", "date", "load [N]", "slip [%]", "duration [s]", "SHA-256")
+HEAD = ("run", masthead.DATE, "load [N]", "slip [%]", "duration [s]", "SHA-256")
 
 
 def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
@@ -172,11 +177,30 @@ def _slips(of: Beside | None) -> str:
     return f"{fixed(float(low), 0)} … {fixed(float(high), 0)}"
 
 
-def records(recordings: Sequence[Recording], settings: Settings) -> list[dict[str, str]]:
-    """The same rows, and the notes of each run, by the names of the columns."""
-    given = ((settings_of_run(without_absent(settings, r), r.run), r) for r in recordings)
-    runs = lab_runs(list(bed_runs(given, settings.bed.repeatability)))
+def records_of(runs: Sequence[LabRun]) -> list[dict[str, str]]:
+    """The same rows by the names of the columns, with operator and notes of each run."""
     return [
-        {**dict(zip(HEAD, row, strict=True)), "notes": run.run.recording.run.notes}
+        dict(zip(HEAD, row, strict=True)) | _remarks(run)
         for run, row in zip(runs, table_of(runs), strict=True)
     ]
+
+
+def _remarks(run: LabRun) -> dict[str, str]:
+    info = run.run.recording.run
+    return {masthead.OPERATOR: info.operator, masthead.NOTES: info.notes}
+
+
+def with_runs(
+    diagnosis: Diagnosis, paths: Sequence[Path], configuration: Configuration
+) -> Diagnosis:
+    """With the rig and the table of runs that its report begins with; a drive without soil has
+    none. Raises CommandError for a file that cannot be read.
+    """
+    recordings = read_all(paths)
+    if is_drive(recordings):
+        return diagnosis
+    settings = configuration.settings
+    given = ((settings_of_run(without_absent(settings, r), r.run), r) for r in recordings)
+    runs = lab_runs(list(bed_runs(given, settings.bed.repeatability)))
+    told = {front.RIG: settings.testbed, front.RUNS: records_of(runs)}
+    return replace(diagnosis, redo={**diagnosis.redo, **told})

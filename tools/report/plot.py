@@ -116,8 +116,9 @@ def frame(
     parts = []
     for value, words in zip(heights, tick_labels(heights), strict=True):
         height = float(at.y(value))
-        parts.append(tag("line", class_="grid", x1=at.x.start, x2=at.x.end, y1=height, y2=height))
-        parts.append(text(at.x.start - 6, height + 3.5, words, "end"))
+        ends = {"x1": at.x.start, "x2": at.x.end, "y1": height, "y2": height}
+        parts.append(tag("line", class_="grid tick", **ends))
+        parts.append(text(at.x.start - 6, height + 3.5, words, "end", "tick"))
 
     parts.append(text(at.x.start, at.y.end - 6, label, "start", "label"))
 
@@ -130,10 +131,23 @@ def frame(
         for value, words in zip(
             widths, names if names is not None else tick_labels(widths), strict=True
         ):
-            parts.append(text(float(at.x(value)), at.y.start + 14, words, "middle"))
+            parts.append(text(float(at.x(value)), at.y.start + 14, words, "middle", "tick"))
         parts.append(text(at.x.end, at.y.start + 28, below, "end", "label"))
 
-    return tag("g", parts)
+    zoomed = {} if names is not None else _ranges(at, below, most)
+    return tag("g", parts, **zoomed)
+
+
+def _ranges(at: Axes, below: str | None, most: int) -> dict[str, str | float | None]:
+    """What the page's script needs to draw other ticks: low, high, start and end of both axes."""
+    return {
+        **{
+            f"data_{name}": f"{scale.low:.9g} {scale.high:.9g} {scale.start:g} {scale.end:g}"
+            for name, scale in (("x", at.x), ("y", at.y))
+        },
+        "data_most": f"{most}",
+        "data_below": None if below is None else "1",
+    }
 
 
 def text(

@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from gritd.tools.report.html import Child, Markup, table, tag
+from gritd.tools.report.html import Child, Markup, section, table, tag
 
 NAMES = {"sha256": "SHA-256"}
 
 
 def content(redo: Mapping[str, Any]) -> list[Markup]:
-    """The command line first, long texts last."""
+    """The command line, the files with their checksums, and what is short; long texts are the
+    appendix.
+    """
     command = redo.get("command", "")
     others = {key: _records(key, value) for key, value in redo.items() if key != "command"}
     short = {
@@ -25,8 +27,13 @@ def content(redo: Mapping[str, Any]) -> list[Markup]:
     rows = [(_name(key), tag("span", _words(value), class_="code")) for key, value in short.items()]
     parts = [tag("pre", _command(command), class_="command")] if command else []
     parts += [_files(key, value) for key, value in others.items() if _tabular(value)]
-    parts += [table(("what", "as used"), rows)] if rows else []
-    return parts + [_folded(_name(key), value) for key, value in others.items() if _long(value)]
+    return parts + ([table(("what", "as used"), rows)] if rows else [])
+
+
+def appendix(redo: Mapping[str, Any]) -> Markup | None:
+    """Long texts, folded: the configuration."""
+    folded = [_folded(_name(key), value) for key, value in redo.items() if _long(value)]
+    return section("Appendix", folded, class_="appendix") if folded else None
 
 
 def _records(key: str, value: Any) -> Any:

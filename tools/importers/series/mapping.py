@@ -87,6 +87,8 @@ class SeriesMap:
     width: float | None  # [m]
     torque_constant: Uncertain | None  # [N·m/A]
     load: float | None  # [N] of every run that states no other
+    operator: str = ""  # of every run that states no other
+    notes: str = ""  # the same
 
     def named(self, channel: str) -> str | None:
         """The column of a channel."""
@@ -160,6 +162,7 @@ RUN = {
     "load": Key(Quantity("N", above=0), "weights", ABSENT),
     "pass": Key(Integer(1, 1000), "number of the pass", "1"),
     "start": Key(Quantity("m"), "starting position", "0 m"),
+    "operator": Key(Text(), "who ran it", "''"),
     "notes": Key(Text(), "one line", "''"),
 }
 WHEEL = {
@@ -168,8 +171,9 @@ WHEEL = {
 }
 
 
-def _run(load: float | None, start: float, notes: str, **values: Any) -> RunInfo:
-    return RunInfo("", load, values["pass"], start, notes)
+def _run(load: float | None, start: float, **values: Any) -> RunInfo:
+    told = {name: values[name] for name in ("operator", "notes")}
+    return RunInfo("", load, values["pass"], start, **told)
 
 
 def _channels() -> dict[str, Section]:
@@ -226,6 +230,8 @@ TABLE = Section(
         "wheel": Key(Section(WHEEL, dict), "the wheel, without --config", ABSENT),
         "torque_constant": Key(uncertain("N*m/A", above=0), "of the drive", ABSENT),
         "load": Key(Quantity("N", above=0), "weights of every run", ABSENT),
+        "operator": Key(Text(), "who made the runs", "''"),
+        "notes": Key(Text(), "of every run that has none of its own", "''"),
         "runs": Key(Runs(), "what is known of each run", "{}"),
     },
     _whole,

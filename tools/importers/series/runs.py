@@ -115,6 +115,8 @@ def _info(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
         nominal_load=load,
         start_position=told.start_position if start is None else start,
         pass_number=told.pass_number if number is None else round(number),
+        operator=told.operator or mapped.operator,
+        notes=told.notes or mapped.notes,
     )
 
 

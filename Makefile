@@ -6,7 +6,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow package lint format type docs proof scenarios fuzz soak install uninstall wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios fuzz soak install uninstall wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -27,6 +27,9 @@ demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
 
 test: $(READY) ## the tests, without the slow ones
 	@$(BIN)/python -m pytest --quiet -n 2
+
+tutorial: $(READY) ## the first day and the notebooks of docs/first-day, word for word
+	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs
 
 slow: $(READY) ## the slow tests
 	@$(BIN)/python -m pytest --quiet -m slow

@@ -71,7 +71,7 @@
       from = place(event);
       of = inside(from);
       if (of === undefined) { from = null; return; }
-      plot.setPointerCapture(event.pointerId);
+      if (event.isTrusted) plot.setPointerCapture(event.pointerId);
       box = made("rect", {class: "chosen"}, plot);
       event.preventDefault();
       plot.focus({preventScroll: true});

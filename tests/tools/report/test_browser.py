@@ -8,10 +8,12 @@ import html
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from gritd.config import packaged
 from gritd.tools.report import diagnosis
 from tests.tools.report import cases
 
@@ -31,6 +33,30 @@ MEASURE = """<iframe id="f" style="width:{width}px;height:800px" srcdoc="{page}"
   const loose = wide.filter(x => !x.closest('svg, .panel-title, thead'));
   document.title = root.scrollWidth + ' ' + loose.length;
 }}</script>"""
+
+ZOOM = """<iframe id="f" style="width:1280px;height:900px" srcdoc="{page}"></iframe>
+<script>document.getElementById('f').onload = e => {{
+  const page = e.target.contentDocument, view = e.target.contentWindow;
+  const plot = page.querySelector('svg.zoomable'), frame = plot.querySelector('g[data-x]');
+  const labels = () => [...frame.querySelectorAll('text.tick')].map(x => x.textContent).join(' ');
+  const scale = () => plot.querySelector('svg path').getAttribute('transform') || 'none';
+  const [x0, x1] = frame.dataset.x.split(' ').slice(2).map(Number);
+  const [y0, y1] = frame.dataset.y.split(' ').slice(2).map(Number);
+  const at = (type, x, y) => {{
+    const p = new view.DOMPoint(x, y).matrixTransform(plot.getScreenCTM());
+    const where = {{clientX: p.x, clientY: p.y, button: 0, pointerType: 'mouse', bubbles: true}};
+    plot.dispatchEvent(new view.PointerEvent(type, where));
+  }};
+  const before = labels();
+  at('pointerdown', x0 + 0.25 * (x1 - x0), (y0 + y1) / 2);
+  at('pointermove', x0 + 0.5 * (x1 - x0), (y0 + y1) / 2);
+  at('pointerup', x0 + 0.75 * (x1 - x0), (y0 + y1) / 2);
+  const told = [scale(), before !== labels()];
+  plot.dispatchEvent(new view.Event('dblclick'));
+  told.push(scale(), before === labels(), plot.querySelectorAll('.chosen').length);
+  document.title = told.join('|');
+}}</script>"""
+MOST_PAGES = 6  # of A4, the configuration among them
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")]
 
@@ -54,10 +80,27 @@ def test_nothing_is_wider_than_the_screen(case: str, width: int, tmp_path: Path)
     assert int(title[1]) <= width and title[2] == "0"
 
 
-def test_prints(tmp_path: Path) -> None:
+@pytest.mark.parametrize("case", cases.ALL)
+def test_prints(case: str, tmp_path: Path) -> None:
     page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
-    diagnosis.write(cases.explained(), page)
+    made = cases.ALL[case]()
+    redo = {**made.redo, "configuration": packaged().read_text(encoding="utf-8")}
+    diagnosis.write(replace(made, redo=redo), page)
     browse(tmp_path, page, f"--print-to-pdf={printed}", "--no-pdf-header-footer")
     text = printed.read_bytes()
-    assert text.startswith(b"%PDF") and 4 <= len(re.findall(rb"/Type\s*/Page\b", text)) <= 10
+    assert (
+        text.startswith(b"%PDF") and 2 <= len(re.findall(rb"/Type\s*/Page\b", text)) <= MOST_PAGES
+    )
     assert re.search(rb"/MediaBox\s*\[\s*0 0 59[45][.\d]* 84[12]", text)
+
+
+def test_a_drag_zooms_and_a_double_click_shows_the_whole_again(tmp_path: Path) -> None:
+    outer = tmp_path / "outer.html"
+    page = html.escape(diagnosis.render(cases.explained()))
+    outer.write_text(ZOOM.format(page=page), encoding="utf-8")
+    title = re.search(r"<title>(.*)</title>", browse(tmp_path, outer, "--dump-dom"))
+    assert title is not None
+    zoomed, other, whole, same, left = title[1].split("|")
+    assert re.match(r"matrix\(2(\.0*\d*)? 0 0 1 ", zoomed), zoomed
+    assert re.match(r"matrix\(1 0 0 1 ", whole), whole
+    assert (other, same, left) == ("true", "true", "0")

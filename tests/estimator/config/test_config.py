@@ -132,9 +132,13 @@ def test_effects_are_checked_against_a_schema() -> None:
 
 def test_run_section() -> None:
     read = config.loads(
-        MINIMAL + "run: {name: sand 3, load: 70 N, pass: 2, start: 150 mm}\n", "rig.yaml"
+        MINIMAL
+        + "run: {name: sand 3, load: 70 N, pass: 2, start: 150 mm, operator: Ada, notes: dry}\n",
+        "rig.yaml",
     )
-    assert read.run == RunInfo("sand 3", nominal_load=70.0, pass_number=2, start_position=0.15)
+    assert read.run == RunInfo(
+        "sand 3", 70.0, pass_number=2, start_position=0.15, notes="dry", operator="Ada"
+    )
     assert config.loads(read.text, "b.yaml").run == read.run
     assert config.loads(MINIMAL, "rig.yaml").run == RunInfo()
 

@@ -18,7 +18,7 @@ def recorded(tmp_path: Path) -> Path:
     """Two seconds of a potentiometer at 100 Hz, silent from 0.5 s to 1.2 s."""
     path = tmp_path / "run.mcap"
     text = packaged().read_text(encoding="utf-8")
-    writer = RunWriter(path, (), text, RunInfo("sand", nominal_load=70.0, notes="raked twice"))
+    writer = RunWriter(path, (), text, RunInfo("sand", 70.0, notes="raked twice", operator="Ada"))
     for place in range(200):
         if not 50 < place < 120:
             stamp = 10 * NS + place * NS // 100
@@ -31,6 +31,7 @@ def test_run_rate_gap_and_configuration_are_told(recorded, capsys):
     assert cli.main(["info", str(recorded)]) == 0
     said = capsys.readouterr().out
     assert "sand, load 70 N, pass 1" in said and "raked twice" in said
+    assert "operator       Ada" in said
     assert "single-wheel testbed: wheel r 72 mm, b 71 mm" in said
     (line,) = [line for line in said.splitlines() if line.startswith("/raw/sinkage_pot")]
     assert line.split() == [

@@ -316,11 +316,50 @@ def test_in_a_tie_the_simpler_effect_stands_first_and_every_name_leads_to_its_fo
 
 
 def test_the_runs_stand_before_the_pictures_with_their_notes() -> None:
-    rows = [
-        {"run": name, "load [N]": load, "SHA-256": "0123456789ab", "notes": note}
-        for name, load, note in (("r1", "40", "raked twice"), ("r2", "70", ""))
-    ]
-    found = cases.explained()
-    said = words(diagnosis.render(replace(found, redo={**found.redo, "runs": rows})))
+    said = words(with_runs(("raked twice", ""), ("A. Engineer", "A. Engineer")))
     assert said.index("raked twice") < said.index("Simulation against recording")
     assert said.count("0123456789ab") == 2
+
+
+def with_runs(notes: tuple[str, str], operators: tuple[str, str]) -> str:
+    rows = [
+        {
+            "run": f"r{at}",
+            "date": f"2026-11-2{at} 10:00",
+            "SHA-256": "0123456789ab",
+            "operator": operators[at],
+            "notes": notes[at],
+        }
+        for at in range(2)
+    ]
+    found = cases.explained()
+    told = {"rig": "bench <three>", "runs": rows}
+    return diagnosis.render(replace(found, redo={**found.redo, **told}))
+
+
+@pytest.mark.parametrize(
+    ("notes", "operators", "first", "columns"),
+    [
+        (("dry", "dry"), ("Ada", "Ada"), "operator Ada notes dry", False),
+        (("dry", "wet"), ("Ada", "Bo"), "operator Ada and Bo notes see the runs", True),
+        (("", ""), ("", ""), "operator not stated", False),
+    ],
+)
+def test_rig_date_operator_and_notes_stand_on_the_first_page(
+    notes: tuple[str, str], operators: tuple[str, str], first: str, columns: bool
+) -> None:
+    """What all runs share stands once; what differs stands in the table of runs."""
+    page = with_runs(notes, operators)
+    before, after = (" ".join(part.split()) for part in words(page).split(" Runs ", 1))
+    assert "rig bench <three> date 2026-11-20 … 2026-11-21 (UTC)" in spaced(page)
+    assert first in spaced(page)
+    head = after[: after.index("r0")]
+    assert ("operator" in head and "notes" in head) == columns
+    assert "Explained" in before
+
+
+def spaced(page: str) -> str:
+    """The words of the first page's entries."""
+    root = parsed(page)
+    entries = next(e for e in root.iter("dl") if e.get("class") == "masthead")
+    return " ".join(" ".join(entries.itertext()).split())

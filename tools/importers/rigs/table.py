@@ -11,7 +11,8 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,13 @@ CSV = re.compile(r".*\.csv(?:\.gz)?")
 CONSTANTS = ("source", "wheel_radius_m", "wheel_width_m", "soil_simulant", "soil_shear_modulus_k_m")
 MEASURED = ("vertical_load_n", "slip", "meas_drawbar_pull_n", "meas_sinkage_m")
 TORQUE = "meas_torque_nm"  # a table may lack it
+# channel -> unit, column, and how well a value is read from a printed figure
+MEASURED_ERRORS = {
+    "drawbar-pull": ("N", "meas_drawbar_pull_n", 0.5),
+    "sinkage": ("m", "meas_sinkage_m", 0.25e-3),
+    "torque": ("N·m", TORQUE, 0.1),
+}
+SAME_SLIP = 0.005  # slips that differ by less were meant to be one
 ALIKE = 0.02  # relative difference of loads that were meant to be one
 SOIL = (
     "simulant",
@@ -63,18 +71,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the faster of rim and carriage, default 0.01",
     )
 
-    for name, unit, default in (
-        ("drawbar-pull", "N", 0.5),
-        ("sinkage", "m", 0.25e-3),
-        ("torque", "N·m", 0.1),
-    ):
-        explained = f"standard deviation of a tabulated value [{unit}], default {default:g}"
+    for name, (unit, _, least) in MEASURED_ERRORS.items():
+        explained = (
+            f"standard deviation of a tabulated value [{unit}]; else how repeats differ, "
+            f"at least {least:g}"
+        )
         parser.add_argument(
-            f"--{name}-sigma",
-            type=number(above=0.0),
-            default=default,
-            metavar="SIGMA",
-            help=explained,
+            f"--{name}-sigma", type=number(above=0.0), metavar="SIGMA", help=explained
         )
 
     parser.add_argument(
@@ -128,7 +131,7 @@ def _import(path: Path, soils: list[Path], args: argparse.Namespace, tell: Tell)
     for at, (rows, table) in enumerate(groups, start=1):
         name = stem if len(groups) == 1 else f"{stem}-{at}"
         written += _import_group(path, name, rows, table, soils, args)
-        tell(_told(name, table))
+        tell(_told(name, table, errors(table, args)))
     return written
 
 
@@ -141,13 +144,19 @@ def _groups(table: Table) -> Iterator[tuple[list[int], Table]]:
         yield [at + 2 for at in chosen], rows
 
 
-def _told(name: str, table: Table) -> str:
-    """A group in one line."""
+def _told(name: str, table: Table, sigma: Mapping[str, float]) -> str:
+    """A group, and the errors its values are taken to have, in two lines."""
     loads = np.array([float(text) for text in table["vertical_load_n"]])
     without = "" if TORQUE in table else ", no torque"
+    taken = ", ".join(
+        f"{channel} {value:.2g} {MEASURED_ERRORS[channel][0] if channel in MEASURED_ERRORS else 'N'}"
+        for channel, value in sigma.items()
+        if channel != "torque" or TORQUE in table
+    )
     return (
         f"{name}: {loads.size} steady states, mean load {loads.mean():.1f} N, radius "
-        f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{without}"
+        f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{without}\n"
+        f"{name}: taken as uncertain by {taken}"
     )
 
 
@@ -166,7 +175,7 @@ def _import_group(
     load = float(np.mean([condition.load.value for condition in conditions]))
     notes = f"{len(conditions)} steady states from a table"
     info = RunInfo(name=name, nominal_load=round(load, 2), notes=notes)
-    made = streams(conditions, COUNTING)
+    made = streams(conditions, COUNTING, zlib.crc32(name.encode()))  # no two scatter alike
     recording = write(args.output / f"{name}.mcap", made, configured, info)
     return [args.output / f"{name}.yaml", recording]
 
@@ -176,8 +185,7 @@ def _conditions(
 ) -> list[Condition]:
     columns = [numbers(path, table, name).tolist() for name in MEASURED]
     torques = numbers(path, table, TORQUE).tolist() if TORQUE in table else [None] * len(rows)
-    sigma = args.load_sigma or load_scatter(table["vertical_load_n"])
-    conditions = []
+    sigma, conditions = errors(table, args), []
 
     for row, load, slip, pull, sinkage, torque in zip(rows, *columns, torques, strict=True):
         if not -1.0 <= slip <= 1.0 or load <= 0.0:
@@ -189,14 +197,43 @@ def _conditions(
             Condition(
                 rim_speed=args.speed * min(1.0, 1.0 + slip),
                 carriage_speed=args.speed * min(1.0, 1.0 - slip),
-                sinkage=scatter_of_mean(sinkage, args.sinkage_sigma),
-                load=scatter_of_mean(load, sigma),
-                drawbar_pull=scatter_of_mean(pull, args.drawbar_pull_sigma),
-                current=None if torque is None else scatter_of_mean(torque, args.torque_sigma),
+                sinkage=scatter_of_mean(sinkage, sigma["sinkage"]),
+                load=scatter_of_mean(load, sigma["load"]),
+                drawbar_pull=scatter_of_mean(pull, sigma["drawbar-pull"]),
+                current=None if torque is None else scatter_of_mean(torque, sigma["torque"]),
             )
         )
 
     return conditions
+
+
+def errors(table: Table, args: argparse.Namespace) -> dict[str, float]:
+    """Standard deviation of a tabulated value by channel, SI: as stated; else how repeats of one
+    condition differ, and at least what reading a printed figure leaves open.
+    """
+    stated = vars(args)
+    found = {
+        channel: stated[f"{channel.replace('-', '_')}_sigma"]
+        or max(repeat_scatter(table, column) if column in table else 0.0, least)
+        for channel, (_, column, least) in MEASURED_ERRORS.items()
+    }
+    return found | {"load": args.load_sigma or load_scatter(table["vertical_load_n"])}
+
+
+def repeat_scatter(table: Table, column: str) -> float:
+    """Pooled standard deviation of the values of rows at one load and slip; 0 without repeats."""
+    loads, slips, values = (
+        np.array([float(text) for text in table[name]])
+        for name in ("vertical_load_n", "slip", column)
+    )
+    left, squares, freedom = np.ones(values.size, dtype=bool), 0.0, 0
+    for load, slip in zip(loads, slips, strict=True):
+        one = left & (np.abs(loads - load) <= ALIKE * load) & (np.abs(slips - slip) <= SAME_SLIP)
+        if one.any():
+            squares += float(((values[one] - values[one].mean()) ** 2).sum())
+            freedom += int(one.sum()) - 1
+        left &= ~one
+    return math.sqrt(squares / freedom) if freedom else 0.0
 
 
 def load_scatter(texts: Sequence[str]) -> float:
@@ -221,6 +258,7 @@ def _values(
     soil = _soil(path, soils, constant["soil_simulant"])
     radius = finite_number(path, "wheel_radius_m", constant["wheel_radius_m"])
     shear = finite_number(path, "soil_shear_modulus_k_m", constant["soil_shear_modulus_k_m"])
+    sigma = errors(table, args)
 
     values: dict[str, float] = {
         "radius": radius,
@@ -233,9 +271,9 @@ def _values(
         "exponent_sigma": 0.1 * soil["n"],
         "k_c": soil["k_c_kN_per_m_n_plus_1"],
         "k_phi": soil["k_phi_kN_per_m_n_plus_2"],
-        "sinkage_sigma": args.sinkage_sigma,
-        "torque_sigma": args.torque_sigma,
-        "drawbar_pull_sigma": args.drawbar_pull_sigma,
+        "sinkage_sigma": sigma["sinkage"],
+        "torque_sigma": sigma["torque"],
+        "drawbar_pull_sigma": sigma["drawbar-pull"],
     }
 
     strength, comment = _strength(soil, args.soil_strength)

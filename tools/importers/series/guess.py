@@ -29,6 +29,7 @@ WORDS = {
     "current": {"current", "amps", "ampere", "i"},
     "torque": {"torque", "moment", "ty", "my", "mz", "tz"},
 }
+RATE = re.compile(r"[_ .]([A-Za-zµ°]+)(?:_per_|_p_|_|p)s(?:ec)?$")  # speed_mm_s, omega_rad_per_s
 BY_UNIT = {"N*m": "torque", "A": "current", "rpm": "wheel_speed", "rad/s": "wheel_speed"}
 HEAD = """\
 # A proposal of `gritd import csv --guess`: check every line, then import with --map.
@@ -163,7 +164,14 @@ def _unit(table: SeriesTable, name: str) -> str:
     told = (table.units or {}).get(name, "")
     bracket = re.search(r"[\[(]([^\])]+)[\])]\s*$", name)
     ending = re.search(r"[_ .]([A-Za-zµ°%]+)$", name)
-    for text in (told, bracket[1] if bracket else "", ending[1] if ending else ""):
+    rate = RATE.search(name)
+    options = (
+        told,
+        bracket[1] if bracket else "",
+        f"{rate[1]}/s" if rate else "",
+        ending[1] if ending else "",
+    )
+    for text in options:
         for way in (text, _usual_case(text)):
             try:
                 if way and units.unit(spelled(way)).dimension:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.commands.import_rig import main
-from gritd.tools.importers.rigs.table import load_scatter
+from gritd.tools.importers.rigs.table import load_scatter, repeat_scatter
 from tests.real_recordings import REAL, Physical, needs
 
 
@@ -108,3 +108,30 @@ def test_the_scatter_of_loads(tmp_path: Path) -> None:
     assert load_scatter(["80.0", "80.0"]) == pytest.approx(0.1 / 12**0.5)
     assert load_scatter(["40.1", "39.9", "80.2", "79.8"]) == pytest.approx(0.2236, rel=0.01)
     assert load_scatter(["40", "80", "120"]) == pytest.approx(1 / 12**0.5)
+
+
+def test_repeats_of_a_condition_tell_how_uncertain_a_value_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Pulls of 10, 13 and 16 N at one load and slip: 3 N; without repeats what a figure leaves."""
+    rows = [f"me,0.1,0.1,sand,0.02,40,0.2,{pull},0.01" for pull in (10, 13, 16)]
+    assert repeat_scatter({k: [r.split(",")[i] for r in rows] for i, k in enumerate(HEADER.split(","))},
+                          "meas_drawbar_pull_n") == pytest.approx(3.0)  # fmt: skip
+    (tmp_path / "one.csv").write_text("\n".join([HEADER, *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0
+    assert "drawbar-pull 3 N, sinkage 0.00025 m, load" in capsys.readouterr().out
+    pull = Physical(tmp_path / "out" / "one.mcap").force("fx").reshape(3, -1)
+    assert pull.std(axis=1) / 60**0.5 == pytest.approx(3.0)
+
+
+def test_no_two_recordings_scatter_alike(tmp_path: Path) -> None:
+    """A pattern that several recordings share would count as a signal: ripples of the wheel."""
+    rows = [*rows_of(0.1, "sand"), *rows_of(0.1, "clay")]
+    (tmp_path / "two.csv").write_text("\n".join([HEADER, *rows]))
+    (tmp_path / "soils.csv").write_text(SOILS)
+    main(["table", str(tmp_path), "-o", str(tmp_path / "out")])
+    first, second = (Physical(tmp_path / "out" / f"two-{n}.mcap").force("fx") for n in (1, 2))
+    off = [f.reshape(3, -1) - f.reshape(3, -1).mean(axis=1, keepdims=True) for f in (first, second)]
+    for one, other in zip(*off, strict=True):
+        assert abs(np.corrcoef(one, other)[0, 1]) < 0.5

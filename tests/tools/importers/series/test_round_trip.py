@@ -26,7 +26,7 @@ columns:
   fx: {channel: drawbar_pull, unit: kN}
   fz: {channel: load, unit: N}
   ty: {channel: torque, unit: Nm, noise: 30 mN*m}
-runs: {run.csv: {load: 60 N, pass: 2, start: 10 cm, notes: first}}
+runs: {run.csv: {load: 60 N, pass: 2, start: 10 cm, operator: A. Engineer, notes: first}}
 """
 
 

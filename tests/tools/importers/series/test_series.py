@@ -187,6 +187,8 @@ HEADERS = {
     "wheel_torque_Nm": "torque",
     "trial": "run",
     "humidity": None,
+    "cart_mm_s": "carriage_speed, unit: mm/s",
+    "omega_rad_per_s": "wheel_speed, unit: rad/s",
 }
 
 

@@ -148,8 +148,9 @@ def _told(name: str, table: Table, sigma: Mapping[str, float]) -> str:
     """A group, and the errors its values are taken to have, in two lines."""
     loads = np.array([float(text) for text in table["vertical_load_n"]])
     without = "" if TORQUE in table else ", no torque"
+    units = {channel: unit for channel, (unit, _, _) in MEASURED_ERRORS.items()}
     taken = ", ".join(
-        f"{channel} {value:.2g} {MEASURED_ERRORS[channel][0] if channel in MEASURED_ERRORS else 'N'}"
+        f"{channel} {value:.2g} {units.get(channel, 'N')}"
         for channel, value in sigma.items()
         if channel != "torque" or TORQUE in table
     )

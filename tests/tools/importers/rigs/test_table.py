@@ -115,8 +115,9 @@ def test_repeats_of_a_condition_tell_how_uncertain_a_value_is(
 ) -> None:
     """Pulls of 10, 13 and 16 N at one load and slip: 3 N; without repeats what a figure leaves."""
     rows = [f"me,0.1,0.1,sand,0.02,40,0.2,{pull},0.01" for pull in (10, 13, 16)]
-    assert repeat_scatter({k: [r.split(",")[i] for r in rows] for i, k in enumerate(HEADER.split(","))},
-                          "meas_drawbar_pull_n") == pytest.approx(3.0)  # fmt: skip
+    columns = zip(*(row.split(",") for row in rows), strict=True)
+    table = {name: list(values) for name, values in zip(HEADER.split(","), columns, strict=True)}
+    assert repeat_scatter(table, "meas_drawbar_pull_n") == pytest.approx(3.0)
     (tmp_path / "one.csv").write_text("\n".join([HEADER, *rows]))
     (tmp_path / "soils.csv").write_text(SOILS)
     assert main(["table", str(tmp_path), "-o", str(tmp_path / "out")]) == 0

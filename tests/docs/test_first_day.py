@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import subprocess
 from pathlib import Path
@@ -75,15 +74,9 @@ def test_the_diagnosis_names_a_friction_of_the_drive(day: tuple[Path, dict[str, 
 def test_the_soil_is_the_strangers_once_the_friction_is_known(
     day: tuple[Path, dict[str, str]],
 ) -> None:
-    folder, said = day
-    found = folder / "found.json"
-    last = next(line for line in reversed(said) if line.startswith("gritd estimate"))
-    subprocess.run(
-        ["bash", "-c", f"{last} --json {found}"], cwd=folder, env=environment(), check=True
-    )
-    together = json.loads(found.read_text())["together"]
-    for key, truth in (("c", TRUE_COHESION), ("tan_phi", TRUE_TAN_PHI)):
-        assert abs(together[key]["value"] - truth) < 3.0 * together[key]["sigma"]
+    soil = load(day[0] / "explained.yaml").settings.soil
+    for found, truth in ((soil.cohesion, TRUE_COHESION), (soil.tan_phi, TRUE_TAN_PHI)):
+        assert abs(found.value - truth) < 3.0 * found.sigma
 
 
 @pytest.mark.slow

@@ -27,6 +27,7 @@ from gritd.tools.recordings.summary import RunSummary, summary
 from gritd.tools.report import front, masthead
 
 NS = 1e-9
+UNDATED = 978_307_200_000_000_000  # [ns] 2001: files that do not say when begin before
 PIECE = 1 << 20  # [bytes] that are hashed at once
 
 
@@ -167,7 +168,7 @@ def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
 
 
 def _date(stamp: int) -> str:
-    return time.strftime("%Y-%m-%d %H:%M", time.gmtime(stamp * NS)) if stamp else NOTHING
+    return time.strftime("%Y-%m-%d %H:%M", time.gmtime(stamp * NS)) if stamp > UNDATED else NOTHING
 
 
 def _slips(of: Beside | None) -> str:

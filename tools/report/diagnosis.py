@@ -16,7 +16,16 @@ from gritd.tools.diagnose.explain.result import (
     Trace,
 )
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.report import effect_notes, figures, front, hypotheses, record, redo, tables
+from gritd.tools.report import (
+    effect_notes,
+    figures,
+    front,
+    hypotheses,
+    record,
+    redo,
+    side_by_side,
+    tables,
+)
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.words import (
     name_of,
@@ -52,6 +61,7 @@ def render(diagnosis: Diagnosis, name: str = "report.html") -> str:
         front.verdict(diagnosis),
         front.runs(diagnosis),
         _simulation(diagnosis),
+        side_by_side.campaigns(diagnosis),
         _misfit(diagnosis),
         _hypotheses(diagnosis),
         _soil(diagnosis),

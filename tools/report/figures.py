@@ -136,7 +136,7 @@ def trace_picture(trace: Trace) -> Markup:
     )
 
     top = plot.axes(span, plot.limits(measured[seen], before[seen], after[seen]), *ROWS.signal)
-    noise = 2.0 * _known(trace.sigma) * factor
+    noise = 2.0 * known(trace.sigma) * factor
     low = plot.axes(
         span, plot.limits(*(measured - s for s, _ in simulated), [-noise, noise]), *ROWS.residual
     )
@@ -162,7 +162,8 @@ def trace_picture(trace: Trace) -> Markup:
     )
 
 
-def _known(sigma: float) -> float:
+def known(sigma: float) -> float:
+    """0 where no σ is known."""
     return sigma if np.isfinite(sigma) else 0.0
 
 
@@ -191,10 +192,10 @@ def scatter(
     )
 
     values = {kind: np.asarray(getattr(of, kind), float) * factor for _, kind in sides}
-    sigma = _known(of.sigma) * factor
+    sigma = known(of.sigma) * factor
     y_limits = plot.limits(*values.values(), [-2 * sigma, 2 * sigma], keep=0.0)
 
-    x, name, x_limits, names = _by_run(of, runs) if drawn_against(of) == "run" else _along(of)
+    x, name, x_limits, names = _by_run(of, runs) if drawn_against(of) == "run" else along(of)
     at = plot.axes(x_limits, y_limits, 20.0, 190.0)
 
     drawn = []
@@ -203,7 +204,7 @@ def scatter(
         marks = (
             plot.band(at, -2 * sigma, 2 * sigma),
             plot.frame(at, f"residual [{unit or '–'}]", below=name, names=names),
-            plot.dots(at, *_some(x, values[kind]), f"dots {kind}"),
+            plot.dots(at, *some(x, values[kind]), f"dots {kind}"),
             plot.uprights(at, _marked(of, changes), "change") if changes else None,
             _levels(at, of, values[kind])
             if names
@@ -226,7 +227,7 @@ Along = tuple[
 ]  # values, label, limits, names of 0, 1, 2 …
 
 
-def _along(of: Scatter) -> Along:
+def along(of: Scatter) -> Along:
     """The covariate in the unit shown; angles of the wheel are folded into one turn."""
     covariate, x = drawn_against(of), np.asarray(of.x, float)
     unit, factor = covariate_shown(covariate, of.covariate_unit)
@@ -266,7 +267,8 @@ def _levels(at: plot.Axes, of: Scatter, values: Array) -> list[Markup]:
     ]
 
 
-def _some(x: Array, y: Array) -> tuple[Array, Array]:
+def some(x: Array, y: Array) -> tuple[Array, Array]:
+    """As many dots as a picture can show."""
     step = max(1, -(-len(x) // SCATTERED))
     return x[::step], y[::step]
 
@@ -307,7 +309,7 @@ def soil(of: SoilFit) -> Markup:
 def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Markup:
     """Values with their uncertainty under each other, on one scale."""
     there = [(label, q, kind) for label, q, kind in rows if q is not None and np.isfinite(q.value)]
-    ends = [q.value + s * _known(q.sigma) for _, q, _ in there for s in (-2.0, 2.0)]
+    ends = [q.value + s * known(q.sigma) for _, q, _ in there for s in (-2.0, 2.0)]
     across = plot.Scale(*plot.limits(ends), 88.0, 212.0)
     marks = [
         _interval(across, 14.0 + 24.0 * i, label, q, kind)
@@ -318,7 +320,7 @@ def intervals(name: str, rows: Sequence[tuple[str, Quantity | None, str]]) -> Ma
 
 
 def _interval(across: plot.Scale, y: float, label: str, q: Quantity, kind: str) -> Markup:
-    at = {s: float(across(q.value + s * _known(q.sigma))) for s in (-2, -1, 0, 1, 2)}
+    at = {s: float(across(q.value + s * known(q.sigma))) for s in (-2, -1, 0, 1, 2)}
     return tag(
         "g",
         plot.text(0.0, y + 4.0, label),

@@ -47,6 +47,7 @@ def test_what_is_new_is_named_alone() -> None:
     found = judged((NEW,))
     assert found.verdict == "explained"
     assert [h.effect for h in found.hypotheses if h.accepted] == ["viscous_friction"]
+    assert {place.channel for place in found.location} == {"torque"}
 
 
 def _rng() -> np.random.Generator:

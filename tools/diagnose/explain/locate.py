@@ -62,10 +62,14 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
     what they do.
 
     Fitted for itself, the base model moves soil and calibration until they hide what they can of
-    the misfit, and what is left shows where they cannot follow, not where the misfit was made.
+    the misfit, and what is left shows where they cannot follow, not where the misfit was made. With
+    a reference campaign, what both campaigns do is none of it.
     """
     fit = accepted.fitted
     alone = screening.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
+    own, whitened = accepted.discrepancy()
+    if screening.problem.stack.referred:
+        alone = replace(alone, predicted=alone.predicted + own, residual=alone.residual - whitened)
 
     held = replace(
         alone,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.bending import bending_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
@@ -30,6 +32,22 @@ class Model:
     bends: tuple[float, ...] = ()
     marginal: Marginal | None = None
     chosen: Chosen = ()  # sizes of all freedoms in `marginal`
+
+    def discrepancy(self) -> tuple[Array, Array]:
+        """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
+        allowance, slack = self.fitted.allowance, self.fitted.slack
+        freedoms = self.marginal.freedoms if self.marginal else ()
+        sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
+        first = sum(columns.shape[1] for columns, _, _ in allowance.parts[: allowance.fixed])
+        acting = sum(size > 0.0 for size in sizes)
+        own = np.zeros_like(self.fitted.residual)
+        whitened = np.zeros_like(self.fitted.residual)
+        for columns, white, size in allowance.parts[allowance.fixed :][:acting]:
+            weights = slack[first : first + columns.shape[1]]
+            own = own + size * (columns @ weights)
+            whitened = whitened + size * (white @ weights)
+            first += columns.shape[1]
+        return own, whitened
 
     def constants(self) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of

@@ -115,9 +115,7 @@ def taken_share(search: Search, model: Model) -> float:
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
     shared = np.zeros(fitted.residual.size)
     if search.problem.stack.referred:  # what both campaigns do is no misfit
-        count = fitted.allowance.carried.shape[1]
-        whitened = fitted.allowance.whitened[:, fitted.slack.size - count :]
-        shared = whitened @ fitted.slack[fitted.slack.size - count :]
+        shared = model.discrepancy()[1]
     left = [f.residual - shared for f in (off, fitted)]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, 1e-9), 0.0, 1.0))

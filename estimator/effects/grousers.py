@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, Parameter, shape, strength, told_apart
-from gritd.estimator.stages.situation import ContactLaw, Reaction, Situation
-from gritd.estimator.terramechanics.soil import Scalar, Wheel
+from gritd.estimator.stages.situation import ContactLaw, Reaction, Situation, dug_by_slip
+from gritd.estimator.terramechanics.soil import Wheel
 
 RIPPLE = ("ripple_cos", "ripple_sin", "count")
-HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ class Grousers(Effect):
             drawbar_pull=reaction.drawbar_pull + ripple * situation.torque / situation.radius,
             sinkage=reaction.sinkage
             - ripple * self.height
-            + self.digging * _carried(situation.slip),
+            + self.digging * dug_by_slip(situation.slip),
         )
 
 
@@ -93,11 +92,3 @@ class GrousersInMeans(Grousers):
     @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
         return tuple(p for p in super().parameters() if p.name not in RIPPLE)
-
-
-def _carried(slip: Scalar) -> Scalar:
-    """i/(1 − i): travel of the rim that does not drive, over the travel; a wheel that hardly moves
-    digs in for long.
-    """
-    driving = np.clip(slip, 0.0, HIGHEST_SLIP)
-    return driving / (1.0 - driving)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.situation import Situation
+from gritd.estimator.stages.situation import Reaction, Situation, dug_by_slip
 from gritd.estimator.terramechanics.soil import Soil
 
 
@@ -15,14 +15,20 @@ from gritd.estimator.terramechanics.soil import Soil
 class SlipSinkage(Effect):
     """A slipping wheel digs soil out from under itself and sinks deeper.
 
-    n = n₀ + n₁ |i|, in Eqs. (3) and (4)
+    n = n₀ + n₁ |i|, in Eqs. (3) and (4);   z + d i/(1 − i)
 
+    The first changes the contact. The second is a layer that slip carries away from under the
+    wheel: the rut is deeper, the contact is the same.
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in
-    i.
+    i; i/(1 − i) is attributed to Reece (1965).
     """
 
     growth: float = strength(
         "rise of the exponent with slip, n₁", "", typical=0.2, low=-0.5, high=2.5
+    )
+
+    digging: float = strength(
+        "height of the soil that slip carries away, d", "m", typical=2e-3, low=0.0, high=0.06
     )
 
     stage = "soil"
@@ -31,3 +37,7 @@ class SlipSinkage(Effect):
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         return replace(soil, exponent=soil.exponent + self.growth * np.abs(situation.slip))
+
+    def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
+        dug = self.digging * dug_by_slip(situation.slip)
+        return replace(reaction, sinkage=reaction.sinkage + dug)

@@ -18,6 +18,7 @@ from gritd.estimator.terramechanics.soil import Scalar, Wheel
 
 Recall = tuple[float, ...]  # what one effect remembers
 
+HIGHEST_SLIP = 0.95  # beyond it the wheel digs on without coming to a steady depth
 CREEP = 2e-4  # [m/s] slower than this the wheel neither drives nor brakes: soil forces fade out
 
 
@@ -149,3 +150,11 @@ def signed_slip(rim_speed: Scalar, carriage_speed: Scalar) -> tuple[Scalar, Scal
     direction = np.tanh((rim_speed + carriage_speed) / (2.0 * CREEP))
     fastest = np.maximum(np.maximum(np.abs(rim_speed), np.abs(carriage_speed)), CREEP)
     return np.clip(direction * (rim_speed - carriage_speed) / fastest, -1.0, 1.0), direction
+
+
+def dug_by_slip(slip: Scalar) -> Scalar:
+    """i/(1 − i): travel of the rim that does not drive, over the travel; a wheel that hardly moves
+    digs in for long, and a wheel that skids does not dig.
+    """
+    driving = np.clip(slip, 0.0, HIGHEST_SLIP)
+    return driving / (1.0 - driving)

@@ -90,7 +90,7 @@ class Chain:
         self.effects = in_order(effects)
         self.acting = tuple(e for e in self.effects if not e.filter_only)
         self.wheel: Wheel = reduce(lambda wheel, e: e.geometry(wheel), self.effects, settings.wheel)
-        self.reacts = any(e.stage in ("wheel", "testbed", "any") for e in self.acting)
+        self.reacts = any(_reacts(e) for e in self.acting)
         self._settings = settings
         soil = settings.soil
         self._exponent = soil.exponent.value
@@ -306,3 +306,10 @@ def with_latencies(settings: Settings) -> Settings:
     return replace(
         settings, channels=channels, wrench=wrench, rates=replace(settings.rates, horizon=horizon)
     )
+
+
+def _reacts(effect: Effect) -> bool:
+    """Whether an effect changes forces or sinkage after the balance, whatever its stage."""
+    own = type(effect)
+    late = own.wheel is not Effect.wheel or own.testbed is not Effect.testbed
+    return late or effect.stage in ("wheel", "testbed", "any")

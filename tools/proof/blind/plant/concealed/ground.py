@@ -167,6 +167,9 @@ class ReeceSlipSinkage(Effect):
         dug = self.strength * slip / (1.0 - slip) * scene.moving * (scene.sinkage > 0.0)
         return replace(scene, sinkage=scene.sinkage + dug)
 
+    def coinciding(self) -> dict[str, float]:
+        return {"digging": self.strength}
+
 
 @dataclass(frozen=True)
 class Stretch(Effect, ABC):

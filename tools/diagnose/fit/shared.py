@@ -10,6 +10,7 @@ with one strength,
 linear about the rough fit, reduced to the directions that the recordings can show. A ripple keeps
 its order and its size, but not its phase: each run has its own. It may be faster than the grid: the
 grid's values are means over an interval, which damp it, and what is left is an alias of known size.
+A run of larger forces or torques may ripple more in proportion, as a gear does.
 """
 
 from __future__ import annotations
@@ -22,11 +23,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
-from gritd.tools.diagnose.fit.signatures import (
-    highest_order,
-    order_of,
-    raw_signatures,
-)
+from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -108,20 +105,30 @@ def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
         own = stack.of(channel) & moving
         waves = {n: _waves(stack, own, n, orders) for n in np.unique(stack.run[own])}
         of_reference = [w for n, w in waves.items() if not stack.rig.new[n]]
-        for order, size in _standing(of_reference, residual):
+        usual = _level(stack, [w.index for w in of_reference])
+        for order, amplitude in _standing(of_reference, residual):
             for wave in (w for w in waves.values() if w.shown[order] > 0.0):
+                size = amplitude * max(_level(stack, [wave.index]) / max(usual, 1e-300), 1.0)
                 pair = np.zeros((stack.size, 2))
                 pair[wave.index, 0] = size * wave.wave[:, order].real
                 pair[wave.index, 1] = size * wave.wave[:, order].imag
                 yield pair
 
 
+def _level(stack: Stack, parts: Sequence[Index]) -> float:
+    """Root mean square of what was measured."""
+    values = np.concatenate([np.zeros(0), *(stack.measured[index] for index in parts)])
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
 def _orders(stack: Stack) -> Array:
-    """Ripples a turn that are tried (o,); none where the wheel hardly turns."""
-    if highest_order(stack) == 0.0:
-        return np.zeros(0)
+    """Ripples a turn that are tried (o,); none where the wheel hardly turns. A run must hold a few
+    of them.
+    """
     fit = TUNING.fit
-    return np.arange(fit.lowest_ripple, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
+    turns = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs) / (2.0 * np.pi)
+    lowest = max(fit.lowest_ripple, TUNING.noise.cycles / max(turns, 1e-9))
+    return np.arange(lowest, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
 
 
 def _waves(stack: Stack, own: Bools, number: int, orders: Array) -> _Waves:

@@ -23,7 +23,7 @@ class WeightSets:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(f"weights_{load:.3g}" for load in self.loads)
+        return tuple(f"weights_{load:.4g}" for load in self.loads)
 
 
 def weight_sets(loads: Sequence[Array]) -> WeightSets:

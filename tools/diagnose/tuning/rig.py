@@ -110,7 +110,9 @@ class Rig:
     held_values: int = tuned(
         10, "values", "at exactly one load make a set of weights; in between they are changed"
     )
-    same_weights: float = tuned(0.02, "-", "relative distance from which weights are others")
+    same_weights: float = tuned(
+        0.002, "-", "relative distance from which stated weights are another stack", "rounding"
+    )
     most_sets: int = tuned(60, "sets", "at most", "run time")
 
     # --- weights.py ---

@@ -25,15 +25,15 @@ def test_the_reduced_columns_have_the_same_covariance() -> None:
     np.testing.assert_allclose(raw, 3.0 * whitened, atol=1e-8)
 
 
-def _columns(acting: tuple[Any, ...], seed: int) -> tuple[Stack, Any]:
+def _columns(acting: tuple[Any, ...], seed: int, seconds: float = 60.0) -> tuple[Stack, Any]:
     """Ripples of two campaigns of which nothing is new, about a prediction without ripples."""
     before, after = (
-        record(plan(seed=s, seconds=60.0, standstill=False), acting) for s in (seed, seed + 1)
+        record(plan(seed=s, seconds=seconds, standstill=False), acting) for s in (seed, seed + 1)
     )
     stack = Stack(WheelRig([*before, *after], settings(), len(before), "same"))
     smooth = Stack(
         WheelRig(
-            [*record(plan(seed=seed, seconds=60.0, standstill=False), ())] * 2,
+            [*record(plan(seed=seed, seconds=seconds, standstill=False), ())] * 2,
             settings(),
             3,
             "same",
@@ -60,6 +60,14 @@ def test_a_ripple_faster_than_the_grid_keeps_its_size() -> None:
     torque = stack.of("torque")
     assert columns.shape[1]
     assert 0.0 < np.abs(columns[torque]).max() < 0.6
+
+
+def test_less_than_a_turn_shows_a_fast_ripple() -> None:
+    """A quarter of a turn holds ten of 40 ripples a turn."""
+    ripple = make("gear_ripple", {"ripple_cos": 0.3, "ripple_sin": 0.0, "order": 40.0})
+    stack, columns = _columns((ripple,), 5, seconds=14.0)
+    assert max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs) < 2.0 * np.pi
+    assert np.any(columns[stack.of("torque")])
 
 
 def test_noise_does_not_ripple() -> None:

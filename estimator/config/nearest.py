@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+BEGINNING = 4  # letters of a name that are enough to propose it
 ALIKE = 0.7  # share of equal letters from which a word is likely to be meant
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """' (did you mean NAME?)' with the known name that is most like a word; '' for none."""
-    close = get_close_matches(word[:60].lower(), list(known), n=1, cutoff=ALIKE)
+    names, begun = list(known), word[:60].lower()
+    close = get_close_matches(begun, names, n=1, cutoff=ALIKE)
+    if not close and len(begun) >= BEGINNING:
+        close = [name for name in names if name.startswith(begun)][:1]
     return f" (did you mean {close[0]}?)" if close else ""

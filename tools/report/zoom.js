@@ -29,7 +29,8 @@
     const step = [1, 2, 5, 10].map(s => s * power).find(s => s >= raw * (1 - 1e-9));
     const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
     for (let i = Math.ceil(low / step - 1e-9); high / step + 1e-9 >= i; i++) found.push(i * step);
-    return found.slice(0, most).map(v => [v, v.toFixed(places).replace("-", "\u2212")]);
+    const words = v => Math.abs(v) > 1e-9 * step ? v.toFixed(places).replace("-", "\u2212") : "0";
+    return found.slice(0, most).map(v => [v, words(v)]);
   };
 
   const drawn = axes => {

@@ -38,7 +38,7 @@ ZOOM = """<iframe id="f" style="width:1280px;height:900px" srcdoc="{page}"></ifr
 <script>document.getElementById('f').onload = e => {{
   const page = e.target.contentDocument, view = e.target.contentWindow;
   const plot = page.querySelector('svg.zoomable'), frame = plot.querySelector('g[data-x]');
-  const labels = () => [...frame.querySelectorAll('text.tick')].map(x => x.textContent).join(' ');
+  const labels = () => [...plot.querySelectorAll('text.tick')].map(x => x.textContent).join(' ');
   const scale = () => plot.querySelector('svg path').getAttribute('transform') || 'none';
   const [x0, x1] = frame.dataset.x.split(' ').slice(2).map(Number);
   const [y0, y1] = frame.dataset.y.split(' ').slice(2).map(Number);
@@ -101,6 +101,7 @@ def test_a_drag_zooms_and_a_double_click_shows_the_whole_again(tmp_path: Path) -
     title = re.search(r"<title>(.*)</title>", browse(tmp_path, outer, "--dump-dom"))
     assert title is not None
     zoomed, other, whole, same, left = title[1].split("|")
-    assert re.match(r"matrix\(2(\.0*\d*)? 0 0 1 ", zoomed), zoomed
-    assert re.match(r"matrix\(1 0 0 1 ", whole), whole
+    for transform, scale in ((zoomed, 2.0), (whole, 1.0)):
+        across, *_, down, _, _ = map(float, transform.removeprefix("matrix(").rstrip(")").split())
+        assert (across, down) == pytest.approx((scale, 1.0))
     assert (other, same, left) == ("true", "true", "0")

@@ -14,7 +14,7 @@ import gritd
 LOADS = (40.0, 55.0, 70.0, 85.0, 100.0, 115.0)  # [N], one a run
 SLIPS = (0.1, 0.25, 0.4, 0.6)
 SOIL = {"cohesion": 1200.0, "tan_phi": 0.55}  # [Pa], [-]
-FRICTION = {"coulomb_friction": {"loss": 0.3}}  # [N·m]
+FRICTION = {"coulomb_friction": {"loss": 0.05}}  # [N·m]
 EVERY = 5  # of 250 rows a second one in five is written
 HEAD = "t_ms,wheel_rpm,cart_mm_s,depth_mm,motor_A,Fx_N,Fz_N"
 

@@ -26,6 +26,7 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
+from gritd.estimator.wheel.windows import DITHER, ENOUGH
 
 ANALOGUE = ("sinkage_pot", "motor_shunt")
 NEVER = -(1 << 62)  # [ns]
@@ -147,7 +148,7 @@ class Series:
     value: Array  # (m,)
     sigma: Array  # (m,)
     known: Bools  # (m,)
-    still: Ints  # (m,) for how long the raw value has not changed at all [ns]
+    still: Ints  # (m,) for how long the raw value has not changed, but for a dither [ns]
 
 
 @dataclass(frozen=True)
@@ -176,8 +177,21 @@ class Accepted(NamedTuple):
     def still(self, ends: Ints) -> Ints:
         """How long the value had not changed at the end of each window [ns], 0 in an empty one."""
         changed = np.append(True, self.values[1:] != self.values[:-1])
+        return self._since(changed, self.members.size > 0, ends)
+
+    def nearly_still(self, ends: Ints, near: Array) -> Ints:
+        """The same but for a dither between two values no further apart than near (n,); 0 in a
+        window that holds a third. See wheel.windows.MeanWindow.
+        """
+        changed, last = [], np.inf
+        for value, distance in zip(self.values.tolist(), near.tolist(), strict=True):
+            changed.append(abs(value - last) > distance)
+            last = value if changed[-1] else last
+        return self._since(np.array(changed), self.members.hold_two(self.values), ends)
+
+    def _since(self, changed: Bools, known: Bools, ends: Ints) -> Ints:
         since = np.maximum.accumulate(np.where(changed, self.stamp, 0))
-        return np.where(self.members.size > 0, ends - since[self.members.last], 0)
+        return np.where(known, ends - since[self.members.last], 0)
 
 
 class View:
@@ -250,8 +264,17 @@ class View:
             np.where(size > 0, mean * scale + calibration.offset.value, np.nan),
             np.where(size > 0, noise / np.sqrt(np.maximum(size, 1)) * abs(scale), 0.0),
             size > 0,
-            accepted.still(self.ends),
+            accepted.nearly_still(self.ends, self._near(accepted.stamp, noise)),
         )
+
+    def _near(self, stamp: Ints, noise: float) -> Array:
+        """How far each reading (n,) may be from another one of a sensor that stands still."""
+        inside = np.arange(len(stamp)) - np.searchsorted(stamp, self._opened(stamp), "right")
+        return np.where(inside >= ENOUGH, DITHER * noise, 0.0)
+
+    def _opened(self, stamp: Ints) -> Ints:
+        """The beginning of the window (n,) into which each reading comes [ns]."""
+        return np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp)]
 
     def slope(self, name: str, arm: float) -> Motion:
         """Position and speed of an encoder; arm is the pulley radius, or 1 for an angle."""
@@ -263,7 +286,7 @@ class View:
         if accepted is None:
             return self.nothing
 
-        accepted = accepted._replace(values=self._rebaselined(accepted, channel.max_rate))
+        accepted = self._rebaselined(accepted, channel.max_rate)
         stamp, counts, members = accepted
         line = lines(members, stamp, counts)
         span = stamp[members.last] - stamp[members.first]
@@ -295,27 +318,36 @@ class View:
             return None
         return Accepted(stamp, values, members(stamp, self.ends - self.length, self.ends))
 
-    def _rebaselined(self, accepted: Accepted, max_rate: float) -> Ints:
-        """Counts with every jump taken out; see wheel.windows.SlopeWindow."""
+    def _rebaselined(self, accepted: Accepted, max_rate: float) -> Accepted:
+        """With every jump taken out, and windows cut at a second one; see
+        wheel.windows.SlopeWindow.
+        """
         stamp, counts, _ = accepted
         step, elapsed = np.diff(counts), np.diff(stamp)
-        opened = np.append(-1, self._closed - self.length)[np.searchsorted(self._closed, stamp[1:])]
+        opened = self._opened(stamp)
         fast = np.abs(step) * float(NS) > max_rate * elapsed + 2.0 * NS
 
         # a reading that enters an empty window has nothing to jump from
-        fresh = np.searchsorted(self._closed, stamp[:-1]) < np.searchsorted(self._closed, stamp[1:])
-        jumps = np.flatnonzero(fast & ~(fresh & (stamp[:-1] <= opened))) + 1
+        closing = np.searchsorted(self._closed, stamp)
+        fresh = (closing[:-1] < closing[1:]) & (stamp[:-1] <= opened[1:])
+        jumps = np.flatnonzero(fast & ~fresh) + 1
 
         shifted, shift, done = counts.copy(), 0, 0
+        last, cut, cuts = 0, 0, np.zeros(len(stamp), np.int64)
         for i in jumps.tolist():
             shifted[done:i] += shift
-            start = int(np.searchsorted(stamp, opened[i - 1], "right"))
+            start = max(int(np.searchsorted(stamp, opened[i], "right")), cut)
             expected = _expected_step(
                 stamp[start:i], shifted[start:i], int(elapsed[i - 1]), self.length // 2
             )
             shift, done = shift + expected - int(step[i - 1]), i
+            cut = i if start < last else cut  # the last jump is still in the window
+            cuts[i], last = cut, i
         shifted[done:] += shift
-        return shifted
+
+        after = np.append(-1, stamp)[np.maximum.accumulate(cuts)][accepted.members.last]
+        windows = members(stamp, np.maximum(self.ends - self.length, after), self.ends)
+        return Accepted(stamp, shifted, windows)
 
     def stale(self) -> Ints:
         """CHANNEL_BITS (m,) of channels last heard of longer ago than they may be, or never."""

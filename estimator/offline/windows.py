@@ -51,6 +51,15 @@ class Members(NamedTuple):
         mean: Array = self.sum(values[self.reading]) / np.maximum(self.size, 1)
         return mean
 
+    def hold_two(self, values: NDArray[Any]) -> Bools:
+        """Whether each window (m,) holds one or two different values of the readings' (n,)."""
+        inside = values[self.reading]
+        least, most = np.full(len(self.size), np.inf), np.full(len(self.size), -np.inf)
+        np.minimum.at(least, self.window, inside)
+        np.maximum.at(most, self.window, inside)
+        between = (inside > least[self.window]) & (inside < most[self.window])
+        return (self.size > 0) & (self.sum(between.astype(float)) == 0.0)
+
 
 def members(stamp: Ints, after: Ints, until: Ints) -> Members:
     """The readings of each window: after < stamp ≤ until.

@@ -233,17 +233,17 @@ class Sync:
         An encoder is stuck when the other encoder moves and it does not change; a wheel that really
         stands still while the carriage moves is dragged, which no update survives either. A
         potentiometer, shunt or wrench is stuck when the wheel turns and not one digit of noise
-        shows, of the wrench on any axis.
+        shows, or the last digit alone, to and fro; of the wrench on any axis.
         """
         turning, travelling = _moves(wheel), _moves(carriage)
         bits = 0
-        if travelling and self._slopes["wheel_encoder"].still_for() >= STUCK_AFTER:
+        if travelling and self._slopes["wheel_encoder"].frozen(STUCK_AFTER):
             bits |= CHANNEL_BITS["wheel_encoder"]
 
         if turning or travelling:
             for name in ("sinkage_pot", "motor_shunt"):
                 window = self._means[name]
-                if window.noise > 0.0 and window.still_for() >= STUCK_AFTER:
+                if window.noise > 0.0 and window.frozen(STUCK_AFTER):
                     bits |= CHANNEL_BITS[name]
             if self._wrench and self._wrench_frozen():
                 bits |= CHANNEL_BITS["wrench"]
@@ -253,7 +253,7 @@ class Sync:
     def _wrench_frozen(self) -> bool:
         heard = [window for window in self._wrench.values() if window.inside]
         return bool(heard) and all(
-            window.noise > 0.0 and window.still_for() >= STUCK_AFTER for window in heard
+            window.noise > 0.0 and window.frozen(STUCK_AFTER) for window in heard
         )
 
 

@@ -15,6 +15,9 @@ from typing import NamedTuple
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.wheel.geometry import slope_sigma
 
+DITHER = 0.75  # [σ of one reading] between the two values of a sensor that stands still
+ENOUGH = 8  # readings in a window without which a dither is not told from noise
+
 
 class Sample(NamedTuple):
     """A reading inside a channel's window: latency-corrected stamp [ns] and value."""
@@ -59,7 +62,7 @@ class Window:
     pending: list[Sample] = field(default_factory=list)  # newer than the horizon, sorted
     inside: deque[Sample] = field(default_factory=deque)  # within the window, sorted
     closed: int = -1  # end of the last window [ns]; nothing older is accepted
-    still_since: int = -1  # stamp since which the value has not changed [ns]
+    still_since: int = -1  # stamp since which the value has not left `last` [ns]
     last: float = inf
 
     def insert(self, stamp: int, value: float, counters: Counters) -> None:
@@ -96,20 +99,35 @@ class Window:
             self._leave(inside.popleft())
 
     def _enter(self, sample: Sample) -> None:
-        if sample.value != self.last:
+        if self._leaves_last(sample.value):
             self.last, self.still_since = sample.value, sample.stamp
         self.inside.append(sample)
+
+    def _leaves_last(self, value: float) -> bool:
+        """Whether a value shows that the sensor lives."""
+        return value != self.last
 
     def _leave(self, sample: Sample) -> None:
         """A reading has left the window."""
 
-    def still_for(self) -> int:
-        """How long the value has not changed at all [ns]."""
-        return self.closed - self.still_since if self.inside else 0
+    def frozen(self, span: int) -> bool:
+        """Whether the value has not changed for so long [ns]."""
+        return bool(self.inside) and self.closed - self.still_since >= span
 
 
 class MeanWindow(Window):
-    """Mean of an analogue channel over the window."""
+    """Mean of an analogue channel over the window.
+
+    A sensor that stands still may dither between two values of its converter. It is told from a
+    live one by their distance, less than its noise, and by there being no third.
+    """
+
+    def _leaves_last(self, value: float) -> bool:
+        near = DITHER * self.noise if len(self.inside) >= ENOUGH else 0.0
+        return abs(value - self.last) > near
+
+    def frozen(self, span: int) -> bool:
+        return super().frozen(span) and len({sample.value for sample in self.inside}) <= 2
 
     def mean(self) -> Mean | None:
         inside = self.inside
@@ -124,13 +142,15 @@ class SlopeWindow(Window):
     """Mean and least-squares slope of an encoder count over the window, by exact integer sums.
 
     max_rate: fastest believable change [raw/s]. A faster one is a jump of the counter: it is taken
-    out by a shift of the baseline, so neither position nor speed shows it.
+    out by a shift of the baseline, so neither position nor speed shows it. That bridges one jump:
+    with a second one in the same window, nothing is known of the speed, and the window begins anew.
     """
 
     max_rate: float = inf
     counters: Counters = field(default_factory=Counters)
     shift: int = 0  # counts added since the first jump
-    # stamp and count the sums are taken about: keeps the integers short
+    # stamp and count the sums are taken about, which keeps the integers short. The stamp is that of
+    # the last jump, or of the reading that came into an empty window.
     origin: tuple[int, int] = (0, 0)
     sums: tuple[int, int, int, int] = (0, 0, 0, 0)  # Σt, Σx, Σt², Σtx
 
@@ -144,12 +164,29 @@ class SlopeWindow(Window):
                 self.shift -= lost
                 value -= lost
                 self.counters.jumps += 1
-        else:
+                self._jumped(sample.stamp)
+        if not self.inside:
             self.origin = (sample.stamp, value)
             self.sums = (0, 0, 0, 0)
 
         super()._enter(Sample(sample.stamp, value))
         self._add(sample.stamp, value, 1)
+
+    def _jumped(self, stamp: int) -> None:
+        """The reading of this stamp [ns] has jumped: remember where, or begin anew."""
+        if self.inside[0].stamp < self.origin[0]:  # the last jump is still in the window
+            self.inside.clear()
+            return
+
+        count, later = len(self.inside), stamp - self.origin[0]
+        st, sx, stt, stx = self.sums
+        self.origin = (stamp, self.origin[1])
+        self.sums = (
+            st - count * later,
+            sx,
+            stt - later * (2 * st - count * later),
+            stx - later * sx,
+        )
 
     def _expected_step(self, elapsed: int) -> int:
         """Counts the window's own slope predicts for a time [ns]."""

@@ -50,7 +50,7 @@ SCHEDULE = [(1.0, 70.0, 0.2), (1.0, 70.0, 0.4), (1.0, 100.0, 0.4), (1.0, 100.0, 
 
 def rough(rng, seconds=1.2):
     """Readings on a bad day: jitter, gaps, repeats, late ones, counter jumps, impossible values, a
-    frozen channel.
+    channel that is frozen or dithers, a counter that says anything for a while.
     """
     steady = readings_of(START, seconds=seconds, noise=True, seed=int(rng.integers(1 << 30)))
     steady += [
@@ -73,6 +73,9 @@ def rough(rng, seconds=1.2):
         int(rng.integers(0, seconds * NS)): int(rng.integers(-(2**40), 2**40)) for _ in range(3)
     }
     freeze = int(rng.integers(0, seconds * NS))
+    dither = float(rng.choice([0.0, 0.5e-3, 1.4e-3, 1.6e-3]))  # [V]; the noise is 2 mV
+    wild = int(rng.integers(0, 2 * seconds * NS))  # in one run of two a counter is
+    lasting = int(rng.integers(0, 300 * MS))
     absent = rng.random(6) < 0.1  # axes that the sensor does not have
     ices = int(rng.integers(0, 2 * seconds * NS))  # in one run of two the wrench does
     held = tuple(np.where(absent, np.nan, 20.0).tolist())
@@ -85,6 +88,8 @@ def rough(rng, seconds=1.2):
             reading = reading._replace(
                 value=reading.value + sum(j for at, j in jumps.items() if since > at)
             )
+            if 0 < since - wild < lasting:
+                reading = reading._replace(value=int(rng.integers(0, 2**16)))
         elif rng.random() < 0.01:
             bad = float(rng.choice([np.nan, np.inf, -1e9]))
             reading = reading._replace(value=(bad,) * 6 if reading.channel == "wrench" else bad)
@@ -96,7 +101,7 @@ def rough(rng, seconds=1.2):
                 value=tuple(float("nan") if none else value for value, none in axes)
             )
         elif reading.channel == "sinkage_pot" and since > freeze:
-            reading = reading._replace(value=1.25)
+            reading = reading._replace(value=1.25 + dither * int(rng.integers(2)))
         stamp = reading.stamp + int(rng.integers(-MS, MS))
         delay = (
             int(rng.exponential(2 * MS)) if rng.random() < 0.95 else int(rng.integers(0, 90 * MS))

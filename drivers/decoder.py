@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from gritd.drivers.device_clock import DeviceClock
 from gritd.drivers.framing import Frame, Framing
 from gritd.drivers.sensor import Sensor
-from gritd.estimator.messages.readings import Reading
+from gritd.estimator.messages.readings import NS, Reading
 
 
 class Decoder:
@@ -25,6 +25,7 @@ class Decoder:
         }
         self._clocks = {key: DeviceClock(framing.clock_modulus(key)) for key in self._listeners}
         self._last: dict[str, tuple[int, int | None]] = {}
+        self._taken: dict[str, int] = {}  # when the newest frame of a key was taken [ns]
 
     @property
     def mistimed(self) -> int:
@@ -49,7 +50,9 @@ class Decoder:
         for frame, stamp in zip(frames, stamps, strict=True):
             if stamp is None:  # nobody knows when it was taken
                 continue
+            elapsed = self._elapsed(frame.key, stamp)
             for sensor in self._listeners[frame.key]:
+                sensor.elapsed(elapsed)
                 value = sensor.value(frame)
                 if value is not None:
                     readings.append(Reading(stamp, sensor.channel, value, received))
@@ -59,10 +62,17 @@ class Decoder:
         """The device was reopened: nothing it said before connects with what it says next."""
         self.framing.reset()
         self._last.clear()
+        self._taken.clear()
         for clock in self._clocks.values():
             clock.restart()
         for sensor in self.sensors:
             sensor.reset()
+
+    def _elapsed(self, key: str, stamp: int) -> float:
+        """How long after the one before it a frame was taken [s]; 0 for the first."""
+        before = self._taken.get(key, stamp)
+        self._taken[key] = max(before, stamp)
+        return max(stamp - before, 0) / NS
 
     def _is_wanted(self, frame: Frame) -> bool:
         if frame.key not in self._listeners:

@@ -39,6 +39,7 @@ class ReaderStats:
     mistimed: int  # frames whose device time cannot be right
     clock_steps: int  # times the device's clock jumped
     clock_step: float  # how far, the last time [s]
+    turns_unknown: int  # silences of an encoder in which its counter may have wrapped
     readings: int
     reopened: int  # times the device was opened again
 
@@ -112,6 +113,7 @@ class Reader:
             mistimed=self.decoder.mistimed,
             clock_steps=steps,
             clock_step=step,
+            turns_unknown=sum(sensor.turns_unknown for sensor in sensors),
             readings=self._readings,
             reopened=max(self._opened - 1, 0),
         )

@@ -40,10 +40,14 @@ class Sensor(ABC):
         self.keys: tuple[str, ...] = (signal,)  # the frames it wants
         self.quarantined = 0  # values refused as impossible
         self.incomplete = 0  # values of which a part never came
+        self.turns_unknown = 0  # silences in which its counter may have wrapped
 
     @abstractmethod
     def value(self, frame: Frame) -> Value | None:
         """The value of a frame whose key is in `keys`; None if refused, or not yet complete."""
+
+    def elapsed(self, seconds: float) -> None:  # noqa: B027 - most sensors have no counter
+        """The next frame was taken so long after the one before it [s]."""
 
     def reset(self) -> None:  # noqa: B027 - most sensors remember nothing
         """The device was reopened or started anew: forget what depended on its last frames."""
@@ -61,12 +65,14 @@ class Encoder(Sensor):
     integer.
 
     The first count is taken as read. After a reset of the device the total goes on from where it
-    was.
+    was. After a silence in which the counter may have gone half round, nobody knows how far it
+    went: the total goes on to the nearest count that the counter shows, and that is counted.
     """
 
     def __init__(self, settings: Channel) -> None:
         super().__init__(settings.signal)
         self.bits = settings.bits
+        self._half = (1 << (settings.bits - 1)) / settings.max_rate  # [s] it takes to go half round
         self._total: int | None = None
         self._last: int | None = None
 
@@ -85,6 +91,9 @@ class Encoder(Sensor):
     def _fits(self, count: int) -> bool:
         """Whether a counter of this width, signed or not, can show this count."""
         return -(1 << (self.bits - 1)) <= count < 1 << self.bits
+
+    def elapsed(self, seconds: float) -> None:
+        self.turns_unknown += self._last is not None and seconds >= self._half > 0.0
 
     def reset(self) -> None:
         self._last = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from gritd.drivers.framing import Frame
 from gritd.drivers.sensor import Analog, Encoder, modular_difference, sensor_kinds
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS
-from tests.drivers.rig import FUZZ, channel, wrench
+from tests.drivers.rig import FUZZ, INF, channel, wrench
 
 KINDS = sensor_kinds()
 
@@ -123,6 +124,22 @@ def test_a_count_that_the_counter_cannot_show_is_quarantined(count):
     sensor = Encoder(channel("wheel_encoder", "dev", bits=16))
     assert sensor.value(frame(count)) is None and sensor.quarantined == 1
     assert sensor.value(frame(10)) == 10 and sensor.value(frame(12)) == 12
+
+
+@pytest.mark.parametrize(
+    "seconds, max_rate, count", [(0.33, 1e5, 1), (0.32, 1e5, 0), (1e6, INF, 0)]
+)
+def test_a_silence_in_which_the_counter_may_have_gone_half_round_is_counted(
+    seconds, max_rate, count
+):
+    sensor = Encoder(replace(channel("wheel_encoder", "dev", bits=16), max_rate=max_rate))
+    sensor.elapsed(1e6)  # nothing came before
+    sensor.value(frame(65_000))
+    sensor.elapsed(0.004)
+    assert sensor.value(frame(65_100)) == 65_100 and sensor.turns_unknown == 0
+    sensor.elapsed(seconds)
+    assert sensor.turns_unknown == count
+    assert sensor.value(frame(164)) == 65_700, "still what the counter shows, but for whole rounds"
 
 
 # ---- analogue ------------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ OF_DEVICE = {  # of ReaderStats
     "quarantined": "impossible values refused",
     "incomplete": "incomplete cycles of the wrench",
     "mistimed": "frames of a wrong device time",
+    "turns_unknown": "turns unknown, an encoder was silent while its counter may have wrapped",
 }
 OF_TICK = {
     "late": "readings older than the horizon",

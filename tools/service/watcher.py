@@ -150,7 +150,8 @@ class Watcher:
                 f"device {s.device}: {s.readings} readings, {s.frames} frames, {s.bad} bad, "
                 f"{s.garbage} garbage bytes, {s.lost} lost, {s.duplicates} duplicates, "
                 f"{s.quarantined} quarantined, {s.incomplete} incomplete, {s.mistimed} mistimed, "
-                f"{s.unknown} unknown, {s.errors} bus errors, reopened {s.reopened} times"
+                f"{s.turns_unknown} turns unknown, {s.unknown} unknown, {s.errors} bus errors, "
+                f"reopened {s.reopened} times"
             )
 
         say(f"loop: {daemon.loop.ticks} ticks, {daemon.loop.missed} missed")

@@ -183,11 +183,17 @@ class Accepted(NamedTuple):
         """The same but for a dither between two values no further apart than near (n,); 0 in a
         window that holds a third. See wheel.windows.MeanWindow.
         """
-        changed, last = [], np.inf
+        lasts, changed, last = [], [], np.inf
         for value, distance in zip(self.values.tolist(), near.tolist(), strict=True):
             changed.append(abs(value - last) > distance)
             last = value if changed[-1] else last
-        return self._since(np.array(changed), self.members.hold_two(self.values), ends)
+            lasts.append(last)
+
+        windows, last_of = self.members, np.array(lasts)[self.members.last]
+        others = self.values[windows.reading] != last_of[windows.window]
+        same = (windows.size > 0) & (windows.sum(others.astype(float)) == 0.0)
+        two = (windows.size >= ENOUGH) & windows.hold_two(self.values)
+        return self._since(np.array(changed), same | two, ends)
 
     def _since(self, changed: Bools, known: Bools, ends: Ints) -> Ints:
         since = np.maximum.accumulate(np.where(changed, self.stamp, 0))

@@ -15,17 +15,17 @@ import os
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import count, islice
+from itertools import count
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.backlog import Backlog, Item, PartStart
 from gritd.estimator.recording.cdr import Topic, Values
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import part_path
@@ -34,23 +34,10 @@ from gritd.estimator.recording.syncer import Syncer
 from gritd.estimator.threads.waiting import wait_until
 
 CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
-BATCH = 5_000  # messages taken at once, so that a chunk stays small after an outage
 # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
 LARGEST = 1 << 17
 RETRY = 1.0  # [s] between attempts at a disk that failed
 _FULL = (errno.ENOSPC, errno.EDQUOT)
-
-Message = tuple[str, int, Values]  # topic, log_time [ns] and values
-
-
-class PartStart(NamedTuple):
-    """The first message of a new part, and the effective configuration that holds from there on."""
-
-    config_yaml: str
-    message: Message
-
-
-Item = Reading | Message | PartStart
 State = Literal["writing", "degraded", "closed"]
 
 
@@ -89,7 +76,7 @@ class WriterThread:
         retry: float = RETRY,
         mode: int | None = None,
     ) -> None:
-        self._queue = _Queue(capacity)
+        self._queue = Backlog(capacity)
         self._sync = Syncer()
         self._parts = _Parts(
             Path(path),
@@ -124,7 +111,7 @@ class WriterThread:
         """
         self._queue.put([*readings, *messages])
 
-    def begin_part(self, config_yaml: str, message: Message) -> None:
+    def begin_part(self, config_yaml: str, message: tuple[str, int, Values]) -> None:
         """Go on in a new part from here, with this configuration; `message` is its first."""
         self._queue.put([PartStart(config_yaml, message)])
 
@@ -265,89 +252,6 @@ class WriterThread:
             self._write_out()
         except MemoryError:  # there is no later attempt: once more
             self._write_out()
-
-
-class _Queue:
-    """A bounded queue that drops its oldest messages, and counts exactly."""
-
-    def __init__(self, capacity: int) -> None:
-        self._capacity = capacity
-        self._items: deque[Item] = deque()
-        self._lock = threading.Lock()
-        self._accepted = self._written = self._dropped = 0
-        self._taken = 0  # on their way to the disk
-        self._overflow = 0  # dropped since the last take
-        self._config = ""  # of the last PartStart among them
-        self._starts = 0  # PartStarts waiting
-
-    def put(self, items: list[Item]) -> None:
-        """Raises MemoryError, and nothing has changed."""
-        with self._lock:
-            accepted, before = self._accepted + len(items), len(self._items)
-            starts = self._starts + (isinstance(items[0], PartStart) if items else 0)
-            try:
-                self._items.extend(items)
-            except MemoryError:
-                while len(self._items) > before:
-                    self._items.pop()
-                raise
-            self._accepted, self._starts = accepted, starts
-            self._drop_oldest(max(0, len(self._items) - self._capacity))
-
-    def _drop_oldest(self, excess: int) -> None:
-        for _ in range(excess):
-            self._drop(self._items.popleft())
-            self._dropped += 1
-            self._overflow += 1
-
-    def _drop(self, item: Item) -> None:
-        if isinstance(item, PartStart):
-            self._starts -= 1
-            self._config = item.config_yaml
-
-    def batches(self) -> int:
-        """How many takes empty the queue as it is, or write the batch that waits."""
-        return 1 + len(self._items) // BATCH + self._starts
-
-    def take(self) -> tuple[list[Item], int, str]:
-        """The next messages, how many were dropped before them since the last take, and the
-        configuration of a PartStart among those. A PartStart comes first in its batch.
-        """
-        with self._lock:
-            batch = list(islice(self._items, self._leading()))
-            taken = self._taken + len(batch)
-            lost, config = self._overflow, self._config
-            # from here on nothing may fail: what is taken is counted
-            for _ in batch:
-                self._items.popleft()
-            if batch and isinstance(batch[0], PartStart):
-                self._starts -= 1
-            self._taken, self._overflow, self._config = taken, 0, ""
-        return batch, lost, config
-
-    def _leading(self) -> int:
-        """How many to take: up to the next PartStart, which is the first of its own batch."""
-        following = islice(self._items, 1, BATCH)
-        starts = (at for at, item in enumerate(following, 1) if isinstance(item, PartStart))
-        return next(starts, min(BATCH, len(self._items)))
-
-    def settle(self, dropped: int) -> None:
-        """What was taken is written, but for those that could not be encoded."""
-        with self._lock:
-            written, dropped = self._written + self._taken - dropped, self._dropped + dropped
-            self._written, self._dropped, self._taken = written, dropped, 0
-
-    def drop_all(self) -> None:
-        """Give up what is still here."""
-        with self._lock:
-            self._dropped += len(self._items) + self._taken
-            self._taken = self._starts = 0
-            self._items.clear()
-
-    def counters(self) -> tuple[int, int, int, int]:
-        """Accepted, written, dropped, queued."""
-        with self._lock:
-            return self._accepted, self._written, self._dropped, len(self._items) + self._taken
 
 
 class _Parts:

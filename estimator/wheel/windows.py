@@ -127,7 +127,10 @@ class MeanWindow(Window):
         return abs(value - self.last) > near
 
     def frozen(self, span: int) -> bool:
-        return super().frozen(span) and len({sample.value for sample in self.inside}) <= 2
+        if not super().frozen(span):
+            return False
+        values = {sample.value for sample in self.inside}
+        return values == {self.last} or (len(values) <= 2 and len(self.inside) >= ENOUGH)
 
     def mean(self) -> Mean | None:
         inside = self.inside

@@ -159,6 +159,48 @@ def test_a_stuck_potentiometer_is_flagged_while_the_wheel_turns_and_not_at_rest(
     assert not any(s.stuck for s in resting)
 
 
+@pytest.mark.parametrize("digit, frozen", [(1.2e-3, True), (1.6e-3, False)])
+def test_a_potentiometer_that_dithers_between_two_near_values_is_stuck(digit, frozen):
+    """The noise stated is 2 mV."""
+    rng = random.Random(3)
+    readings = [
+        r._replace(value=1.25 + rng.randrange(2) * digit) if r.channel == "sinkage_pot" else r
+        for r in readings_of(START, seconds=1.0, noise=True)
+    ]
+    found, _ = snapshots(readings, 250)
+    assert any(s.stuck & CHANNEL_BITS["sinkage_pot"] for s in found) == frozen
+
+
+@pytest.mark.parametrize("every", [1, 12])
+def test_a_quiet_sensor_of_three_values_is_not_stuck_nor_is_a_slow_one(every):
+    """A tenth of the noise that is stated; every twelfth reading, which is 20 Hz."""
+    rng = random.Random(3)
+    readings = [
+        r._replace(value=1.25 + rng.randrange(3) * 0.2e-3) if r.channel == "sinkage_pot" else r
+        for number, r in enumerate(readings_of(START, seconds=1.2, noise=True))
+        if r.channel != "sinkage_pot" or (number // 4) % every == 0
+    ]
+    silent = [r for r in readings if not (600 * MS < r.stamp - START < 690 * MS and every == 1)]
+    found, _ = snapshots(silent, 300)
+    assert sum(bool(s.stuck) for s in found) <= 3, "but by chance where a channel falls silent"
+
+
+def test_two_jumps_within_a_window_leave_no_speed_and_the_place_goes_on():
+    readings = [
+        r._replace(value=r.value + 10**6 * (NS // 2 < r.stamp - START < NS // 2 + 20 * MS))
+        if r.channel == "wheel_encoder"
+        else r
+        for r in readings_of(START, seconds=1.0, omega=0.4)
+    ]
+    found, counters = snapshots(readings, 250)
+    unknown = [k * 4 for k, s in enumerate(found) if k > 60 and not s.ready]
+    assert counters.jumps == 2
+    assert 560 <= unknown[0] <= 580 and 40 <= unknown[-1] - unknown[0] <= 60
+    elapsed = (found[-1].evaluated - START) / NS
+    assert found[-1].wheel_angle == pytest.approx(0.4 * elapsed, abs=2e-3)
+    assert all(abs(s.wheel_speed.value - 0.4) < 0.01 for s in found[60:] if s.ready)
+
+
 def test_a_stuck_wheel_encoder_is_flagged_while_the_carriage_moves():
     found, _ = snapshots(
         readings_of(START, seconds=1.2, noise=True, frozen=("wheel_encoder", 0.5)), 300

@@ -171,6 +171,110 @@ def test_no_false_alarm_of_a_stuck_sensor(seed, figure):
     )
 
 
+# ---- readings that look right but lie ------------------------------------------------------------
+
+WHEEL = "wheel_encoder"
+SILENT = "encoder silent while its counter wraps"
+RANDOM = "random counter of the wheel"
+DITHER = "sensor frozen but for its last digit"
+
+
+@pytest.mark.parametrize("silence, said", [(10.0, 1), (0.2, 0)])
+def test_an_encoder_that_is_silent_while_its_counter_wraps(seed, silence, said, figure):
+    """16 bits, 65536 counts a turn: in ten seconds it wraps three times, and nobody can know."""
+    rate, device = random.Random(seed).uniform(1.9, 2.1), SETTINGS.devices["encoders"]
+    wire, decoder = SerialWire(device), build_decoder(with_bits(16), device)
+    scale = SETTINGS.channels["wheel_encoder"].calibration.scale.value
+    angles = {}
+    for number in range(5000):
+        seconds = number * 0.004
+        if 1.0 < seconds < 1.0 + silence:
+            continue
+        counts = {"wheel_encoder": round(rate * seconds / scale), "carriage_encoder": number}
+        for key, count in counts.items():
+            data = wire.encode(key, [count % 65536], number * 4000)
+            readings = decoder.decode(START + number * TICK, data)
+            angles.update((seconds, r.value * scale) for r in readings if r.channel == WHEEL)
+
+    unknown = {sensor.channel: sensor.turns_unknown for sensor in decoder.sensors}
+    assert unknown["wheel_encoder"] == said and unknown["carriage_encoder"] == 0
+    off = (rate * max(angles) - angles[max(angles)]) / (2.0 * math.pi)
+    assert off == pytest.approx(round(off), abs=1e-3), "but for whole turns the angle is right"
+    assert (abs(off) > 0.5) == bool(said)
+    name = f"lines missing or too many after {silence:g} s"
+    figure(SILENT, DRIVERS, name, abs(unknown["wheel_encoder"] - said), "", 0)
+    figure(SILENT, DRIVERS, f"whole turns that are missing after {silence:g} s", abs(off))
+
+
+@pytest.mark.parametrize("largest", [1 << 32, 1 << 16, 5000, 400])
+def test_a_random_counter_of_the_wheel(seed, largest, figure):
+    """From the middle of a run on, every count is drawn anew; 400 is within max_rate."""
+    rng, clean = random.Random(seed), shifted(driven(8.0, seed))
+    at = clean[len(clean) // 2].stamp
+    wild = [
+        r._replace(value=rng.randrange(largest))
+        if r.channel == "wheel_encoder" and r.stamp >= at
+        else r
+        for r in clean
+    ]
+    ticks = ticks_of(wild)
+    after = ticks["evaluated"] > at + 10**9 // 10
+    assert np.sum(ticks["status"][~after] == Status.TRACKING) > 100
+    updates = int(ticks["updates"][-1]) - int(ticks["updates"][after][0])
+    believed = int(np.sum(ticks["status"][after] == Status.TRACKING))
+    figure(RANDOM, PIPELINE, "updates of the filter", updates, "", 0)
+    figure(RANDOM, PIPELINE, "ticks that say TRACKING", believed, "", 0)
+
+
+@pytest.mark.parametrize("channel", ["sinkage_pot", "motor_shunt", "wrench"])
+def test_a_sensor_frozen_but_for_its_last_digit(seed, channel, figure):
+    """Converters of 12 bits over 5 V, and of 0.02 N and 0.002 N·m."""
+    rng = random.Random(seed)
+    digits = (0.02,) * 3 + (0.002,) * 3 if channel == "wrench" else (5.0 / 4096,)
+    readings = shifted(driven(8.0, seed))
+    since = START + int(rng.uniform(3.0, 5.0) * 1e9)
+    held = next(r.value for r in reversed(readings) if r.channel == channel and r.stamp < since)
+
+    def frozen():
+        values = held if channel == "wrench" else (held,)
+        shown = tuple(v + rng.randrange(2) * d for v, d in zip(values, digits, strict=True))
+        return shown if channel == "wrench" else shown[0]
+
+    dithering = [
+        r._replace(value=frozen()) if r.channel == channel and r.stamp >= since else r
+        for r in readings
+    ]
+    ticks = ticks_of(dithering)
+    stuck = (ticks["stuck"] & CHANNEL_BITS[channel]) > 0
+    assert not np.any(stuck[ticks["stamp"] < since])
+    assert set(ticks["status"][stuck]) <= {Status.STUCK, Status.STANDSTILL}
+    noticed = (ticks["stamp"][stuck][0] - since) * 1e-9
+    figure(DITHER, PIPELINE, "noticed after it froze", noticed, "s", 0.45)
+
+
+def test_a_live_sensor_of_coarse_digits_is_not_taken_for_frozen(seed, figure):
+    """Every analogue channel as a converter of 12 bits shows it, with half the noise stated, and
+    as one of 16 bits with a tenth.
+    """
+    rng, alarms = random.Random(seed), 0
+    for digit, share in ((5.0 / 4096, 0.5), (5.0 / 65536, 0.1)):
+        quiet = [with_noise(r, rng, digit, share) for r in shifted(driven(30.0, seed))]
+        alarms += int(np.sum(ticks_of(quiet)["stuck"] > 0))
+    figure(DITHER, PIPELINE, "ticks of false alarm in a minute of driving", alarms, "", 0)
+
+
+def with_noise(reading, rng, digit, share):
+    """A reading of potentiometer or shunt on the digits of a converter, with a share of the noise
+    stated.
+    """
+    if reading.channel not in SIGNALS:
+        return reading
+    noise = SETTINGS.channels[reading.channel].noise
+    steady = round(reading.value / (20.0 * noise)) * 20.0 * noise  # its own noise taken out
+    noisy = steady + rng.gauss(0.0, share * noise)
+    return reading._replace(value=round(noisy / digit) * digit)
+
+
 NO_NUMBERS = (math.nan, math.inf, -math.inf)
 AXES = 6
 

@@ -84,6 +84,9 @@ ROWS = (
     "silence, garbage, counter jumps, a stopped process",
     "ten crashes in a minute",
     "every allocation of the hot path fails once",
+    "encoder silent while its counter wraps",
+    "random counter of the wheel",
+    "sensor frozen but for its last digit",
 )
 
 Figure = dict[str, Any]

@@ -9,8 +9,9 @@ import time
 from contextlib import suppress
 
 import pytest
+import yaml
 
-from tests.scenarios.rig import WIRES, driven, log_lines, service
+from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, service
 
 SAID = "silence, garbage, counter jumps, a stopped process"
 MANY = 12  # lines for one fault, both ends included, whatever else they bring about
@@ -21,6 +22,7 @@ class Meddled:
 
     def __init__(self, wires, rng):
         self._send, self._rng, self.mute, self.jumping = wires.encoders.send, rng, False, False
+        self.bits = 32  # of the counters
         wires.encoders.send = self.send
 
     def send(self, key, values, device_us):
@@ -28,7 +30,7 @@ class Meddled:
             return
         if self.jumping and key == "wheel_encoder":
             values = tuple(value + self._rng.randint(-(1 << 24), 1 << 24) for value in values)
-        self._send(key, values, device_us)
+        self._send(key, tuple(value % (1 << self.bits) for value in values), device_us)
 
 
 def silence(wires, daemon, encoders, scale):
@@ -65,10 +67,25 @@ def stopped(wires, daemon, encoders, scale):
     daemon.signal(signal.SIGCONT)
 
 
+def wraps(wires, daemon, encoders, scale):
+    """Silence of counters that wrap."""
+    encoders.mute = True
+    time.sleep(2.0 * scale)
+    encoders.mute = False
+
+
+def narrow():
+    """The encoders' channels with counters of 16 bits, for the configuration."""
+    channels = yaml.safe_load(TESTBED.text)["channels"]
+    names = ("wheel_encoder", "carriage_encoder")
+    return {"channels": {name: {**channels[name], "bits": 16} for name in names}}
+
+
 FAULTS = {
     "silence": (silence, r"channels? .*wheel_encoder.*: nothing usable arrives", "well again"),
     "garbage": (garbage, r"device encoders: bytes of garbage: \d+", r"over after .* \d+ in all"),
     "jumps": (jumps, r"jumps of an encoder: \d+", r"jumps of an encoder: over after .* \d+ in all"),
+    "wraps": (wraps, r"device encoders: turns unknown, .*: \d+", "well again"),
     "stopped": (stopped, r"ticks missed: \d+", ""),
 }
 
@@ -77,8 +94,10 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_it_is_said(tmp_path, fault, scale, figure):
     bring_about, begins, ends = FAULTS[fault]
-    with service(tmp_path, driven(90.0, 1, skip=1.0)) as (wires, daemon):
+    changes = narrow() if fault == "wraps" else {}
+    with service(tmp_path, driven(90.0, 1, skip=1.0), **changes) as (wires, daemon):
         encoders = Meddled(wires, random.Random(2))
+        encoders.bits = 16 if fault == "wraps" else 32
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         before = len(daemon.said)
         took = bring_about(wires, daemon, encoders, scale)

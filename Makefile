@@ -6,7 +6,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios fuzz soak install uninstall wheel clean
+.PHONY: help venv demo test tutorial slow package lint format type docs proof scenarios coverage fuzz soak install uninstall wheel clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-9s %s\n", $$1, $$2 }' Makefile
@@ -55,6 +55,9 @@ proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their
 
 scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
 	@$(BIN)/python -m gritd.tools.dev.reliability
+
+coverage: $(READY) ## which branches of estimator and drivers the tests take; writes that part of docs/reliability.md
+	@$(BIN)/python -m gritd.tools.dev.coverage
 
 fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody meant: the full counts
 	@$(BIN)/python -m gritd.tools.dev.fuzz

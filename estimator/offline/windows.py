@@ -58,7 +58,8 @@ class Members(NamedTuple):
         np.minimum.at(least, self.window, inside)
         np.maximum.at(most, self.window, inside)
         between = (inside > least[self.window]) & (inside < most[self.window])
-        return (self.size > 0) & (self.sum(between.astype(float)) == 0.0)
+        held: Bools = (self.size > 0) & (self.sum(between.astype(float)) == 0.0)
+        return held
 
 
 def members(stamp: Ints, after: Ints, until: Ints) -> Members:

@@ -1,0 +1,56 @@
+"""Every recorded session gives what it gave: a change of the drivers or the filter that touches
+one is seen, and reviewed.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.wires.library import FOLDER, differences, outcome, session, sessions
+
+LARGEST = 100_000  # [bytes] of a session in the repository
+
+
+@pytest.mark.parametrize("name", [one.name for one in sessions()])
+def test_a_session_gives_what_it_gave(tmp_path, name):
+    recorded = session(name)
+    recorded.unpack(tmp_path)
+    found = list(differences(recorded.outcome, outcome(recorded, tmp_path)))
+    assert not found, "\n".join([f"{name}: {recorded.about}", *found])
+
+
+def test_the_library_is_there_and_compact():
+    assert len(sessions()) >= 12
+    for one in sessions():
+        assert sum(path.stat().st_size for path in one.folder.iterdir()) < LARGEST, one.name
+        assert {path.name for path in one.folder.iterdir()} == {
+            "session.json", "encoders.wire.xz", "bus.wire.xz",
+        }  # fmt: skip
+    assert {path.name for path in FOLDER.iterdir()} == {one.name for one in sessions()}
+
+
+def test_differences_are_told_in_words():
+    want = {"a": {"bad": 1}, "x": 2.0, "list": [1, 2.0], "gone": 3}
+    have = {"a": {"bad": 2, "new": 4}, "x": 2.0000001, "list": [1, 2.1]}
+    assert list(differences(want, have)) == [
+        "a bad: 2, was 1", "a new: 4, was 0", "gone: 0, was 3", "list[1]: 2.1, was 2.0",
+    ]  # fmt: skip
+
+
+def test_good_sessions_lose_nothing_and_bad_ones_say_so():
+    """What the names promise stands in the outcomes."""
+    told = {one.name: one.outcome for one in sessions()}
+    for name in ("good-slcan", "good-multicast", "good-ascii", "wraps"):
+        devices = told[name]["devices"]
+        assert not devices["encoders"].keys() - {"good", "unknown"}, name
+        assert told[name]["last"]["updates"] > 5 and told[name]["last"]["jumps"] == 0, name
+    for name, count in {
+        "noise": "garbage", "flipped-bits": "bad", "garbage-8-mb": "garbage",
+        "clock-step": "clock_steps", "wrong-stamps": "mistimed", "frames-lost": "lost",
+        "frames-twice": "duplicates", "silence-16-bit": "turns_unknown",
+    }.items():  # fmt: skip
+        assert told[name]["devices"]["encoders"][count], name
+    assert told["garbage-8-mb"]["devices"]["encoders"]["garbage"] > 7_500_000
+    assert told["no-numbers"]["devices"]["bus"]["quarantined"]
+    assert told["random-counter"]["last"]["jumps"] > 100
+    assert told["frozen-pot"]["stuck"].keys() == {"sinkage_pot"}

@@ -127,7 +127,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class FilterSettings:
-    engine: Literal["filterpy", "plain"] = "filterpy"  # of ENGINES
+    engine: Literal["filterpy", "plain"] = "plain"  # of ENGINES
     cohesion_walk: float = 2.0  # [Pa/√s]
     tan_phi_walk: float = 2e-4  # [1/√s]
     ln_k_walk: float = 1e-4  # [1/√s]

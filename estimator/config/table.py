@@ -159,7 +159,7 @@ RATES = {
 }
 
 FILTER = {
-    "engine": Key(Choice(ENGINES), "same numbers from both; plain is the faster", "filterpy"),
+    "engine": Key(Choice(ENGINES), "equal to 1e-9; filterpy takes 1 s and 60 MB more", "plain"),
     "cohesion_walk": Key(
         Quantity("Pa/sqrt(s)", low=0, high=1e6), "random walk of c", "2 Pa/sqrt(s)"
     ),

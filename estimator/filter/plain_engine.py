@@ -1,4 +1,4 @@
-"""The filter's algebra in plain floats: the engine of fast replay, equal to filterpy's to rounding.
+"""The filter's algebra in plain floats: the default engine, equal to filterpy's to rounding.
 
 Only the rows of the state are touched, because a considered nuisance never changes. With M = P Hᵀ +
 C Gᵀ and N = Cᵀ Hᵀ + V Gᵀ, the covariances of state and nuisances with what is predicted, and S that

@@ -40,7 +40,7 @@ TESTBED = config.load(packaged())
 BUS = "udp_multicast" if has_multicast() else "slcan"
 BECOMING = """
 import os, encodings.idna, encodings.utf_8_sig, can.interfaces.slcan, can.interfaces.udp_multicast
-import gritd.tools.commands.run, gritd.tools.service.serve, gritd.estimator.filter.filterpy_engine
+import gritd.tools.commands.run, gritd.tools.service.serve
 import gritd.tools.main
 from gritd.drivers.build import build_readers
 from gritd.estimator.config.configuration import load

@@ -86,8 +86,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--engine",
         choices=ENGINES,
-        default="filterpy",
-        help="of the pipeline; default filterpy",
+        default="plain",
+        help="of the pipeline; default plain",
     )
     parser.add_argument(
         "--minutes", type=float, default=60.0, help="of the daemon on wires; default 60, 0: none"

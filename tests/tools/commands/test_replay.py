@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gritd.config import packaged
-from gritd.estimator.config.configuration import load
+from gritd.estimator.config.configuration import load, with_engine
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
@@ -37,7 +37,10 @@ def configuration():
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory, configuration):
     """A run logged as the daemon logs it: the readings a tick consumed, then the tick."""
-    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    return logged(tmp_path_factory.mktemp("run") / "run.mcap", configuration)
+
+
+def logged(path, configuration):
     pipeline = Pipeline(configuration.settings)
     state = pipeline.start()
     writer = RunWriter(path, TOPICS, configuration.text, RunInfo(name="test"))
@@ -62,6 +65,19 @@ def recorded(tmp_path_factory, configuration):
 def test_a_replay_is_identical_bit_for_bit(recorded, capsys):
     for _ in range(3):
         assert replay.main([str(recorded), "--verify"]) == 0
+    assert "identical bit for bit" in capsys.readouterr().out
+
+
+def test_a_recording_of_the_former_default_engine_is_verified_with_that_engine(
+    configuration, tmp_path, capsys
+):
+    """The recording states its engine: what the default is today does not matter to it."""
+    former = with_engine(configuration, "filterpy")
+    path = logged(tmp_path / "former.mcap", former)
+    assert "engine: filterpy" in str(read(path).config_yaml)
+    assert configuration.settings.filter.engine == "plain"
+
+    assert replay.main([str(path), "--verify"]) == 0
     assert "identical bit for bit" in capsys.readouterr().out
 
 
@@ -271,9 +287,9 @@ def test_missing_messages_are_counted_and_no_difference(recorded, tmp_path, caps
 
 
 def test_another_engine_stands_in_the_recording_it_made(recorded, tmp_path, capsys):
-    out = tmp_path / "plain.mcap"
-    assert replay.main([str(recorded), "--engine", "plain", "-o", str(out)]) == 0
-    assert "engine: plain" in str(read(out).config_yaml)
+    out = tmp_path / "filterpy.mcap"
+    assert replay.main([str(recorded), "--engine", "filterpy", "-o", str(out)]) == 0
+    assert "engine: filterpy" in str(read(out).config_yaml)
     assert replay.main([str(out), "--verify"]) == 0
     assert "identical bit for bit" in capsys.readouterr().out
 

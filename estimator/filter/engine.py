@@ -1,8 +1,9 @@
 """What applies a measurement to an estimate: two engines with one interface.
 
 `filterpy_engine` is filterpy's ExtendedKalmanFilter with the Schmidt gain, and the reference;
-`plain_engine`, the default, is the same algebra in plain floats. Both use the Joseph form with the gain that was really applied, zeroed rows
-included, so the covariance stays symmetric and positive. A test holds them equal.
+`plain_engine`, the default, is the same algebra in plain floats. Both use the Joseph form with the
+gain that was really applied, zeroed rows included, so the covariance stays symmetric and positive.
+A test holds them equal.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from gritd.estimator.offline.gaps import built_ticks
 from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.recording.tables import Fields
 from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
@@ -30,6 +31,9 @@ from gritd.estimator.wheel.windows import DITHER, ENOUGH
 
 ANALOGUE = ("sinkage_pot", "motor_shunt")
 NEVER = -(1 << 62)  # [ns]
+RAW: dict[str, Fields] = {f"/raw/{channel}": None for channel in CHANNELS}
+# What `recorded_streams` takes of a recording with ticks: told to `read`, it unpacks the file once.
+STREAMS: dict[str, Fields] = {**RAW, TICK: ("stamp",)}
 
 
 class Stream(NamedTuple):
@@ -58,9 +62,10 @@ def recorded_streams(recording: Recording, rate: float) -> RecordedStreams:
     if not recording.counts[TICK]:
         return streams_at(recording, rate)
 
-    raw, logged = _raw(recording), recording.arrays(TICK)
+    tables = recording.tables(STREAMS)
+    raw, logged = _raw(tables), tables[TICK]
     consumed = {name: np.searchsorted(logged["order"], rows["order"]) for name, rows in raw.items()}
-    return _streams(logged["stamp"], raw, consumed)
+    return _streams(logged["stamp"].copy(), raw, consumed)
 
 
 def streams_at(recording: Recording, rate: float) -> RecordedStreams:
@@ -68,7 +73,7 @@ def streams_at(recording: Recording, rate: float) -> RecordedStreams:
     logged.
     """
     try:
-        return streams_of(_raw(recording), rate)
+        return streams_of(_raw(recording.tables(RAW)), rate)
     except RecordingError as error:
         raise RecordingError(f"{recording.path}: {error}") from None
 
@@ -86,9 +91,9 @@ def streams_of(raw: Mapping[str, NDArray[np.void]], rate: float) -> RecordedStre
     return _streams(ticks, raw, consumed)
 
 
-def _raw(recording: Recording) -> dict[str, NDArray[np.void]]:
+def _raw(tables: Mapping[str, NDArray[np.void]]) -> dict[str, NDArray[np.void]]:
     """The raw readings of every channel that has any."""
-    raw = {channel: recording.arrays(f"/raw/{channel}") for channel in CHANNELS}
+    raw = {channel: tables[f"/raw/{channel}"] for channel in CHANNELS}
     return {channel: rows for channel, rows in raw.items() if rows.size}
 
 
@@ -100,12 +105,13 @@ def _streams(
 
 
 def _stream(channel: str, rows: NDArray[np.void], tick: Ints, ticks: int) -> Stream:
-    """What some tick consumed; readings after the last tick are left out."""
-    rows, tick = rows[tick < ticks], tick[tick < ticks]
-    columns = [rows[name] for name in CHANNELS[channel]]
+    """What some tick consumed, ascending; readings after the last tick are left out."""
+    end = int(np.searchsorted(tick, ticks))
+    rows, tick = rows[:end], tick[:end]
+    columns = [rows[name].copy() for name in CHANNELS[channel]]  # side by side, and rows can go
     return Stream(
-        rows["stamp"],
-        rows["log_time"],
+        rows["stamp"].copy(),
+        rows["log_time"].copy(),
         tick,
         columns[0] if len(columns) == 1 else np.stack(columns, axis=1),
     )

@@ -90,13 +90,47 @@ class Texts:
             raise Damaged("the record is longer than its fields")
 
 
+class Unpacker:
+    """Unpacks block after block with one zstd context, which costs as much as a small block."""
+
+    def __init__(self) -> None:
+        self._zstd = zstandard.ZstdDecompressor(max_window_size=MAX_WINDOW)
+        self._largest = int(limits().chunk)
+
+    def whole(self, block: Block, data: memoryview) -> bytes | None:
+        """The records of a block from its stored bytes, its checksum verified; None where it is not
+        as it should be, and `unpack` says why.
+        """
+        if too_large(block, self._largest) or len(data) != block.stored:
+            return None
+        try:
+            content = self._content(block, data)
+        except (Damaged, zstandard.ZstdError):
+            return None
+        if len(content) != block.size or (block.crc and zlib.crc32(content) != block.crc):
+            return None
+        return content
+
+    def _content(self, block: Block, data: memoryview) -> bytes:
+        # what a frame says of its size is taken at its word and allocated
+        if block.compression == "zstd" and zstandard.frame_content_size(data) == block.size:
+            return self._zstd.decompress(data)
+        return _decompress(block, bytes(data))
+
+
+def too_large(block: Block, largest: int) -> str:
+    """Why a block is not unpacked, whatever it holds; '' as a rule. largest: limits().chunk."""
+    if block.size > largest or block.stored > largest:
+        return f"claims {block.size} bytes; chunks up to {largest} are read"
+    if block.size > MAX_RATIO * max(block.stored, 64):
+        return f"claims to unpack {block.stored} bytes to {block.size}"
+    return ""
+
+
 def unpack(file: BinaryIO, block: Block) -> bytes:
     """The records of a block, its checksum verified. Raises Damaged."""
-    largest = int(limits().chunk)
-    if block.size > largest or block.stored > largest:
-        raise Damaged(f"claims {block.size} bytes; chunks up to {largest} are read")
-    if block.size > MAX_RATIO * max(block.stored, 64):
-        raise Damaged(f"claims to unpack {block.stored} bytes to {block.size}")
+    if why := too_large(block, int(limits().chunk)):
+        raise Damaged(why)
     file.seek(block.start)
     content = _decompress(block, file.read(block.stored))
     if len(content) != block.size:

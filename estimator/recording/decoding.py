@@ -21,9 +21,9 @@ from gritd.estimator.recording.mcapfile import (
     gather,
 )
 
-_PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
+PADDING = 7  # [bytes] some CDR writers fill a message up to a multiple of 4 or 8
 # the first two bytes of the encapsulation header, 00 01, as a little-endian number
-_CDR_LE = 0x0100
+CDR_LE = 0x0100
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def select(
     complaints = []
     for channel, own in whole.groups.items():
         source = sources.get(channel)
-        good[own] = _sound(whole, own, source) if source else False
+        good[own] = sound(whole, own, source) if source else False
         if bad := int(np.count_nonzero(~good[own])):
             what = (
                 f"do not fit the fields of {source.topic.name}"
@@ -117,7 +117,7 @@ def select(
     return (whole if good.all() else Chunk(content, starts[good], whole.heads[good])), complaints
 
 
-def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
+def sound(chunk: Chunk, own: Starts, source: Source) -> Any:
     """Which of the messages numbered `own` are little-endian CDR of the right length, shape
     (n,).
     """
@@ -130,11 +130,11 @@ def _sound(chunk: Chunk, own: Starts, source: Source) -> Any:
     excess = chunk.heads["length"][own].astype(np.int64) - (
         MESSAGE_HEAD.size - RECORD_HEAD.size + codec.size
     )
-    fits = (excess >= 0) & (excess <= _PADDING)
+    fits = (excess >= 0) & (excess <= PADDING)
     kinds = gather(
         chunk.content, chunk.starts[own[fits]] + MESSAGE_HEAD.size, np.dtype([("kind", "<u2")])
     )
-    fits[fits] = kinds["kind"] == _CDR_LE
+    fits[fits] = kinds["kind"] == CDR_LE
 
     return fits
 

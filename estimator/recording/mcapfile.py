@@ -83,12 +83,15 @@ def reported(path: Path, doing: str) -> Iterator[None]:
         ) from error
 
 
-def opened(path: Path) -> BinaryIO:
-    """A file to read. A pipe or a device is refused without waiting for it. Raises OSError."""
+def opened(path: Path, buffering: int = 1 << 18) -> BinaryIO:
+    """A file to read. A pipe or a device is refused without waiting for it. Raises OSError.
+
+    buffering [bytes]: 0 for whoever asks for large pieces here and there.
+    """
     file = open(  # noqa: SIM115 - for the caller to close
         path,
         "rb",
-        buffering=1 << 18,
+        buffering,
         opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK),
     )
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):

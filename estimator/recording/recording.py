@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
-
-import numpy as np
 
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.blocks import Block, split, unpack
 from gritd.estimator.recording.cdr import Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source, select
-from gritd.estimator.recording.mcapfile import RecordingError, Starts, opened, reported
+from gritd.estimator.recording.mcapfile import RecordingError, opened, reported
 from gritd.estimator.recording.metadata import CONFIG, RECOVERED, RUN
+from gritd.estimator.recording.piles import Pile, alone
+from gritd.estimator.recording.piles import opened as open_pile
+from gritd.estimator.recording.tables import Fields, Table, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 
 Message = tuple[str, int, tuple[Any, ...]]
@@ -39,8 +40,9 @@ class Recording:
     attachments: int = 0
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
     sources: dict[int, Source] = field(default_factory=dict)  # by channel number
-    _blocks: list[Block] = field(default_factory=list, repr=False)
-    _kept: dict[int, Chunk] = field(default_factory=dict, repr=False)
+    _piles: list[tuple[Block, ...]] = field(default_factory=list, repr=False)
+    _kept: dict[int, Pile] = field(default_factory=dict, repr=False)
+    _tables: dict[tuple[str, Fields], Rows] = field(default_factory=dict, repr=False)
 
     @property
     def complete(self) -> bool:
@@ -65,14 +67,14 @@ class Recording:
 
     def chunks(self) -> Iterator[Chunk]:
         """The good messages, block by block in file order, still encoded."""
-        with reported(self.path, "read"), opened(self.path) as file:
-            for number, block in enumerate(self._blocks):
-                yield self._kept.get(number) or self._chunk(file, block)
+        for pile in self._opened():
+            yield from pile.parts()
 
     def messages(self) -> Iterator[Message]:
         """(topic, log_time [ns], values) in file order; values as the topic has its fields."""
-        for chunk in self.chunks():
-            rows: dict[int, Message] = {}
+        for pile in self._opened():
+            chunk = pile.chunk
+            rows: list[Message | None] = [None] * len(chunk.starts)
             for channel, own in chunk.groups.items():
                 source = self.sources[channel]
                 if source.codec:
@@ -81,7 +83,7 @@ class Recording:
                         own.tolist(), times, source.values(chunk, own), strict=True
                     ):
                         rows[i] = (source.topic.name, time, values)
-            yield from (rows[i] for i in sorted(rows))
+            yield from (row for row in rows if row is not None)
 
     def arrays(self, topic: str) -> Rows:
         """All messages of a topic as one structured array, shape (n,), in file order.
@@ -91,33 +93,63 @@ class Recording:
         empty. Raises RecordingError for a topic whose messages are not of fixed size or not
         decoded.
         """
+        return self.tables({topic: None})[topic]
+
+    def tables(self, wanted: Mapping[str, Fields]) -> dict[str, Rows]:
+        """Several topics at once, each as `arrays` gives it, in one pass over the file; of its
+        fields the named ones, or all for None. The arrays are read-only where `read` was told of
+        the same topic and fields: they were made then. Raises RecordingError.
+        """
+        known = {topic: self._known(topic) for topic in wanted}
+        made = {
+            topic: self._tables[topic, fields]
+            for topic, fields in wanted.items()
+            if (topic, fields) in self._tables
+        }
+        rest = {topic: fields for topic, fields in wanted.items() if topic not in made}
+        tables = Tables(rest)
+        tables.expected = self.counts
+
+        if any(self.counts[topic] for topic in rest):
+            before = 0
+            for pile in self._opened():
+                tables.add(pile.chunk, self.sources, before)
+                before += len(pile.chunk.starts)
+
+        for topic in tables.refused:
+            names = ", ".join(rest[topic] or ()) or "the same fields"
+            raise RecordingError(f"{self.path}: {topic}: not all of its messages have {names}")
+
+        passed = {topic: rows for (topic, _), rows in tables.done().items()}
+        empty = {
+            topic: Table(known[topic], fields).done()
+            for topic, fields in rest.items()
+            if topic not in passed
+        }
+        for rows in (*passed.values(), *empty.values()):
+            rows.flags.writeable = True  # nobody else has them
+        return {**empty, **passed, **made}
+
+    def _known(self, topic: str) -> Topic:
+        """Raises RecordingError for a topic without decoded fields of fixed size."""
         known = self.topics.get(topic) or next((t for t in RAW_TOPICS if t.name == topic), None)
         if known is None or not known.codec.flat:
             raise RecordingError(
                 f"{self.path}: {topic}: no topic with decoded fields of fixed size"
             )
-        tables = [np.empty(0, [("log_time", "<i8"), ("order", "<i8"), *known.codec.table_dtype])]
-        before = 0
-        for chunk in self.chunks():
-            for channel, own in chunk.groups.items():
-                if self.sources[channel].topic.name == topic:
-                    tables.append(
-                        _table(self.sources[channel], chunk, own, before, tables[0].dtype)
-                    )
-            before += len(chunk.starts)
-        joined = np.concatenate(tables)
-        return joined[np.argsort(joined["order"], kind="stable")]
+        return known
+
+    def _opened(self) -> Iterator[Pile]:
+        """Pile by pile in file order."""
+        with reported(self.path, "read"), opened(self.path, buffering=0) as file:
+            for number, blocks in enumerate(self._piles):
+                pile = self._kept.get(number) or open_pile(file, blocks, self.sources)
+                if pile is not None:
+                    yield pile
+                    continue
+                for block in blocks:
+                    yield alone(self._chunk(file, block))
 
     def _chunk(self, file: BinaryIO, block: Block) -> Chunk:
         content = unpack(file, block)
         return select(content, split(file, block, content)[0], self.sources)[0]
-
-
-def _table(
-    source: Source, chunk: Chunk, own: Starts, before: int, dtype: np.dtype[np.void]
-) -> Rows:
-    table = np.empty(own.shape, dtype)
-    table["log_time"] = chunk.heads["log_time"][own]
-    table["order"] = own + before
-    source.fill(table[list(source.topic.names)], chunk, own)
-    return table

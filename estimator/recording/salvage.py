@@ -3,11 +3,14 @@
 Every chunk is unpacked and checked once by `read`; what cannot be trusted is left out and named in
 `damage`, one line each. What `messages` and `arrays` give afterwards comes from intact chunks only,
 in file order.
+
+Chunks are checked a pile at a time (piles.py). A pile in which anything is not as it should be is
+gone through chunk by chunk, which is several times slower and finds what is wrong.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,10 +23,19 @@ from gritd.estimator.recording.blocks import Block, Damaged, records, split, unp
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.decoding import Chunk, select
 from gritd.estimator.recording.definitions import Definitions
-from gritd.estimator.recording.mcapfile import LIBRARY, RecordingError, opened, reported
+from gritd.estimator.recording.mcapfile import (
+    LIBRARY,
+    MAGIC,
+    MESSAGE_HEAD,
+    RecordingError,
+    reported,
+)
+from gritd.estimator.recording.mcapfile import opened as file_opened
 from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
+from gritd.estimator.recording.piles import REACH, ROOM, Pile, alone, opened
 from gritd.estimator.recording.recording import Message, Recording
-from gritd.estimator.recording.sequence import Sequence
+from gritd.estimator.recording.sequence import Sequence as Numbers
+from gritd.estimator.recording.tables import NOTHING, Fields, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.recording.walk import Contents, Walk
 
@@ -36,21 +48,30 @@ MAX_WASTE = 128 << 20  # [bytes] read and unpacked in vain before giving up
 _COST = 100  # [bytes] that could be read in the time one message takes that then is not good
 # A chunk takes as long as some thousand messages. So many may have fewer than this, on average.
 SMALL_CHUNKS, FEW = 20_000, 4
+TRIES = 4  # to check what is left of a pile at once, each after definitions that were new
+MAX_PREAMBLES = 1000  # a recording of ours has a few: which channels a chunk holds
 
 
-def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
+def read(
+    path: Path | str,
+    topics: Iterable[Topic] = RAW_TOPICS,
+    tables: Mapping[str, Fields] = NOTHING,
+) -> Recording:
     """Open a recording and check all of it.
 
     `topics` are those whose fields the caller relies on; all others are taken as the file defines
-    them. Raises RecordingError if there is no such file, it is no MCAP file, or one of `topics`
-    lacks a field in it.
+    them. `tables` are what `Recording.tables` will be asked for: made in the same pass, a long file
+    is unpacked once. Raises RecordingError if there is no such file, it is no MCAP file, or one of
+    `topics` lacks a field in it.
     """
     path = Path(path)
     recording = Recording(path)
-    with reported(path, "read"), opened(path) as file:
+    wanted = Tables(tables)
+    with reported(path, "read"), file_opened(path, buffering=0) as file:
         try:
             walk = Walk(file, path.stat().st_size)
-            _Check(recording, {topic.name: topic for topic in topics}).whole(file, walk)
+            known = {topic.name: topic for topic in topics}
+            _Check(recording, known, wanted).whole(file, walk)
         except RecordingError as error:
             message = str(error)
             raise RecordingError(
@@ -58,6 +79,7 @@ def read(path: Path | str, topics: Iterable[Topic] = RAW_TOPICS) -> Recording:
             ) from None
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
+    recording._tables = wanted.done()
     return recording
 
 
@@ -89,13 +111,18 @@ class _Check:
     damage.
     """
 
-    def __init__(self, recording: Recording, known: dict[str, Topic]) -> None:
+    def __init__(self, recording: Recording, known: dict[str, Topic], tables: Tables) -> None:
         self._recording = recording
         self._definitions = Definitions(recording.path, known)
         recording.sources = self._definitions.sources
-        self._sequence = Sequence()
+        self._tables = tables
+        self._sequence = Numbers()
+        self._numbered = False  # its messages are numbered as ours are
+        self._preambles: set[bytes] = {b""}  # definitions that are known, as they stand in a chunk
+        self._preamble = b""  # the last of them
+        self._line = 0  # where the next line of damage belongs
         self._waste = 0
-        self._kept_room = MAX_KEPT
+        self._kept_room = 0 if tables.wanted else MAX_KEPT  # who has the arrays asks no more
         self._unpacked = self._stored = self._chunks = self._messages = 0
 
     def whole(self, file: BinaryIO, walk: Walk) -> None:
@@ -104,29 +131,97 @@ class _Check:
         recording.damage = contents.damage
         walk.begin()
         expected = self._summary(contents.summary)
+        self._expect(expected, walk.size)
 
-        for block in walk.blocks():
-            if ending := self._ending(block):
-                recording.damage.append(f"byte {block.start}: {ending}; the rest is not read")
+        for pile in _piles(walk, contents.damage):
+            self._numbered = contents.library == LIBRARY
+            if not self._pile(file, pile):
                 break
-            try:
-                self._block(file, block, numbered=contents.library == LIBRARY)
-            except Damaged as why:
-                recording.damage.append(
-                    f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}"
-                )
-                self._waste += block.stored + min(block.size, int(limits().chunk))
+        else:
+            if not contents.headed:
+                line = f"byte {len(MAGIC)}: no header: nobody recorded here"
+                recording.damage.insert(0, line)
 
         recording.closed, recording.attachments = contents.closed, contents.attachments
         _take_metadata(recording, contents)
-        self._count_lost(expected, numbered=contents.library == LIBRARY)
+        self._count_lost(expected, numbered=self._numbered)
+
+    def _pile(self, file: BinaryIO, pile: Sequence[tuple[Block, int]]) -> bool:
+        """Check neighbouring blocks; False where nothing is read from one on. With each stands how
+        many lines of damage the walk had found before it.
+        """
+        damage, more, tries, known = self._recording.damage, 0, TRIES, -1
+        for number, (block, before) in enumerate(pile):
+            if tries and len(self._preambles) > known:  # at first, and when there is hope again
+                if self._together(file, [block for block, _ in pile[number:]]):
+                    return True
+                tries, known = tries - 1, len(self._preambles)
+
+            self._line = before + more
+            if ending := self._ending(block):
+                line = f"byte {block.start}: {ending}; the rest is not read"
+                damage[self._line :] = [line]  # what the walk found beyond is not looked at
+                return False
+            try:
+                self._block(file, block)
+            except Damaged as why:
+                self._say(f"byte {block.start}: chunk of {block.stored} bytes skipped: {why}")
+                self._waste += block.stored + min(block.size, int(limits().chunk))
+            more = self._line - before
+        return True
+
+    def _say(self, line: str) -> None:
+        self._recording.damage.insert(self._line, line)
+        self._line += 1
+
+    def _together(self, file: BinaryIO, blocks: Sequence[Block]) -> bool:
+        """Check a pile at once; False, and nothing is taken of it, where anything is not as it
+        should be.
+        """
+        if self._ends_within(blocks):
+            return False
+        pile = opened(file, blocks, self._recording.sources)
+        if pile is None or not all(map(self._is_known, pile.preambles)):
+            return False
+
+        ranges = pile.ranges()
+        if not self._numbered:
+            for each in ranges:
+                self._sequence.add(each)
+        elif not self._sequence.add_all(ranges):
+            return False
+
+        for block in blocks:
+            self._count(block)
+        self._keep(blocks, pile)
+        return True
+
+    def _is_known(self, preamble: bytes) -> bool:
+        """Whether a chunk's definitions are, to the byte, those of a chunk before."""
+        if preamble != self._preamble:  # hashing takes longer
+            if preamble not in self._preambles:
+                return False
+            self._preamble = preamble
+        return True
+
+    def _ends_within(self, blocks: Sequence[Block]) -> bool:
+        """Whether reading might end inside a pile; `_ending` then says where."""
+        bounds = limits()
+        unpacked = self._unpacked + sum(block.size for block in blocks)
+        stored = self._stored
+        return (
+            self._waste > MAX_WASTE
+            or unpacked > bounds.start + bounds.ratio * stored
+            or (
+                self._chunks + len(blocks) > SMALL_CHUNKS
+                and FEW * (self._chunks + len(blocks)) > self._messages
+            )
+        )
 
     def _ending(self, block: Block) -> str:
         """Why nothing is read from here on; '' as a rule."""
         bounds = limits()
-        self._chunks += 1
-        self._unpacked += block.size
-        self._stored += block.stored + block.index[1] - block.index[0]
+        self._count(block)
         if self._waste > MAX_WASTE:
             return "too much damage"
         if self._unpacked > bounds.start + bounds.ratio * self._stored:
@@ -134,46 +229,55 @@ class _Check:
         few = FEW * self._chunks > self._messages
         return f"chunks of fewer than {FEW} messages" if self._chunks > SMALL_CHUNKS and few else ""
 
-    def _block(self, file: BinaryIO, block: Block, numbered: bool) -> None:
+    def _count(self, block: Block) -> None:
+        self._chunks += 1
+        self._unpacked += block.size
+        self._stored += block.stored + block.index[1] - block.index[0]
+
+    def _block(self, file: BinaryIO, block: Block) -> None:
         content = unpack(file, block)
         starts, definitions = split(file, block, content)
         for opcode, start, end in definitions:
             self._definitions.add(opcode, content[start:end])
         chunk, complaints = select(content, starts, self._recording.sources)
-        self._recording.damage += [f"byte {block.start}: {complaint}" for complaint in complaints]
+        for complaint in complaints:
+            self._say(f"byte {block.start}: {complaint}")
         self._waste += _COST * (len(starts) - len(chunk.starts))
-        self._place(block, chunk, numbered)
-        self._keep(block, chunk)
+        self._place(block, chunk)
+        self._keep([block], alone(chunk))
+        if len(starts) and len(self._preambles) < MAX_PREAMBLES:
+            self._preambles.add(content[: int(starts[0])])
 
-    def _place(self, block: Block, chunk: Chunk, numbered: bool) -> None:
+    def _place(self, block: Block, chunk: Chunk) -> None:
         """Hold the messages' numbers against those before. Raises Damaged for a chunk that stands
         there twice.
         """
-        numbers = chunk.heads["sequence"]
-        ranges = {
-            channel: (int(numbers[own[0]]), int(numbers[own[-1]]), len(own))
-            for channel, own in chunk.groups.items()
-        }
-        if numbered and self._sequence.repeated(ranges):
+        (ranges,) = alone(chunk).ranges()
+        if self._numbered and self._sequence.repeated(ranges):
             self._recording.misplaced += 1
             raise Damaged("it stands there twice")
-        if not self._sequence.add(ranges) and numbered:
+        if not self._sequence.add(ranges) and self._numbered:
             self._recording.misplaced += 1
-            self._recording.damage.append(
+            self._say(
                 f"byte {block.start}: chunk of {block.stored} bytes is not in its place: its"
                 " messages come after later ones"
             )
 
-    def _keep(self, block: Block, chunk: Chunk) -> None:
-        recording = self._recording
+    def _keep(self, blocks: Sequence[Block], pile: Pile) -> None:
+        recording, chunk = self._recording, pile.chunk
         self._kept_room -= len(chunk.content)
         if self._kept_room >= 0:
-            recording._kept[len(recording._blocks)] = chunk
-        recording._blocks.append(block)
-        recording.unverified += 0 if block.crc else len(chunk.starts)
-        self._messages += len(chunk.starts)
+            recording._kept[len(recording._piles)] = pile
+        recording._piles.append(tuple(blocks))
+
+        sizes = np.diff(pile.cuts).tolist()
+        recording.unverified += sum(
+            size for block, size in zip(blocks, sizes, strict=True) if not block.crc
+        )
         for channel, own in chunk.groups.items():
             recording.counts[recording.sources[channel].topic.name] += len(own)
+        self._tables.add(chunk, recording.sources, self._messages)
+        self._messages += len(chunk.starts)
 
     def _summary(self, summary: bytes) -> dict[int, int]:
         """Take the definitions of the summary; return its count of messages by channel, if it has
@@ -190,6 +294,17 @@ class _Check:
             pass
         return expected
 
+    def _expect(self, counts: Mapping[int, int], size: int) -> None:
+        """Room in the tables for the messages that the index counts, as far as a file of this size
+        [bytes] can hold so many.
+        """
+        most = limits().start + limits().ratio * size
+        for channel, count in counts.items():
+            source = self._recording.sources.get(channel)
+            if source and source.codec and source.codec.flat:
+                possible = int(most / (MESSAGE_HEAD.size + source.codec.size))
+                self._tables.expected[source.topic.name] += min(count, possible)
+
     def _count_lost(self, expected: dict[int, int], numbered: bool) -> None:
         """By the count of the index, else by the messages' numbers."""
         recording, counted = self._recording, self._sequence.counts()
@@ -205,6 +320,23 @@ class _Check:
             recording.damage.insert(0, f"{surplus} messages more than its index counts")
         if recording.lost:
             recording.damage.insert(0, f"{recording.lost} messages are missing")
+
+
+def _piles(walk: Walk, damage: Sequence[str]) -> Iterator[list[tuple[Block, int]]]:
+    """Neighbouring blocks that are checked together, in file order, each with how many lines of
+    damage the walk had found when it came to it.
+    """
+    pile: list[tuple[Block, int]] = []
+    size = 0
+    for block in walk.blocks():
+        far = pile and block.start + block.stored - pile[0][0].start > REACH
+        if pile and (far or size + block.size > ROOM):
+            yield pile
+            pile, size = [], 0
+        pile.append((block, len(damage)))
+        size += block.size
+    if pile:
+        yield pile
 
 
 def _channel_counts(statistics: bytes) -> dict[int, int]:

@@ -4,7 +4,7 @@ next. Where it does not, messages are missing, or a chunk stands in another plac
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 _WRAP = 1 << 32  # numbers begin again there
@@ -45,6 +45,27 @@ class Sequence:
         before = key in self._seen
         self._seen.add(key)
         return before
+
+    def add_all(self, chunks: Iterable[Mapping[int, tuple[int, int, int]]]) -> bool:
+        """Count chunks that all count on from those before and were not there before; False, and
+        nothing is counted, where one does not.
+        """
+        chunks = list(chunks)
+        keys = [hash(tuple(chunk.items())) for chunk in chunks]
+        lasts = {channel: counted.last for channel, counted in self._channels.items()}
+
+        for chunk in chunks:
+            for channel, (first, last, _) in chunk.items():
+                if _ahead(first, lasts.get(channel, first - 1)) <= 0 or _ahead(last, first) < 0:
+                    return False
+                lasts[channel] = last
+        if len(set(keys)) < len(keys) or not self._seen.isdisjoint(keys):
+            return False
+
+        self._seen.update(keys)
+        for chunk in chunks:
+            self.add(chunk)
+        return True
 
     def add(self, chunk: Mapping[int, tuple[int, int, int]]) -> bool:
         """Count a chunk; whether all its channels count on from the chunks before."""

@@ -35,6 +35,8 @@ _FOOTER = struct.Struct("<BQQQI")
 _CLOSING = _FOOTER.size + len(MAGIC)
 _DATA_END_SIZE = 13
 _STEP = 1 << 20
+_WINDOW = 1 << 13  # [bytes] of the file read at once where records are small
+_INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of the entries
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
@@ -56,13 +58,14 @@ class Walk:
 
     def __init__(self, file: BinaryIO, size: int) -> None:
         self._file = file
-        self._size = size
+        self.size = size
         self._limit = size  # where the data section ends
         self._metadata_room = MAX_METADATA
         self._idle = 0  # records without messages
         self._chunks = 0
         # the last one, whose message index may follow, and the one before
         self._blocks: list[Block] = []
+        self._window, self._window_start = b"", 0  # the part of the file that was read last
         self.found = Contents()
 
     def begin(self) -> None:
@@ -82,8 +85,6 @@ class Walk:
                 self.found.damage.append(line)
                 break
         yield from self._blocks
-        if not self.found.headed:
-            self.found.damage.insert(0, f"byte {len(MAGIC)}: no header: nobody recorded here")
 
     def _too_many(self) -> str:
         """What there is more of than a recording has; '' as a rule."""
@@ -94,8 +95,14 @@ class Walk:
         return f"{MAX_IDLE} records without messages" if idle else ""
 
     def _read(self, start: int, size: int) -> bytes:
-        self._file.seek(start)
-        return self._file.read(max(0, min(size, self._limit - start)))
+        size = max(0, min(size, self._limit - start))
+        at = start - self._window_start
+        if not 0 <= at <= len(self._window) - size:
+            self._file.seek(start)
+            if size >= _WINDOW:
+                return self._file.read(size)
+            self._window, self._window_start, at = self._file.read(_WINDOW), start, 0
+        return self._window[at : at + size]
 
     def _check_magic(self) -> None:
         if self._read(0, len(MAGIC)) == MAGIC:
@@ -111,11 +118,11 @@ class Walk:
         """Footer, magic and summary: trusted if the checksum holds, else the walk goes to the end
         of the file.
         """
-        tail = self._read(max(0, self._size - _CLOSING), _CLOSING)
+        tail = self._read(max(0, self.size - _CLOSING), _CLOSING)
         if len(tail) < _CLOSING or not tail.endswith(MAGIC):
             return
         opcode, length, start, _, crc = _FOOTER.unpack(tail[: _FOOTER.size])
-        end = self._size - _CLOSING
+        end = self.size - _CLOSING
         if (
             opcode != Opcode.FOOTER
             or length != 20
@@ -158,8 +165,8 @@ class Walk:
         if opcode in _LOOSE:
             return self._loose_run(position)
         if opcode == Opcode.CHUNK:
-            self._chunk(start, length)
-        elif opcode == Opcode.MESSAGE_INDEX:
+            return self._chunk(start, length)
+        if opcode == Opcode.MESSAGE_INDEX:
             self._message_index(position, start, length)
         elif opcode == Opcode.METADATA:
             self._metadata(start, length)
@@ -173,8 +180,27 @@ class Walk:
             raise Damaged(f"no record of MCAP's data section has opcode 0x{opcode:02x}")
         return start + length
 
-    def _chunk(self, start: int, length: int) -> None:
-        self._found(self._chunk_head(start, length))
+    def _chunk(self, start: int, length: int) -> int:
+        """The position after a chunk and the message indexes that lie in the window with it."""
+        block, end = self._chunk_head(start, length), start + length
+        after = self._indexes(end)
+        self._found(replace(block, index=(end, after)) if after > end else block)
+        return after
+
+    def _indexes(self, position: int) -> int:
+        """The end of the message indexes from `position` on; `_message_index` takes the others."""
+        self._read(position, _INDEX.size)
+        at = position - self._window_start
+        while 0 <= at <= len(self._window) - _INDEX.size:
+            opcode, length, _, entries = _INDEX.unpack_from(self._window, at)
+            after = at + RECORD_HEAD.size + length
+            if opcode != Opcode.MESSAGE_INDEX or entries + 6 != length:
+                break
+            if self._window_start + after > self._limit:
+                break
+            self._idle += 1
+            at = after
+        return self._window_start + at
 
     def _chunk_head(self, start: int, length: int) -> Block:
         fields = Texts(self._read(start, min(length, 64)))

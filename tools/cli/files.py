@@ -7,11 +7,13 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording, read
+from gritd.estimator.recording.tables import NOTHING, Fields
 from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
 
 WRONG_NAME = (
@@ -25,12 +27,12 @@ WRONG_NAME = (
 )
 
 
-def recording(path: Path) -> Recording:
-    """A recording to read. Raises CommandError, 2 where there is no such file, 3 where it is no
-    recording.
+def recording(path: Path, tables: Mapping[str, Fields] = NOTHING) -> Recording:
+    """A recording to read, and what will be asked of it (see `salvage.read`). Raises CommandError,
+    2 where there is no such file, 3 where it is no recording.
     """
     try:
-        return read(path)
+        return read(path, tables=tables)
     except RecordingError as error:
         raise unread(path, error) from None
 

@@ -17,11 +17,13 @@ from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.offline.batch import replayed
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.offline.playback import Checkpoint
+from gritd.estimator.offline.snapshots import STREAMS
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.recording.tables import NOTHING
 from gritd.estimator.recording.topics import CHECKPOINT, TOPICS, messages_of
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
@@ -66,7 +68,7 @@ def main(argv: Sequence[str]) -> int:
 
 def _carried(paths: Sequence[Path], arguments: Namespace) -> int:
     """Every run begun with what the runs before it know, as the daemon does on one bed."""
-    recordings = [files.recording(path) for path in paths]
+    recordings = [files.recording(path, STREAMS) for path in paths]
     configurations = [_configuration(recording, arguments) for recording in recordings]
     given = [run_settings(r, c, r) for r, c in zip(recordings, configurations, strict=True)]
     check_same_rig(given, recordings)
@@ -86,7 +88,9 @@ def _carried(paths: Sequence[Path], arguments: Namespace) -> int:
 
 
 def _replay(path: Path, arguments: Namespace) -> int:
-    recordings = [files.recording(part) for part in parts(path)]
+    each = arguments.verify or arguments.output  # tick by tick, not from tables
+    tables = NOTHING if each else STREAMS
+    recordings = [files.recording(part, tables) for part in parts(path)]
 
     for recording in recordings:
         for line in recording.damage or (

@@ -51,7 +51,9 @@ def test_both_engines_give_one_update_to_1e_9_of_sigma(components, consider_k, n
         joint = np.outer(sigma, scale)
         near = {"rtol": 1e-9, "atol": 1e-9}
         np.testing.assert_allclose(plain.x / sigma, filterpy.x / sigma, **near)
-        left, right = (np.hstack((e.P, np.reshape(e.cross, (STATES, -1)))) for e in (plain, filterpy))
+        left, right = (
+            np.hstack((e.P, np.reshape(e.cross, (STATES, -1)))) for e in (plain, filterpy)
+        )
         np.testing.assert_allclose(left / joint, right / joint, **near)
 
 

@@ -1,0 +1,196 @@
+"""Neighbouring blocks of a recording read as one: what a call costs is paid once for thousands of
+messages.
+
+A pile is opened only where all of it is as it should be: every block unpacks and its checksum
+holds, the message index names messages that lie end to end, each of them fits its fields. Where
+anything is not so the pile stays closed, and its blocks are read one by one, which tells what is
+wrong and keeps the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+
+from gritd.estimator.limits import limits
+from gritd.estimator.recording.blocks import Block, Unpacker
+from gritd.estimator.recording.cdr import Rows
+from gritd.estimator.recording.decoding import CDR_LE, PADDING, Chunk, Source, sound
+from gritd.estimator.recording.mcapfile import (
+    MESSAGE_DTYPE,
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    Starts,
+    gather,
+)
+
+ROOM = 1 << 20  # [bytes] of a pile, unpacked
+REACH = 4 << 20  # [bytes] of the file that it may lie in
+_HEAD = np.dtype(  # of a message, with the first two bytes of its CDR
+    {
+        "names": [*(MESSAGE_DTYPE.names or ()), "kind"],
+        "formats": [*(MESSAGE_DTYPE[name] for name in MESSAGE_DTYPE.names or ()), "<u2"],
+        "offsets": [0, 1, 9, 11, 15, 23, MESSAGE_HEAD.size],
+        "itemsize": MESSAGE_HEAD.size + 2,
+    }
+)
+_INDEX_HEAD = 15  # [bytes] of a message index before its entries
+_ENTRY = 16  # [bytes] log_time and offset
+
+Ranges = dict[int, tuple[int, int, int]]  # channel -> first number, last number, messages
+
+
+class Pile(NamedTuple):
+    """The messages of some blocks."""
+
+    chunk: Chunk  # of all of them
+    cuts: Starts  # (blocks + 1,) the number of the first message of each block, and how many
+    preambles: tuple[bytes, ...]  # (blocks) what stands before the messages of each
+
+    def parts(self) -> list[Chunk]:
+        """The messages block by block."""
+        if len(self.cuts) == 2:
+            return [self.chunk]
+        edges = self.cuts.tolist()
+        content, starts, heads = self.chunk.content, self.chunk.starts, self.chunk.heads
+        return [Chunk(content, starts[a:b], heads[a:b]) for a, b in pairwise(edges)]
+
+    def ranges(self) -> list[Ranges]:
+        """The messages' numbers in each block, channel by channel."""
+        numbers, groups = self.chunk.heads["sequence"], self.chunk.groups
+        if len(self.cuts) == 2:
+            ends = {c: (int(numbers[own[0]]), int(numbers[own[-1]])) for c, own in groups.items()}
+            return [{c: (*ends[c], len(own)) for c, own in groups.items()}]
+
+        found: list[Ranges] = [{} for _ in range(len(self.cuts) - 1)]
+        block = np.repeat(np.arange(len(found)), np.diff(self.cuts))
+        for channel, own in groups.items():
+            last = np.append(np.flatnonzero(np.diff(block[own])), len(own) - 1)
+            first = np.append(0, last[:-1] + 1)
+            columns = (block[own[last]], numbers[own[first]], numbers[own[last]], last - first + 1)
+            for at, begin, end, count in zip(*(c.tolist() for c in columns), strict=True):
+                found[at][channel] = begin, end, count
+
+        return found
+
+
+def alone(chunk: Chunk) -> Pile:
+    """A pile of one block."""
+    return Pile(chunk, np.array([0, len(chunk.starts)]), ())
+
+
+def opened(file: BinaryIO, blocks: Sequence[Block], sources: Mapping[int, Source]) -> Pile | None:
+    """The messages of neighbouring blocks; None where anything about one of them is not as it
+    should be, or its writer left no message index.
+    """
+    contents, indexes = _unpacked(file, blocks)
+    if len(contents) < len(blocks) or not indexes:
+        return None
+
+    content = contents[0] if len(contents) == 1 else b"".join(contents)
+    ends = np.cumsum([len(each) for each in contents])
+    bases = ends - [len(each) for each in contents]
+    starts = _starts(indexes, bases, len(content))
+    if starts is None:
+        return None
+
+    cuts = np.append(np.searchsorted(starts, bases), len(starts))
+    if np.any(cuts[:-1] >= cuts[1:]):  # a block without messages
+        return None
+    heads = gather(content, starts, _HEAD)
+    if not _tiled(starts, heads, cuts, ends):
+        return None
+
+    chunk = Chunk(content, starts, heads)
+    if not _sound(chunk, sources):
+        return None
+
+    begins = (starts[cuts[:-1]] - bases).tolist()
+    return Pile(chunk, cuts, tuple(c[:b] for c, b in zip(contents, begins, strict=True)))
+
+
+def _sound(chunk: Chunk, sources: Mapping[int, Source]) -> bool:
+    """Whether every message is of a known channel and fits its fields: `decoding.sound` of all
+    channels at once.
+    """
+    if not sources.keys() >= chunk.groups.keys():
+        return False
+
+    size = np.full(max(chunk.groups) + 1, -1)  # of a channel's messages; -1: of no fixed size
+    for channel, own in chunk.groups.items():
+        codec = sources[channel].codec
+        if codec is not None and codec.flat:
+            size[channel] = codec.size
+        elif not np.all(sound(chunk, own, sources[channel])):
+            return False
+
+    expected = size[chunk.heads["channel"]]
+    excess = chunk.heads["length"].astype(np.int64) - (MESSAGE_HEAD.size - RECORD_HEAD.size)
+    excess -= expected
+    fits = (excess >= 0) & (excess <= PADDING) & (chunk.heads["kind"] == CDR_LE)
+    return bool(np.all(fits | (expected < 0)))
+
+
+def _unpacked(
+    file: BinaryIO, blocks: Sequence[Block]
+) -> tuple[list[bytes], list[tuple[int, memoryview]]]:
+    """The blocks' records, as far as they unpack; and (number of the block, entries) of every
+    message index, none where one cannot be read.
+    """
+    origin = blocks[0].start
+    reach = max(max(b.start + b.stored, b.index[1]) for b in blocks) - origin
+    if reach > 2 * max(int(limits().chunk), REACH):
+        return [], []
+    file.seek(origin)
+    packed = memoryview(file.read(reach))
+
+    unpacker, contents = Unpacker(), list[bytes]()
+    indexes: list[tuple[int, memoryview]] = []
+    for number, block in enumerate(blocks):
+        start = block.start - origin
+        content = unpacker.whole(block, packed[start : start + block.stored])
+        first, end = (place - origin for place in block.index)
+        if content is None or not 0 < first < end <= len(packed):
+            break
+        contents.append(content)
+        while first < end:
+            after = first + RECORD_HEAD.size + RECORD_HEAD.unpack_from(packed, first)[1]
+            if after > end:
+                return contents, []
+            indexes.append((number, packed[first + _INDEX_HEAD : after]))
+            first = after
+
+    return contents, indexes
+
+
+def _starts(indexes: Sequence[tuple[int, memoryview]], bases: Starts, size: int) -> Starts | None:
+    """Where messages begin in the joined blocks (n,), ascending, as the message indexes say; None
+    where one points outside.
+    """
+    entries = b"".join(index for _, index in indexes)
+    if not entries or len(entries) % _ENTRY:
+        return None
+
+    offsets = np.frombuffer(entries, "<i8")[1::2]
+    counts = [len(index) // _ENTRY for _, index in indexes]
+    starts = offsets + np.repeat(bases[[number for number, _ in indexes]], counts)
+    starts.sort()
+    return starts if starts[0] >= 0 and starts[-1] <= size - _HEAD.itemsize else None
+
+
+def _tiled(starts: Starts, heads: Rows, cuts: Starts, ends: Starts) -> bool:
+    """Whether messages, and nothing else, lie end to end from the first of each block to its
+    end.
+    """
+    following = np.append(starts[1:], ends[-1])
+    following[cuts[1:] - 1] = ends
+    lengths = heads["length"].astype(np.int64)
+    return bool(
+        np.array_equal(starts + lengths + RECORD_HEAD.size, following)
+        and np.all(heads["opcode"] == Opcode.MESSAGE)
+        and lengths.min() >= MESSAGE_HEAD.size - RECORD_HEAD.size
+    )

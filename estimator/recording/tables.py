@@ -1,0 +1,230 @@
+"""Topics as structured arrays, all of them filled in one pass over the file.
+
+What stands alike in a message and in a row of a table is copied as one piece, fields and all, so
+that a message of sixty fields costs hardly more than one of two.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from gritd.estimator.recording.cdr import BILLION, TIME, Rows, Topic
+from gritd.estimator.recording.decoding import Chunk, Source
+from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, Starts, gather
+
+Fields = tuple[str, ...] | None  # of a topic; None for all of them
+NOTHING: Mapping[str, Fields] = MappingProxyType({})
+KEYS = [("log_time", "<i8"), ("order", "<i8")]  # what a row begins with
+
+
+class _Piece(NamedTuple):
+    """Bytes of a record that become bytes of a row."""
+
+    kind: str  # format in the record
+    offset: int
+    row_kind: str
+    row_offset: int
+
+
+class _Copy(NamedTuple):
+    """How the messages of one source become rows."""
+
+    low: int  # the first byte of a record that is looked at
+    record: np.dtype[np.void]
+    row: np.dtype[np.void]
+    pieces: tuple[str, ...]  # fields of both
+    times: tuple[tuple[str, str, str], ...]  # field of the row; seconds and nanoseconds in `record`
+
+    def into(self, rows: Rows, chunk: Chunk, own: Starts) -> None:
+        """Decode the messages numbered `own`, shape (n,), into n rows that lie side by side."""
+        records = gather(chunk.content, chunk.starts[own] + self.low, self.record)
+        target = rows.view(self.row)
+        for name in self.pieces:
+            target[name] = records[name]
+        for name, seconds, rest in self.times:
+            rows[name] = records[seconds].astype(np.int64) * BILLION + records[rest]
+
+
+class Table:
+    """The rows of one topic. They are allocated once where the file says how many there are; what
+    it says in vain is given back, and where it says too little the rows grow without being copied.
+    """
+
+    def __init__(self, topic: Topic, fields: Fields, expected: int = 0) -> None:
+        chosen = topic.names if fields is None else fields
+        kinds = dict(topic.codec.table_dtype)
+        self.dtype = np.dtype([*KEYS, *((name, kinds[name]) for name in chosen)])
+        self._names, self._whole = chosen, fields is None
+        self._copies: dict[int, _Copy] = {}
+        self._used = 0
+        try:
+            self._rows = np.empty(expected, self.dtype)
+        except MemoryError:  # so many there may never be
+            self._rows = np.empty(0, self.dtype)
+
+    def fits(self, source: Source) -> bool:
+        """Whether messages of a source hold the fields of the table, and if all are asked for, no
+        others.
+        """
+        if source.codec is None or (self._whole and source.topic.names != self._names):
+            return False
+        return set(self._names) <= set(source.codec.names)
+
+    def add(
+        self, chunk: Chunk, sources: Mapping[int, Source], channels: list[int], before: int
+    ) -> None:
+        """The messages of these channels, all of the table's topic; `before` are in the file before
+        the chunk.
+        """
+        groups = [chunk.groups[channel] for channel in channels]
+        own = groups[0] if len(groups) == 1 else np.sort(np.concatenate(groups))
+        rows = self._room(len(own))
+        rows["log_time"] = chunk.heads["log_time"][own]
+        rows["order"] = own + before
+
+        for channel, group in zip(channels, groups, strict=True):
+            copy = self._copy(channel, sources[channel])
+            if len(groups) == 1:
+                copy.into(rows, chunk, own)
+                continue
+            places = np.searchsorted(own, group)
+            some = rows[places]
+            copy.into(some, chunk, group)
+            rows[places] = some
+
+    def done(self) -> Rows:
+        """All rows, shape (n,), which nobody may change: several may ask for them."""
+        if self._used < len(self._rows):
+            self._rows.resize(self._used, refcheck=False)
+        self._rows.flags.writeable = False
+        return self._rows
+
+    def _room(self, count: int) -> Rows:
+        """The next rows to be filled."""
+        start, self._used = self._used, self._used + count
+        if self._used > len(self._rows):
+            # in place: no view of the rows outlives `add`
+            self._rows.resize(self._used + self._used // 8, refcheck=False)
+        return self._rows[start : self._used]
+
+    def _copy(self, channel: int, source: Source) -> _Copy:
+        if channel not in self._copies:
+            self._copies[channel] = self._copy_of(source)
+        return self._copies[channel]
+
+    def _copy_of(self, source: Source) -> _Copy:
+        """By the places of the fields in the messages of a source, neighbours joined."""
+        assert source.codec is not None
+        record, pieces = source.codec.record_dtype(MESSAGE_HEAD.size), list[_Piece]()
+        split = []
+        for name in self._names:
+            if source.codec.kinds[source.codec.names.index(name)] == TIME:
+                split.append(name)
+            else:
+                _join(pieces, _piece(name, record, self.dtype))
+
+        kinds = [piece.kind for piece in pieces]
+        offsets = [piece.offset for piece in pieces]
+        times = [(name, f"{name}.sec", f"{name}.nanosec") for name in split]
+        for part in (part for _, *both in times for part in both):
+            kinds.append(_kind(record, part))
+            offsets.append(_offset(record, part))
+
+        names = [str(number) for number in range(len(pieces))]
+        low = min(offsets)
+        parts = [part for _, *both in times for part in both]
+        return _Copy(
+            low,
+            _dtype([*names, *parts], kinds, [o - low for o in offsets], None),
+            _dtype(names, [p.row_kind for p in pieces], [p.row_offset for p in pieces], self.dtype),
+            tuple(names),
+            tuple(times),
+        )
+
+
+class Tables:
+    """Those that are asked for, by topic. A topic whose messages have no fixed size is left out."""
+
+    def __init__(self, wanted: Mapping[str, Fields]) -> None:
+        self.wanted = wanted
+        self.expected = Counter[str]()  # how many messages of each topic there should be
+        self.refused = set[str]()  # topics of which a channel lacks a field
+        self._tables: dict[str, Table] = {}
+
+    def add(self, chunk: Chunk, sources: Mapping[int, Source], before: int) -> None:
+        """The messages of a chunk that `before` messages of the file stand before."""
+        if not self.wanted:
+            return
+        channels: dict[str, list[int]] = {}
+        for channel in chunk.groups:
+            source = sources[channel]
+            if source.topic.name in self.wanted and source.codec and source.topic.codec.flat:
+                channels.setdefault(source.topic.name, []).append(channel)
+
+        for name, own in channels.items():
+            if name in self.refused:
+                continue
+            table = self._tables.get(name) or self._begun(name, sources[own[0]].topic)
+            if table and all(table.fits(sources[channel]) for channel in own):
+                table.add(chunk, sources, own, before)
+            else:
+                self.refused.add(name)
+                self._tables.pop(name, None)
+
+    def _begun(self, name: str, topic: Topic) -> Table | None:
+        """A table for a topic; None where it lacks a field that is asked for."""
+        fields = self.wanted[name]
+        if not set(fields or ()) <= set(topic.names):
+            return None
+        self._tables[name] = Table(topic, fields, self.expected[name])
+        return self._tables[name]
+
+    def done(self) -> dict[tuple[str, Fields], Rows]:
+        """The rows by topic and fields."""
+        return {(name, self.wanted[name]): table.done() for name, table in self._tables.items()}
+
+
+def _piece(name: str, record: np.dtype[np.void], row: np.dtype[np.void]) -> _Piece:
+    return _Piece(_kind(record, name), _offset(record, name), _kind(row, name), _offset(row, name))
+
+
+def _join(pieces: list[_Piece], piece: _Piece) -> None:
+    """Add a piece; one that goes on where the last one ends, in record and row, makes it longer."""
+    size = np.dtype(piece.kind).itemsize
+    if piece.kind != piece.row_kind:
+        pieces.append(piece)
+        return
+
+    piece = piece._replace(kind=f"V{size}", row_kind=f"V{size}")
+    if pieces and pieces[-1].kind == pieces[-1].row_kind:
+        last = pieces[-1]
+        length = np.dtype(last.kind).itemsize
+        if (last.offset + length, last.row_offset + length) == (piece.offset, piece.row_offset):
+            kind = f"V{length + size}"
+            pieces[-1] = last._replace(kind=kind, row_kind=kind)
+            return
+    pieces.append(piece)
+
+
+def _kind(dtype: np.dtype[np.void], name: str) -> str:
+    assert dtype.fields is not None
+    return dtype.fields[name][0].str
+
+
+def _offset(dtype: np.dtype[np.void], name: str) -> int:
+    assert dtype.fields is not None
+    return dtype.fields[name][1]
+
+
+def _dtype(
+    names: list[str], kinds: list[str], offsets: list[int], like: np.dtype[np.void] | None
+) -> np.dtype[np.void]:
+    """Fields at some offsets; as long as another dtype, or as its fields."""
+    ends = [o + np.dtype(k).itemsize for o, k in zip(offsets, kinds, strict=True)]
+    size = like.itemsize if like is not None else max(ends, default=0)
+    return np.dtype({"names": names, "formats": kinds, "offsets": offsets, "itemsize": size})

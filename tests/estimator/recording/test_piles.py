@@ -1,0 +1,215 @@
+"""Chunks checked a pile at a time: what is read, and what is said, is what chunk by chunk gives."""
+
+from __future__ import annotations
+
+import random
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.records import Channel, Schema
+
+from gritd.estimator.limits import limits
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording import piles, salvage
+from gritd.estimator.recording.cdr import Topic
+from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, McapFile, RecordingError
+from gritd.estimator.recording.recording import Recording
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.topics import RAW_TOPICS, TICK_TOPIC
+from tests.estimator.recording.samples import MIXED, T0, reading_of, write_foreign, write_sample
+
+WANTED = {topic.name: None for topic in RAW_TOPICS} | {"/mixed": None}
+
+
+def everything(path: Path) -> object:
+    """All that a reader says and gives."""
+    recording = read(path, tables=WANTED)
+    said = {
+        name: value
+        for name, value in vars(recording).items()
+        if name not in ("sources", "_piles", "_kept", "_tables")
+    }
+    tables = {
+        name: (rows.dtype.names, rows.tolist())
+        for name, rows in recording.tables(known(recording)).items()
+    }
+    chunks = [chunk.records()[0] for chunk in recording.chunks()]
+    return repr((said, list(recording.messages()), tables)), b"".join(chunks)
+
+
+def known(recording: Recording) -> dict[str, None]:
+    return {topic: None for topic in WANTED if topic in recording.topics}
+
+
+def damaged(data: bytes, rng: random.Random) -> bytes:
+    """A file with something wrong with it: bits, a cut, a part missing, twice or elsewhere."""
+    kind, at = rng.randrange(5), rng.randrange(8, len(data))
+    length = rng.randrange(1, 3000)
+    if kind == 0:
+        flipped = bytearray(data)
+        for _ in range(rng.randrange(1, 4)):
+            flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        return bytes(flipped)
+    if kind == 1:
+        return data[:at]
+    if kind == 2:
+        return data[:at] + data[at + length :]
+    if kind == 3:
+        return data[: at + length] + data[at:]
+    return data[:at] + bytes(length) + data[at + length :]
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+@pytest.mark.parametrize("seed", range(12))
+def test_damage_is_found_and_said_as_chunk_by_chunk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int, compression: str
+) -> None:
+    rng, path = random.Random(seed), tmp_path / "a.mcap"
+    write_sample(path, 60, close=seed % 3 > 0, compression=compression, every=4)
+    whole, found = path.read_bytes(), []
+
+    for number in range(6):
+        path.write_bytes(damaged(whole, rng) if number else whole)
+        together = everything(path)
+        with monkeypatch.context() as patched:
+            patched.setattr(salvage, "opened", lambda *_: None)
+            assert everything(path) == together
+        found.append(together)
+    assert len({repr(each) for each in found}) > 3
+
+
+def test_an_intact_recording_is_read_in_piles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    singly = []
+    one = salvage._Check._block
+    monkeypatch.setattr(salvage._Check, "_block", lambda *given: singly.append(1) or one(*given))
+    write_sample(tmp_path / "a.mcap", 200, every=4)
+    assert read(tmp_path / "a.mcap").complete
+    assert len(singly) == 1, "the first chunk alone tells what is new"
+
+
+def test_other_writers_files_are_read_in_piles_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_foreign(tmp_path / "a.mcap", 3000, chunk_size=4000)
+    together = everything(tmp_path / "a.mcap")
+    monkeypatch.setattr(salvage, "opened", lambda *_: None)
+    assert everything(tmp_path / "a.mcap") == together
+
+
+def test_tables_of_some_fields_and_in_the_pass_of_reading_are_the_arrays(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    write_sample(path, 50)
+    some = {"/mixed": ("e", "stamp"), "/raw/wrench": None, "/raw/motor_shunt": ("volts",)}
+    early, late = read(path, tables=some).tables(some), read(path).tables(some)
+    whole = read(path)
+
+    for topic, fields in some.items():
+        rows = whole.arrays(topic)
+        names = ["log_time", "order", *(fields or rows.dtype.names[2:])]
+        assert early[topic].dtype.names == late[topic].dtype.names == tuple(names)
+        for name in names:
+            assert np.array_equal(early[topic][name], rows[name])
+            assert np.array_equal(late[topic][name], rows[name])
+    assert not early["/mixed"].flags.writeable and late["/mixed"].flags.writeable
+
+
+def write_two_channels(path: Path) -> None:
+    """One topic by two channels in turn, as after a restart; one has a field more."""
+    wide = Topic("/mixed", MIXED.schema_name, MIXED.fields[:3])
+    narrow = Topic("/mixed", "gritd_msgs/msg/Narrow", MIXED.fields[:2])
+    file, records, starts = McapFile(path, library="another"), bytearray(), []
+    for number, topic in enumerate((wide, narrow), start=1):
+        schema = Schema(
+            id=number, name=topic.schema_name, encoding="ros2msg", data=topic.schema.encode()
+        )
+        file.define(schema, Channel(number, "/mixed", "cdr", {}, number))
+    with file.beginning():
+        pass
+    for i in range(200):
+        topic, channel = (wide, 1) if i % 3 else (narrow, 2)
+        body = topic.codec.encode((T0 + i, i, 0.5 * i)[: len(topic.names)])
+        starts.append(len(records))
+        records += MESSAGE_HEAD.pack(5, 22 + len(body), channel, 0, T0 + i, T0 + i) + body
+    file.add_chunk(records, starts)
+    file.close()
+
+
+def test_two_channels_of_one_topic_are_one_table_in_file_order(tmp_path: Path) -> None:
+    write_two_channels(tmp_path / "a.mcap")
+    wanted = {"/mixed": ("stamp", "a")}
+    for recording in (read(tmp_path / "a.mcap", tables=wanted), read(tmp_path / "a.mcap")):
+        rows = recording.tables(wanted)["/mixed"]
+        assert rows["order"].tolist() == list(range(200))
+        assert rows["a"].tolist() == list(range(200))
+        assert rows["stamp"].tolist() == [T0 + i for i in range(200)]
+
+
+def test_a_channel_without_a_field_of_its_topic_is_one_line(tmp_path: Path) -> None:
+    """No value stands in for what is not there."""
+    write_two_channels(tmp_path / "a.mcap")
+    for wanted, words in (
+        ({"/mixed": ("stamp", "b")}, "stamp, b"),
+        ({"/mixed": None}, "the same fields"),
+    ):
+        recording = read(tmp_path / "a.mcap", tables=wanted)
+        with pytest.raises(RecordingError, match=f"/mixed: not all of its messages have {words}"):
+            recording.tables(wanted)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_tables_take_little_more_memory_than_they_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, closed: bool
+) -> None:
+    monkeypatch.setattr(salvage, "ROOM", 1 << 16)
+    path, tick = tmp_path / "a.mcap", tuple(0 for _ in TICK_TOPIC.names)
+    writer = RunWriter(path, [TICK_TOPIC], "", RunInfo(), chunk_size=1 << 15)
+    for i in range(12_000):
+        writer.message("/tick", T0 + i, tick)
+        writer.reading(reading_of("wrench", i))
+    writer.flush()
+    if closed:
+        writer.close()
+
+    wanted = {"/tick": None, "/raw/wrench": None}
+    tracemalloc.start()
+    try:
+        tables = read(path, tables=wanted).tables(wanted)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    size = sum(rows.nbytes for rows in tables.values())
+    assert [len(rows) for rows in tables.values()] == [12_000, 12_000]
+    assert peak < 1.3 * size
+
+
+def test_an_index_that_counts_too_many_costs_no_more_than_the_file_can_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(
+        salvage, "_channel_counts", lambda statistics: dict.fromkeys(range(9), 2**40)
+    )
+    room = salvage.Tables.add
+    monkeypatch.setattr(
+        salvage.Tables, "add",
+        lambda self, *given: asked.append(dict(self.expected)) or room(self, *given),
+    )  # fmt: skip
+    path = tmp_path / "a.mcap"
+    write_sample(path)
+    recording = read(path, tables=WANTED)
+    most = limits().start + limits().ratio * path.stat().st_size
+    assert 0 < max(asked[0].values()) * MESSAGE_HEAD.size <= most
+    assert len(recording.tables(WANTED)["/raw/wrench"]) == 40 and recording.lost
+
+
+def test_a_pile_reaches_no_further_than_it_may(tmp_path: Path) -> None:
+    write_sample(tmp_path / "a.mcap", 400, every=2)
+    recording = read(tmp_path / "a.mcap")
+    for blocks in recording._piles:
+        assert len(blocks) == 1 or sum(block.size for block in blocks) <= piles.ROOM
+    assert len(list(recording.chunks())) == 200

@@ -144,7 +144,7 @@ class _Check:
 
         recording.closed, recording.attachments = contents.closed, contents.attachments
         _take_metadata(recording, contents)
-        self._count_lost(expected, numbered=self._numbered)
+        self._count_lost(expected, numbered=contents.library == LIBRARY)
 
     def _pile(self, file: BinaryIO, pile: Sequence[tuple[Block, int]]) -> bool:
         """Check neighbouring blocks; False where nothing is read from one on. With each stands how

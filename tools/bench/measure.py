@@ -1,5 +1,5 @@
-"""What a tick, a replay, a force, a filter update and a message cost on this
-machine.
+"""What a tick, a replay, a force, a filter update, a message and a start cost on this machine, and
+what others take for the same.
 
 Everything is measured in one run on one seeded, simulated recording. Times are processor time, so
 that what other programs take meanwhile is not counted; they still slow the caches, so the ratios
@@ -30,9 +30,11 @@ from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
-from gritd.estimator.recording.topics import RAW_TOPICS
+from gritd.estimator.recording.topics import RAW_TOPICS, TOPICS, messages_of
 from gritd.estimator.terramechanics import linear, original, scalar
+from gritd.tools.bench import against, peers
 from gritd.tools.bench import forward as forward_bench
+from gritd.tools.bench.start import start
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
@@ -52,6 +54,7 @@ class Sizes:
     ticks: int = 5000
     repeats: int = 7
     samples: int = 2000  # forces in a batch
+    starts: int = 3  # of a process, for each engine
     simulated: float = 60.0  # [s] for the forward model
 
 
@@ -62,7 +65,8 @@ class Subject:
     sizes: Sizes
     configuration: config.Configuration
     run: Run
-    path: Path  # of its recording
+    path: Path  # of its recording, raw topics only
+    logged: Path  # the same run with what the ticks said
 
     def repeated(self, run: Callable[[], object]) -> list[float]:
         """Processor time of each repetition [s]."""
@@ -71,12 +75,15 @@ class Subject:
 
 def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
     """All figures by section, SI: times in s, speeds as multiples of real time."""
-    sections = {
+    sections: dict[str, Callable[[Subject], Figures]] = {
         "tick": tick,
         "replay": replay,
         "forces": forces,
         "update": update,
         "recording": recording,
+        "reading": lambda subject: against.reading(subject.logged, subject.sizes.repeats),
+        "writing": lambda subject: against.writing(subject.logged, subject.sizes.repeats),
+        "start": lambda subject: start(subject.sizes.starts),
         "forward_model": forward_model,
     }
 
@@ -101,8 +108,11 @@ def _subject(sizes: Sizes, folder: Path) -> Subject:
     )
     motion = motion_of(schedule, settings.wheel.radius, settings.rates.tick)
     run = simulate_run(settings, soil_of(settings), motion, (), SEED)
-    subject = Subject(sizes, configuration, run, folder / "bench.mcap")
+    subject = Subject(
+        sizes, configuration, run, folder / "bench.mcap", folder / "bench-with-ticks.mcap"
+    )
     _write(subject, subject.path)
+    _write_ticks(subject)
     return subject
 
 
@@ -110,7 +120,9 @@ def _subject(sizes: Sizes, folder: Path) -> Subject:
 
 
 def tick(subject: Subject) -> Figures:
-    """Cost of one tick of the live loop, with the heap frozen as the daemon has it."""
+    """Cost of one tick of the live loop, with the heap frozen as the daemon has it, to the worst;
+    and how often the median tick could be made in the time of a plain loop of known cost.
+    """
     settings = subject.configuration.settings
     pipeline = Pipeline(settings)
     ticks = list(recorded_ticks(read(subject.path), settings.rates.tick))[: subject.sizes.ticks]
@@ -127,8 +139,18 @@ def tick(subject: Subject) -> Figures:
     finally:
         gc.unfreeze()
 
-    middle, most = np.quantile(spent, (0.5, 0.99)).tolist()
-    return {"median": middle, "at_99_percent": most, "share_of_budget": most * settings.rates.tick}
+    middle, most, nearly = np.quantile(spent, (0.5, 0.99, 0.999)).tolist()
+    loop = statistics.median(subject.repeated(_plain_loop))
+    return {
+        "median": middle,
+        "at_99_percent": most,
+        "at_99.9_percent": nearly,
+        "worst": max(spent),
+        "share_of_budget": most * settings.rates.tick,
+        "plain_loop": loop,
+        "over_plain_loop": loop / middle,
+        "plain_loop_over_worst_ratio": loop / max(spent),
+    }
 
 
 def replay(subject: Subject) -> Figures:
@@ -205,9 +227,13 @@ def update(subject: Subject) -> Figures:
         )
 
     costs = {engine: cost(engine) for engine in ENGINES}
+    alone = peers.filterpy_alone(estimate, offered, measurement.variances)
+    alone_cost = statistics.median(subject.repeated(lambda: [alone() for _ in range(200)])) / 200
     return {
         **costs,
         "ratio": costs["filterpy"] / costs["plain"],
+        "filterpy_alone": alone_cost,
+        "over_filterpy_alone": alone_cost / costs["plain"],
         "nuisances": len(measurement.variances),
     }
 
@@ -243,6 +269,8 @@ def forward_model(subject: Subject) -> Figures:
         "balance": balance.vectorised,
         "balance_by_brentq": balance.scalar,
         "balance_ratio": balance.ratio,
+        "balance_by_brentq_on_8_nodes": balance.nodes,
+        "balance_ratio_to_8_nodes": balance.nodes / balance.vectorised,
     }
 
 
@@ -251,6 +279,29 @@ def _write(subject: Subject, path: Path) -> None:
     for reading in subject.run.readings:
         writer.reading(reading)
     writer.close()
+
+
+def _write_ticks(subject: Subject) -> None:
+    """The run as the daemon logs it."""
+    settings = subject.configuration.settings
+    pipeline = Pipeline(settings)
+    state = pipeline.start()
+    writer = RunWriter(subject.logged, TOPICS, subject.configuration.text, RunInfo())
+    for each in recorded_ticks(read(subject.path), settings.rates.tick):
+        state, record = pipeline.step(state, each.readings, each.stamp)
+        for reading in each.readings:
+            writer.reading(reading)
+        for message in messages_of(record):
+            writer.message(*message)
+    writer.close()
+
+
+def _plain_loop() -> float:
+    """Twenty thousand products and sums of floats: what this interpreter does in that time."""
+    total = 0.0
+    for number in range(20_000):
+        total += 0.5 * number
+    return total
 
 
 def _timed(run: Callable[[], object]) -> float:

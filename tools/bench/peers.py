@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
@@ -51,9 +50,12 @@ def mcap_ros2(path: Path) -> int:
 
 def pybag(path: Path) -> int:
     """The same, message by message, by pybag."""
-    reader = import_module("pybag.mcap_reader").McapFileReader.from_file(path)
-    topics = [topic for topic in reader.get_topics() if topic in WANTED]
-    return _counted(message.data for topic in topics for message in reader.messages(topic))
+    readers = import_module("pybag.mcap_reader").McapFileReader
+    with readers.from_file(path, enable_crc_check=True) as reader:
+        topics = [topic for topic in reader.get_topics() if topic in WANTED]
+        return _counted(
+            message.data for message in reader.messages(topics, in_log_time_order=False)
+        )
 
 
 READERS: dict[str, tuple[str, Reader]] = {  # name -> what it needs, reader
@@ -103,7 +105,9 @@ def write_by_rosbags(path: Path, messages: Encoded) -> None:
             writer.write(connections[name], time, data)
 
 
-def filterpy_alone(estimate: Estimate, update: Update, variances: tuple[float, ...]) -> Callable:
+def filterpy_alone(
+    estimate: Estimate, update: Update, variances: tuple[float, ...]
+) -> Callable[[], object]:
     """filterpy's ExtendedKalmanFilter on the same vectors, without considered states, as its
     documentation uses it: a filter that is there already takes one measurement.
     """
@@ -116,7 +120,7 @@ def filterpy_alone(estimate: Estimate, update: Update, variances: tuple[float, .
     y, R = np.array(update.innovation), np.array(update.R)
     start = ekf.x.copy(), ekf.P.copy()
 
-    def apply() -> Any:
+    def apply() -> object:
         ekf.x, ekf.P = start
         ekf.update(y, lambda _: H, lambda _: np.zeros_like(y), R=R)
         return ekf.x

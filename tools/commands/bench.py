@@ -1,10 +1,13 @@
-"""`gritd bench`: what a tick, a replay, a force, a filter update and a message cost here."""
+"""`gritd bench`: what a tick, a replay, a force, a filter update, a message and a start cost here,
+beside what others take for the same.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,19 +15,29 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from gritd.estimator.config.settings import ENGINES
+from gritd.tools.bench.compare import comparison, loaded, ratios
 from gritd.tools.bench.measure import Figures, Sizes, measure
-from gritd.tools.cli.command import DONE, Parser
+from gritd.tools.cli.command import DONE, FAILED, Parser
 
 
 def main(argv: Sequence[str]) -> int:
-    """Measure and print. Exit 0."""
+    """Measure and print. Exit 0; 1 where a ratio is worse by a fifth than in an earlier run."""
     parser = Parser(
         prog="gritd bench",
-        description="What everything costs on this machine; about half a minute.",
+        description="What everything costs on this machine, and what others take for the same; "
+        "one or two minutes.",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON, SI units")
 
+    parser.add_argument(
+        "--compare",
+        type=Path,
+        metavar="OLD.json",
+        help="fail where a ratio is worse by a fifth than in this output of --json",
+    )
+
     arguments = parser.parse_args(argv)
+    before = loaded(arguments.compare) if arguments.compare else {}
     with TemporaryDirectory(prefix="gritd-bench-") as folder:
         figures = measure(Sizes(), Path(folder))
 
@@ -33,7 +46,10 @@ def main(argv: Sequence[str]) -> int:
     else:
         print(report(figures))
 
-    return DONE
+    lines, failed = comparison(before, ratios(figures))
+    for line in lines:
+        print(line, file=sys.stderr if arguments.json else sys.stdout)
+    return FAILED if failed else DONE
 
 
 def machine() -> dict[str, str | int | float]:
@@ -64,13 +80,17 @@ def report(figures: dict[str, Figures]) -> str:
     """One line a figure, in units for people."""
     on, t, r, f = machine(), figures["tick"], figures["replay"], figures["forces"]
     u, m, w = figures["update"], figures["recording"], figures["forward_model"]
+    s = figures["start"]
 
     return "\n".join(
         [
             f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, "
             f"{on['system']}, Python {on['python']}, numpy {on['numpy']}",
             f"tick       {_µs(t['median'])} at 50 %, {_µs(t['at_99_percent'])} at 99 %: "
-            f"{t['share_of_budget']:.1%} of its period",
+            f"{t['share_of_budget']:.1%} of its period; {_µs(t['at_99.9_percent'])} at 99.9 %, "
+            f"worst {_µs(t['worst'])}",
+            f"           20,000 products and sums of floats take {_µs(t['plain_loop'])}, "
+            f"{t['over_plain_loop']:.1f} median ticks",
             *(
                 f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to "
                 f"estimates, best {r[f'{name}_best']:.0f}"
@@ -82,17 +102,38 @@ def report(figures: dict[str, Figures]) -> str:
             f"quadrature {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
             f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: "
-            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} nuisances)",
+            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} nuisances); filterpy without Schmidt's "
+            f"gain {_µs(u['filterpy_alone'])}: ratio {u['over_filterpy_alone']:.1f}",
             f"recording  a message: write {_µs(m['write'])}, "
             f"read as arrays {_µs(m['read_as_arrays'])}, "
             f"one by one {_µs(m['read_one_by_one'])}, {m['bytes']:.0f} bytes",
+            *_side_by_side("reading", figures["reading"]),
+            *_side_by_side("writing", figures["writing"]),
+            *(
+                f"start      {name}: {s[f'{name}_seconds']:.2f} s of processor time to the first "
+                f"tick, {s[f'{name}_memory'] / 1e6:.0f} MB"
+                for name in ENGINES
+            ),
             f"simulator  {w['speed']:.0f} times real time, "
             f"with six effects {w['speed_with_six_effects']:.0f}",
             f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature "
-            f"{_µs(w['balance_by_brentq'])}: ratio {w['balance_ratio']:.0f}",
+            f"{_µs(w['balance_by_brentq'])}: ratio {w['balance_ratio']:.0f}; on 8 nodes a zone "
+            f"{_µs(w['balance_by_brentq_on_8_nodes'])}: "
+            f"ratio {w['balance_ratio_to_8_nodes']:.0f}",
             "processor time, medians where not said otherwise",
         ]
     )
+
+
+def _side_by_side(title: str, figures: Figures) -> list[str]:
+    """A line for each program: median, span, ratio to gritd."""
+    lines = []
+    for name in (key.removesuffix("_best") for key in figures if key.endswith("_best")):
+        over = figures.get(f"over_{name}")
+        ratio = f": ratio {over:.1f}" if over else ""
+        span = f"{_µs(figures[f'{name}_best'])} to {_µs(figures[f'{name}_worst'])}"
+        lines.append(f"{title:11}{name}: a message {_µs(figures[name])} ({span}){ratio}")
+    return lines
 
 
 def _µs(seconds: float) -> str:

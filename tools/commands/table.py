@@ -63,7 +63,7 @@ COMMANDS = {
     ),
     "bench": (
         "gritd.tools.commands.bench",
-        "what a tick, a replay, a force, an update and a message cost here",
+        "what a tick, a replay, a force, an update and a message cost here, beside others",
     ),
     "completion": ("gritd.tools.commands.completion", "the shell completes commands and options"),
 }

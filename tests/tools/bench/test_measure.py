@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import pytest
 
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
 from gritd.estimator.filter.filterpy_engine import FilterpyEngine
-from gritd.tools.bench import measure
+from gritd.tools.bench import against, forward, measure, peers
+from gritd.tools.testbed.simulation import soil_of
 
-SMALL = measure.Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, simulated=3.0)
-SECTIONS = ("tick", "replay", "forces", "update", "recording", "forward_model")
+SMALL = measure.Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0)
+SECTIONS = (
+    *("tick", "replay", "forces", "update", "recording"),
+    *("reading", "writing", "start", "forward_model"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +35,35 @@ def test_ratios_and_shares_are_those_of_their_parts(figures):
     )
     assert update["ratio"] == pytest.approx(update["filterpy"] / update["plain"])
     assert tick["share_of_budget"] == pytest.approx(tick["at_99_percent"] / 0.004)
-    assert tick["median"] <= tick["at_99_percent"]
+    assert tick["median"] <= tick["at_99_percent"] <= tick["at_99.9_percent"] <= tick["worst"]
+    assert tick["over_plain_loop"] == pytest.approx(tick["plain_loop"] / tick["median"])
+    for section in (figures["reading"], figures["writing"]):
+        for name in (key.removeprefix("over_") for key in section if key.startswith("over_")):
+            assert section[f"over_{name}"] == pytest.approx(section[name] / section["gritd"])
+            assert section[f"{name}_best"] <= section[name] <= section[f"{name}_worst"]
+
+
+def test_every_reader_that_the_tests_install_is_measured(figures):
+    """Each was found to read the same messages; `reading` fails otherwise."""
+    assert {"gritd", "rosbags", "mcap_ros2_support"} <= figures["reading"].keys()
+    assert {"gritd", "mcap", "rosbags"} <= figures["writing"].keys()
+
+
+def test_a_reader_that_leaves_messages_out_is_not_measured(tmp_path, monkeypatch):
+    subject = measure._subject(SMALL, tmp_path)
+    short = ("gritd", lambda path: peers.ours(path) - 1)
+    monkeypatch.setattr(peers, "READERS", {**peers.READERS, "short": short})
+    with pytest.raises(AssertionError, match="short"):
+        against.reading(subject.logged, 1)
+
+
+def test_brentq_on_8_nodes_finds_the_same_angle():
+    settings = config.load(packaged()).settings
+    ground = soil_of(settings)
+    for slip, load in ((0.1, 40.0), (0.5, 100.0)):
+        there = forward._scalar(settings.wheel, ground, slip, load)
+        here = forward._scalar(settings.wheel, ground, slip, load, forward._by_nodes)
+        assert here == pytest.approx(there, rel=1e-5)
 
 
 def test_each_replay_runs_the_engine_it_names(tmp_path, monkeypatch):

@@ -7,6 +7,7 @@ from math import inf
 from typing import Literal
 
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.model.learnt import LearntForm
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 ENGINES = ("filterpy", "plain")  # of the filter
@@ -202,6 +203,7 @@ class Settings:
     effects: tuple[ConfiguredEffect, ...] = ()
     place: Place = Place()
     bed: BedSettings = BedSettings()
+    discrepancy: LearntForm | None = None  # what the equations miss on this rig, as it was learnt
 
 
 def settings_of_run(settings: Settings, run: RunInfo) -> Settings:

@@ -16,6 +16,7 @@ from typing import Any
 
 from gritd.estimator.config.channels import channels
 from gritd.estimator.config.devices import NAME, device
+from gritd.estimator.config.discrepancy import discrepancy
 from gritd.estimator.config.kinds import UNLIMITED, Choice, Integer, Interval, Kind, Quantity, Text
 from gritd.estimator.config.names import EXPECTED, PATTERN
 from gritd.estimator.config.nearest import did_you_mean
@@ -324,6 +325,11 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
         "logging": Key(Section(LOGGING, Logging), "the recordings", "{}"),
         "bed": Key(Section(BED, BedSettings), "runs on one bed add up to one estimate", "{}"),
         "effects": Key(Effects(effect_schema), "physics beyond the paper's, by effect name", "{}"),
+        "discrepancy": Key(
+            discrepancy(),
+            "what the equations miss on this rig, as `gritd diagnose --apply` wrote it",
+            ABSENT,
+        ),
         "run": Key(
             Section(RUN, _run), "about this run; the command line may say it instead", ABSENT
         ),

@@ -4,6 +4,7 @@ what is predicted.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import exp, isnan, sqrt
 from operator import mul
 
@@ -12,9 +13,12 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.estimate import KPA, Estimate, Matrix, Update, Vector, dot, variance
 from gritd.estimator.filter.model import Prediction, Quantity, WheelModel
 from gritd.estimator.filter.nuisance import Sensitivity, nuisances
+from gritd.estimator.filter.tuning import FORM
+from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.chain import Added, Chain, Context, Here, variants
+from gritd.estimator.wheel.form import NAME, FormHere, Three
 from gritd.estimator.wheel.sync import Snapshot
-from gritd.estimator.wheel.wheel_state import WheelState, wheel_state
+from gritd.estimator.wheel.wheel_state import WheelState, wheel_state, wheeling
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
@@ -35,7 +39,10 @@ class Measurement:
         self.variances = (
             *(nuisance.sigma**2 for nuisance in self.nuisances),
             *(1.0,) * len(self._variants),
+            *(1.0,) * directions_of(settings),
         )
+        # windows over which the rest of the discrepancy stays the same
+        self._lasting = max(FORM.lasting * settings.rates.update, 1.0)
 
     def state(
         self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns
@@ -72,6 +79,27 @@ class Measurement:
         """T, DP and resistance at the estimate, in this window's geometry."""
         return _predicted(self.model, estimate, now)
 
+    def at_slip(self, now: WheelState, slip: float) -> WheelState:
+        """The window at another slip that is held."""
+        there = now._replace(slip=now.slip._replace(value=slip))
+        form = self.chain.form
+        if form is None or now.form is None:
+            return there
+        return there._replace(form=form.at_slip(now.form, slip))
+
+    def remember(
+        self, recall: Mapping[str, Recall], elapsed: float, now: WheelState, snapshot: Snapshot
+    ) -> Mapping[str, Recall]:
+        """What effects and discrepancy remember, `elapsed` [s] later, after a window."""
+        form = self.chain.form
+        after = recall
+        if now.situation is not None:
+            after = self.chain.remember(recall, elapsed, now.situation)
+        if form is None or now.form is None:
+            return after
+        lagging = form.remember(wheeling(now, snapshot.wheel_angle), recall.get(NAME, ()))
+        return {**after, NAME: lagging}
+
     def linearise(self, now: WheelState, prediction: Prediction) -> Update:
         """Innovation, H, G and R of the components that are measured: T always, DP where there
         is a sensor.
@@ -81,14 +109,16 @@ class Measurement:
         update = Update(
             innovation=(now.torque.value - torque.value, now.drawbar_pull.value - pull.value),
             H=(_state_gradient(torque), _state_gradient(pull)),
-            G=self._nuisance_gradients(sensitivity, now.columns),
+            G=self._nuisance_gradients(sensitivity, now),
             R=self._noise(now, sensitivity),
         )
         return selected(update, (0,)) if isnan(now.drawbar_pull.value) else update
 
-    def _nuisance_gradients(self, s: Sensitivity, effects: Columns) -> Matrix:
-        """G (2, q): of the calibration, then of the effects' parameters."""
-        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *effects]
+    def _nuisance_gradients(self, s: Sensitivity, now: WheelState) -> Matrix:
+        """G (2, q): of the calibration, of the effects' parameters, then of the discrepancy."""
+        columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *now.columns]
+        if now.form is not None:
+            columns += [_felt(column, s) for column in now.form.columns]
         return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
 
     def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
@@ -99,10 +129,11 @@ class Measurement:
         by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
         torque, pull = tuple(map(mul, by_torque, sigmas)), tuple(map(mul, by_pull, sigmas))
         common = dot(torque, pull)
-        return (
+        noise = (
             (dot(torque, torque) + now.torque.sigma**2, common),
             (common, dot(pull, pull) + now.drawbar_pull.sigma**2),
         )
+        return noise if now.form is None else _plus_rest(noise, _rest(now.form, s), self._lasting)
 
     def sigmas(
         self, estimate: Estimate, now: WheelState, prediction: Prediction
@@ -110,20 +141,28 @@ class Measurement:
         """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this
         window's z, i and W.
         """
-        torque, pull = self._nuisance_gradients(_sensitivity(now, prediction), now.columns)
+        sensitivity = _sensitivity(now, prediction)
+        torque, pull = self._nuisance_gradients(sensitivity, now)
+        of_torque, of_pull = _rest(now.form, sensitivity) if now.form is not None else ((), ())
         return (
-            self._sigma(estimate, now, prediction.torque, torque),
-            self._sigma(estimate, now, prediction.drawbar_pull, pull),
+            self._sigma(estimate, now, prediction.torque, torque, of_torque),
+            self._sigma(estimate, now, prediction.drawbar_pull, pull, of_pull),
             self._sigma(estimate, now, prediction.resistance, ()),  # no sensor reads it
         )
 
     def _sigma(
-        self, estimate: Estimate, now: WheelState, quantity: Quantity, nuisance: Vector
+        self,
+        estimate: Estimate,
+        now: WheelState,
+        quantity: Quantity,
+        nuisance: Vector,
+        rest: Vector = (),
     ) -> float:
         noise = (
             quantity.by_theta_1 * now.theta_1.d_sinkage * now.sinkage.sigma,
             quantity.by_slip * now.slip.sigma,
             quantity.by_load * now.load.sigma,
+            *rest,
         )
         return sqrt(
             variance(estimate, self.variances, _state_gradient(quantity), nuisance)
@@ -206,13 +245,23 @@ def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Predic
             *(_by_estimate(quantity, estimate, here) for quantity in prediction)
         )
 
+    if now.form is not None:
+        torque, pull, _ = now.form.mean
+        prediction = prediction._replace(
+            torque=_raised(prediction.torque, torque),
+            drawbar_pull=_raised(prediction.drawbar_pull, pull),
+        )
+
     if now.added is None:
         return prediction
+    return _with_added(prediction, now.added, estimate)
 
+
+def _with_added(prediction: Prediction, added: Added, estimate: Estimate) -> Prediction:
     x = soil(estimate)
     return prediction._replace(
-        torque=_plus(prediction.torque, now.added[:4], x),
-        drawbar_pull=_plus(prediction.drawbar_pull, now.added[4:], x),
+        torque=_plus(prediction.torque, added[:4], x),
+        drawbar_pull=_plus(prediction.drawbar_pull, added[4:], x),
     )
 
 
@@ -225,6 +274,39 @@ def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
         by_tan_phi=quantity.by_tan_phi + slopes[1],
         by_ln_k=quantity.by_ln_k + slopes[2] * x[2],
     )
+
+
+def _raised(quantity: Quantity, value: float) -> Quantity:
+    return quantity._replace(value=quantity.value + value)
+
+
+def directions_of(settings: Settings) -> int:
+    """How many directions the learnt discrepancy of form is uncertain in."""
+    return 0 if settings.discrepancy is None else settings.discrepancy.directions
+
+
+def _felt(changed: Three, s: Sensitivity) -> tuple[float, float]:
+    """Change of the predicted (T, DP) with a change of δ in torque, pull and sinkage: the sinkage
+    that the equations would give is the measured one less δ.
+    """
+    torque, pull, sinkage = changed
+    return torque - s.by_sinkage[0] * sinkage, pull - s.by_sinkage[1] * sinkage
+
+
+def _rest(form: FormHere, s: Sensitivity) -> tuple[Vector, Vector]:
+    """What the rest of δ makes of predicted T and of DP: of their own, and by the sinkage."""
+    torque, pull, sinkage = form.rest
+    return (torque, s.by_sinkage[0] * sinkage), (pull, s.by_sinkage[1] * sinkage)
+
+
+def _plus_rest(noise: Matrix, rest: tuple[Vector, Vector], lasting: float) -> Matrix:
+    """R (2, 2) with the rest of δ. It is the same in so many windows, so each bears that many times
+    its variance: their mean is then off by the rest, as one window is.
+    """
+    (a, b), (_, d) = noise
+    torque, pull = rest
+    b += lasting * torque[1] * pull[1]
+    return (a + lasting * dot(torque, torque), b), (b, d + lasting * dot(pull, pull))
 
 
 def _by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity:

@@ -52,7 +52,7 @@ def search_on(measurement: Measurement, search: Search, known: Pull) -> tuple[Se
 
 def _at(measurement: Measurement, search: Search, slip: float) -> tuple[WheelState, Prediction]:
     """The window at another slip, and what is predicted there."""
-    there = search.now._replace(slip=search.now.slip._replace(value=slip))
+    there = measurement.at_slip(search.now, slip)
     return there, measurement.predict(search.estimate, there)
 
 

@@ -87,6 +87,7 @@ class Stretch(NamedTuple):
             drawbar_pull=mean(old.drawbar_pull, now.drawbar_pull),
             added=old.added and now.added and Added(*_blend(old.added, now.added, weight)),
             here=old.here and now.here and Here(*_blend(old.here, now.here, weight)),
+            form=old.form and now.form and old.form.mixed(now.form, weight),
             columns=tuple(
                 _blend(a, b, weight) for a, b in zip(old.columns, now.columns, strict=True)
             ),

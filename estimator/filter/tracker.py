@@ -23,6 +23,7 @@ from gritd.estimator.filter.estimate import (
     project,
     variance,
 )
+from gritd.estimator.filter.learnt_soil import with_learnt_soil
 from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
 from gritd.estimator.filter.segments import LONGEST, Memory
 from gritd.estimator.filter.smoother import Smoother
@@ -102,8 +103,11 @@ class Tracker:
             soil.shear_modulus.sigma / soil.shear_modulus.value,
         )
 
-        self.prior = self._unsure(
-            (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
+        self.prior = with_learnt_soil(
+            self._unsure(
+                (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
+            ),
+            settings,
         )
         self.smoother = Smoother(settings, self.measurement, self.engine, self._prior_sigma)
 
@@ -165,9 +169,7 @@ class Tracker:
         """A window has ended: remember what the next one is compared with, and what the effects
         remember.
         """
-        recall = state.recall
-        if now.situation is not None:
-            recall = self.measurement.chain.remember(recall, elapsed, now.situation)
+        recall = self.measurement.remember(state.recall, elapsed, now, snapshot)
         return state._replace(
             window_end=snapshot.evaluated,
             began=snapshot.evaluated if state.began < 0 else state.began,

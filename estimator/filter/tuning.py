@@ -81,5 +81,15 @@ class TrustTuning:
     improbable: float = 2.0
 
 
+@dataclass(frozen=True)
+class FormTuning:
+    """How the learnt discrepancy of form enters the update."""
+
+    # [s] of driving over which the rest of δ stays the same. It is the same at the same conditions,
+    # so it does not average out while they last; the longest stretches of a schedule are this long.
+    lasting: float = 10.0
+
+
 CHANGE = ChangeTuning()
+FORM = FormTuning()
 TRUST = TrustTuning()

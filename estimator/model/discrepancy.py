@@ -34,6 +34,8 @@ LAG = 0.15  # slip less the slip a while ago [-]
 LOAD_LAG = 0.3  # ln W less ln W a while ago
 TRAVELS = (0.003, 0.01, 0.03)  # [m] of rim over which "a while ago" is forgotten
 
+CARRYING = 0.2  # of the usual load: below it the wheel hardly touches soil, and δ is zero
+
 CONDITIONS = ("slip", "load", "speed", "direction", "short_lag", "lag", "long_lag", "load_lag")
 
 
@@ -96,6 +98,24 @@ class Usual:
 
     load: float  # [N]
     rim_speed: float  # [m/s]
+
+
+def weight_of(
+    load: Array,
+    speed: Array,
+    direction: Array,
+    usual: Usual,
+    signed: bool,
+    carrying: float = CARRYING,
+) -> Array:
+    """How large δ is (n,): in proportion to the load, 0 where no soil is touched.
+
+    load [N], speed of the rim [m/s], direction −1 … 1: each (n,); signed: whether the channel turns
+    with the direction; carrying: share of the usual load below which no soil is touched.
+    """
+    share = load / usual.load
+    touching = (speed > 0.0) & (share > carrying)
+    return np.asarray(np.where(touching, share * (direction if signed else np.abs(direction)), 0.0))
 
 
 def conditions_of(

@@ -19,6 +19,7 @@ import numpy as np
 from gritd.estimator.effects import in_order
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model import balance
+from gritd.estimator.model.correction import Correction
 from gritd.estimator.stages.situation import (
     ContactLaw,
     Motion,
@@ -59,6 +60,7 @@ def simulate_arrays(
     torque_constant: float = 1.0,
     theta_1: Array | None = None,
     order: int = balance.ORDER,
+    correction: Correction | None = None,
 ) -> Response:
     """The response of the testbed to a motion.
 
@@ -66,6 +68,7 @@ def simulate_arrays(
     torque_constant: as configured, torque at the axle per ampere [N·m/A].
     theta_1:         (n,) of an earlier call with nearby parameters: the balance starts there.
     order:           quadrature nodes in each zone of the contact.
+    correction:      the discrepancy of form as it was learnt; its mean is added.
     """
     effects = in_order(effects)
     wheel, situation = prepare(wheel, motion, effects)
@@ -76,7 +79,7 @@ def simulate_arrays(
     law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
     solved = _balance(wheel, soil, law, motion, situation, effects, theta_1, order)
     situation = loaded(situation, wheel, solved.theta_1, solved.forces)
-    reaction = react(situation, effects)
+    reaction = corrected_form(react(situation, effects), situation, correction)
     situation, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
@@ -142,6 +145,21 @@ def react(situation: Situation, effects: Sequence[Effect]) -> Reaction:
     )
     reaction = reduce(lambda reaction, e: e.wheel(reaction, situation), effects, reaction)
     return reduce(lambda reaction, e: e.testbed(reaction, situation), effects, reaction)
+
+
+def corrected_form(
+    reaction: Reaction, situation: Situation, correction: Correction | None
+) -> Reaction:
+    """The reaction with the mean of δ: torque, drawbar pull and sinkage, each (n,)."""
+    if correction is None:
+        return reaction
+    torque, pull, sinkage = correction.of(situation).T
+    return replace(
+        reaction,
+        torque=reaction.torque + torque,
+        drawbar_pull=reaction.drawbar_pull + pull,
+        sinkage=reaction.sinkage + sinkage,
+    )
 
 
 def drive(

@@ -121,6 +121,7 @@ def fingerprint(settings: Settings) -> str:
         settings.wrench,
         settings.filter,
         settings.effects,
+        *([settings.discrepancy] if settings.discrepancy is not None else []),
     )
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 

@@ -20,6 +20,8 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.forward import axle_torque, corrected, paper_contact, prepare, react
 from gritd.estimator.stages.situation import Motion, Recall, Sensed, Situation
 from gritd.estimator.terramechanics.soil import Scalar, Soil, Wheel
+from gritd.estimator.wheel.form import NAME as FORM
+from gritd.estimator.wheel.form import FormOnLine
 from gritd.estimator.wheel.geometry import entry_angle
 from gritd.estimator.wheel.sync import Snapshot
 
@@ -91,6 +93,8 @@ class Chain:
         self.acting = tuple(e for e in self.effects if not e.filter_only)
         self.wheel: Wheel = reduce(lambda wheel, e: e.geometry(wheel), self.effects, settings.wheel)
         self.reacts = any(_reacts(e) for e in self.acting)
+        learnt = settings.discrepancy
+        self.form = None if learnt is None else FormOnLine(learnt, self.wheel.radius)
         self._settings = settings
         soil = settings.soil
         self._exponent = soil.exponent.value
@@ -246,8 +250,11 @@ class Chain:
         }
 
     def fresh_memory(self) -> dict[str, Recall]:
-        """What the effects remember before the run."""
-        return {e.name: e.at_start for e in self.effects if type(e).remember is not Effect.remember}
+        """What effects and discrepancy remember before the run."""
+        of_effects = {
+            e.name: e.at_start for e in self.effects if type(e).remember is not Effect.remember
+        }
+        return of_effects if self.form is None else {**of_effects, FORM: ()}
 
 
 def _travel_speed(situation: Situation, slip: float) -> float:

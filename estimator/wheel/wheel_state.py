@@ -12,7 +12,9 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import REQUIRED
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
+from gritd.estimator.terramechanics.soil import Wheel
 from gritd.estimator.wheel.chain import Added, Chain, Context, Here
+from gritd.estimator.wheel.form import NAME, FormHere, FormOnLine, Wheeling
 from gritd.estimator.wheel.geometry import (
     EntryAngle,
     entry_angle,
@@ -55,6 +57,7 @@ class WheelState(NamedTuple):
     ] = ()  # change of predicted (T, DP) with each uncertain effect parameter
     situation: Situation | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
+    form: FormHere | None = None  # the learnt discrepancy of form; None where there is none
 
 
 def wheel_state(
@@ -63,7 +66,36 @@ def wheel_state(
     chain: Chain | None = None,
     context: Context | None = None,
 ) -> WheelState:
-    """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain accounted for."""
+    """Slip, θ₁, θₘ, T, W and DP of one snapshot, with the effects of a chain and the learnt
+    discrepancy accounted for.
+    """
+    now = _with_effects(settings, snapshot, chain, context)
+    if chain is None or context is None or chain.form is None or not snapshot.ready:
+        return now
+    return _with_form(now, snapshot.wheel_angle, chain.wheel, chain.form, context)
+
+
+def wheeling(now: WheelState, wheel_angle: float) -> Wheeling:
+    """What the conditions of the discrepancy are made of."""
+    return Wheeling(
+        now.slip.value, now.load.value, now.rim_speed.value, now.travel_speed.value, wheel_angle
+    )
+
+
+def _with_form(
+    now: WheelState, wheel_angle: float, wheel: Wheel, form: FormOnLine, context: Context
+) -> WheelState:
+    """The sinkage that the equations would give, and θ₁ of it: the measured one less δ's mean."""
+    here = form.at(wheeling(now, wheel_angle), context.memory.get(NAME, ()))
+    sinkage = now.sinkage._replace(value=now.sinkage.value - here.mean[2])
+    angle = entry_angle(wheel.radius, sinkage.value)
+    theta_m = max_stress_angle(wheel.c1, wheel.c2, now.slip.value, angle.value)
+    return now._replace(sinkage=sinkage, theta_1=angle, theta_m=theta_m, form=here)
+
+
+def _with_effects(
+    settings: Settings, snapshot: Snapshot, chain: Chain | None, context: Context | None
+) -> WheelState:
     if chain is None or context is None or not chain.acting or not snapshot.ready:
         return _plain(settings, snapshot)
 

@@ -71,6 +71,14 @@ def _told(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:
     """Value and σ of a constant from the mean (q,) and covariance (q, q) of all, in prior σ; of a
     bed that was prepared anew, in the new campaign.
     """
+    value, slope = linear(rig, constant, mean)
+    return Quantity(value, float(np.sqrt(slope @ spread @ slope)), constant.unit)
+
+
+def linear(rig: Rig, constant: Constant, mean: Array) -> tuple[float, Array]:
+    """Value of a constant at the mean (q,) of all in prior σ, and its slope (q,) along them; of a
+    bed that was prepared anew, in the new campaign.
+    """
     place = rig.constants.index(constant)
     u = float(mean[place])
     value, slope = constant.of(u), np.zeros(len(mean))
@@ -81,4 +89,4 @@ def _told(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:
             factor = float(np.exp(change.of(float(mean[number]))))
             value, slope = factor * value, factor * slope
             slope[number] = value * change.sigma
-    return Quantity(value, float(np.sqrt(slope @ spread @ slope)), constant.unit)
+    return value, slope

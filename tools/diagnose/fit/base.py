@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
@@ -40,7 +41,7 @@ def fit_roughly(stack: Stack) -> BaseFit:
     start = np.zeros(len(stack.rig.constants))
     noise = first_guess(stack, stack.predict(start))
 
-    problem = Problem(stack, noise, tolerance(stack, TUNING.fit.tolerance))
+    problem = Problem(stack, noise, allowed(stack))
     return BaseFit(
         problem, Model(problem.descend((), (), start, np.zeros(0), TUNING.fit.rough_rounds))
     )
@@ -82,5 +83,13 @@ def refit_beside(rough: BaseFit, noise: Noise, more: Sequence[Freedom]) -> BaseF
 
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:
     """Without freedoms, what each run does for itself allowed."""
-    allowed = tolerance(rough.problem.stack, TUNING.fit.tolerance)
-    return Problem(rough.problem.stack, noise, np.column_stack((allowed, noise.of_runs)))
+    stack = rough.problem.stack
+    return Problem(stack, noise, np.column_stack((noise.of_runs, allowed(stack))))
+
+
+def allowed(stack: Stack) -> Array:
+    """Columns (N, t) that every fit has: smooth ones, and what a learnt discrepancy of the
+    configuration leaves open, last.
+    """
+    smooth, held = tolerance(stack, TUNING.fit.tolerance), stack.rig.held
+    return smooth if held is None else np.column_stack((smooth, held.doubts(stack)))

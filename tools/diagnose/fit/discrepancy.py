@@ -41,14 +41,12 @@ def _drive_sizes() -> Sizes:
 def _columns(stack: Stack, source: FormSource) -> Array:
     """δ of one source (N, m), for a size of 1: as large as the channel itself."""
     own = np.any([stack.of(c) for c in source.channels], axis=0)
-    weight = _joined(stack, source.weight) * own
+    weight = joined(stack, source.weight) * own
     acting: Bools = weight != 0.0
     if not acting.any():
         return np.zeros((stack.size, 0))
 
-    conditions = np.column_stack(
-        [_joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
-    )
+    conditions = conditions_at(stack, source)
     shared = stack.referred
     most = TUNING.fit.form_features_shared if shared else TUNING.fit.form_features
     features = features_of(conditions[acting], most, TUNING.fit.form_left_out)
@@ -75,7 +73,14 @@ def _without_levels(columns: Array, weight: Array) -> Array:
     return np.asarray(columns - levels @ np.linalg.lstsq(levels, columns, rcond=None)[0])
 
 
-def _joined(stack: Stack, runs: list[Array] | tuple[Array, ...]) -> Array:
+def conditions_at(stack: Stack, source: FormSource) -> Array:
+    """Of every value (N, d)."""
+    return np.column_stack(
+        [joined(stack, [run[:, i] for run in source.conditions]) for i in range(source.count)]
+    )
+
+
+def joined(stack: Stack, runs: list[Array] | tuple[Array, ...]) -> Array:
     """Per run (n,) to one vector (N,)."""
     return stack.joined([dict.fromkeys(stack.rig.channels, values) for values in runs])
 

@@ -106,14 +106,15 @@ class Marginal:
         """Mean (count,) and covariance of the first unknowns, averaged over the sizes about the
         likeliest ones.
         """
-        about = tuple(max(n, f.least) for n, f in zip(chosen, self.freedoms, strict=True))
-        every = {about, *(c for n in range(len(about)) for c in self._along(about, n))}
-        least = [f.least for f in self.freedoms]
-        ordered = sorted(c for c in every if all(n >= low for n, low in zip(c, least, strict=True)))
-        values = np.array([self.log_evidence(c) for c in ordered])
-        weight = np.exp(values - logsumexp(values))
+        return self.moments(chosen, np.arange(count))
+
+    def moments(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
+        """Mean (w,) and covariance of some unknowns, averaged likewise. The weights of a freedom
+        are told times its size: 0 where it does not act.
+        """
+        ordered, weight = self._weighed(chosen)
         told = [
-            (w, *self._posterior(c, count))
+            (w, *self._posterior(c, wanted))
             for w, c in zip(weight, ordered, strict=True)
             if w > TUNING.fit.slight_size
         ]
@@ -122,8 +123,29 @@ class Marginal:
         spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in told) / total
         return np.asarray(mean), np.asarray(spread)
 
-    def _posterior(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
-        """Mean and covariance of the first unknowns for given sizes."""
+    def size_of(self, chosen: Chosen, number: int) -> float:
+        """Root mean square size of a freedom, over the sizes about the likeliest ones."""
+        ordered, weight = self._weighed(chosen)
+        values = np.array([self.freedoms[number].sizes.values[c[number]] for c in ordered])
+        return float(np.sqrt(weight @ values**2))
+
+    def place_of(self, number: int) -> Index:
+        """Which of the unknowns are the weights of a freedom."""
+        return np.arange(self._ends[1 + number], self._ends[2 + number])
+
+    def _weighed(self, chosen: Chosen) -> tuple[list[Chosen], Array]:
+        """The sizes about the likeliest ones that count for what is not known, and their
+        probabilities.
+        """
+        about = tuple(max(n, f.least) for n, f in zip(chosen, self.freedoms, strict=True))
+        every = {about, *(c for n in range(len(about)) for c in self._along(about, n))}
+        least = [f.least for f in self.freedoms]
+        ordered = sorted(c for c in every if all(n >= low for n, low in zip(c, least, strict=True)))
+        values = np.array([self.log_evidence(c) for c in ordered])
+        return ordered, np.asarray(np.exp(values - logsumexp(values)))
+
+    def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
+        """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
         scale, acting = self._scaled(chosen)
         index = np.flatnonzero(acting & ~self._held)
         products = self._products * scale[:, None] * scale
@@ -132,11 +154,13 @@ class Marginal:
         pull = products[index, -1] - prior * self._centre[index]
 
         covariance = np.linalg.inv(gram)
-        mean, spread = self._centre[:count].copy(), np.zeros((count, count))
-        own = np.flatnonzero(index < count)
-        mean[index[own]] += covariance[own] @ pull
-        spread[np.ix_(index[own], index[own])] = covariance[np.ix_(own, own)]
-        return mean, spread
+        every, shared = self._centre.copy(), np.zeros((len(self._centre), len(wanted)))
+        every[index] += covariance @ pull
+        own = np.isin(wanted, index)
+        places = np.searchsorted(index, wanted[own])
+        shared[np.ix_(index, np.flatnonzero(own))] = covariance[:, places]
+        sized = scale[wanted]
+        return every[wanted] * sized, shared[wanted] * np.outer(sized, sized)
 
     def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
         """The same sizes but for one freedom, which has each of its own; with their evidence."""

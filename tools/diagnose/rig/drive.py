@@ -29,7 +29,7 @@ from gritd.estimator.model.forward import drive
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
-from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Run, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -50,6 +50,7 @@ class DriveRig:
     channels = ("torque",)
     units: Mapping[str, str] = UNITS
     forms: tuple[FormSource, ...] = ()
+    held: Held | None = None
     smooth = (
         ("speed",),
         ("velocity",),

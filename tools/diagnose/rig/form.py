@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gritd.estimator.model.discrepancy import Usual, conditions_of
+from gritd.estimator.model.discrepancy import Usual, conditions_of, weight_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import FormSource, Run
 from gritd.tools.diagnose.tuning import TUNING
@@ -79,7 +79,5 @@ def _conditions(run: Run, usual: Usual, radius: float) -> Array:
 def _weight(run: Run, usual: Usual, signed: bool) -> Array:
     """How large δ is at each value (n,): in proportion to the load, 0 where no soil is touched."""
     known = run.covariates
-    share = known["load"] / usual.load
-    carrying = (known["speed"] > 0.0) & (share > TUNING.rig.carrying)
-    sign = np.where(known["direction"] < 0.0, -1.0, 1.0) if signed else 1.0
-    return np.asarray(np.where(carrying, share * sign, 0.0))
+    direction = np.where(known["direction"] < 0.0, -1.0, 1.0)
+    return weight_of(known["load"], known["speed"], direction, usual, signed, TUNING.rig.carrying)

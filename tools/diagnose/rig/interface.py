@@ -119,6 +119,17 @@ class FormSource:
         return int(self.conditions[0].shape[1])
 
 
+class Held(Protocol):
+    """The learnt discrepancy that a configuration holds already."""
+
+    @property
+    def means(self) -> Sequence[Mapping[str, Array]]:
+        """Per run, mean (n,) in every channel, in its unit."""
+
+    def doubts(self, stack: Stack) -> Array:
+        """Columns (N, t) of unit normal weights: what is left open of it."""
+
+
 class Rig(Protocol):
     """The adapter."""
 
@@ -158,6 +169,10 @@ class Rig(Protocol):
     @property
     def forms(self) -> tuple[FormSource, ...]:
         """Where the form of the model may be off."""
+
+    @property
+    def held(self) -> Held | None:
+        """What of it the configuration holds already, where it does."""
 
     @property
     def smooth(self) -> tuple[tuple[str, ...], ...]:

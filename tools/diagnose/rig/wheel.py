@@ -25,6 +25,7 @@ from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
+from gritd.tools.diagnose.rig.held import HeldForm
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.recorded import channels_of, filled, measured_of, motion_of
@@ -94,6 +95,7 @@ class WheelRig:
         self.baseline = configured(settings.effects)
         stated = all(w.known for w in self._weights)
         self._prepared = preparation(settings) if reference and bed == "prepared" else {}
+        self.held: HeldForm | None = None
         self.constants = (
             *wheel_constants(settings, self.channels, self._sets, stated, self.caveats),
             *(
@@ -128,6 +130,12 @@ class WheelRig:
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
         driven = [measured_of(s, "torque", self._constant) for s in signals]
+        learnt = settings.discrepancy
+        self.held = (
+            HeldForm(learnt, self.runs, self.channels, settings.wheel.radius)
+            if learnt is not None
+            else None
+        )
         self.forms = wheel_forms(
             self.runs,
             self.channels,
@@ -152,7 +160,13 @@ class WheelRig:
             for new, campaign in self._campaigns
         ]
         read = self._read(np.hstack(true), value)
-        return [dict(zip(self.channels, read[:, part], strict=True)) for part in self._parts]
+        told = [dict(zip(self.channels, read[:, part], strict=True)) for part in self._parts]
+        if self.held is None:
+            return told
+        return [
+            {channel: values + mean[channel] for channel, values in run.items()}
+            for run, mean in zip(told, self.held.means, strict=True)
+        ]
 
     def _true(
         self,

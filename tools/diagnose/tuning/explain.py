@@ -106,3 +106,18 @@ class Explain:
     runs_named: int = tuned(6, "runs", "that are all named; of more only the farthest off")
     runs_far_named: int = tuned(3, "runs", "farthest off that are named of many")
     runs_show: float = tuned(0.6, "share", "of the squares of the runs' means that changes take")
+
+    # --- learnt.py: δ as a configuration holds it ---
+    learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")
+    learnt_directions: int = tuned(8, "directions", "at most: a configuration stays readable")
+    learnt_left_out: float = tuned(
+        1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
+    )
+    learnt_ridge: float = tuned(1e-4, "-", "of the features' squares, against rounding")
+    learnt_shrunk: float = tuned(0.999, "-", "factor on correlations that are rounded", "rounding")
+    learnt_margin: float = tuned(
+        0.02, "-", "of the ends of the domain: slip, load and speed scatter about what was held"
+    )
+    learnt_outside: float = tuned(
+        0.03, "-", "σ of δ, in its size, that is new where it was not learnt", "run time"
+    )

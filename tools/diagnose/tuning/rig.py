@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gritd.estimator.model.discrepancy import CARRYING
 from gritd.tools.diagnose.tuning.field import tuned
 
 DESIGN = "order of magnitude of common instruments"
@@ -78,7 +79,9 @@ class Rig:
     )
 
     # --- form.py ---
-    carrying: float = tuned(0.2, "-", "of the usual load: below it the wheel hardly touches soil")
+    carrying: float = tuned(
+        CARRYING, "-", "of the usual load: below it the wheel hardly touches soil"
+    )
 
     # --- proposals.py ---
     proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")

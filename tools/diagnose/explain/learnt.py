@@ -1,0 +1,258 @@
+"""δ as a configuration holds it (estimator/model/learnt.py), from the posterior of a fitted model.
+
+What is written is all that the recordings show beyond the equations at the configured calibration:
+the discrepancy of form, and what the fit moved calibration constants by (a torque constant that is
+1 % off looks like a δ of 1 %). Few directions hold most of what stays uncertain of it, in all
+channels together; the rest is one number a channel. The soil that is written may be an average over
+several explanations. The mean of δ is then the one that belongs to that soil: their sum, which the
+recordings show, stays what it is.
+
+Not written: what goes with the wheel's angle, whose zero no recording keeps, and the discrepancy of
+a drive whose both sides are measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from gritd.estimator.model.correction import LEFT_OUT, root_of
+from gritd.estimator.model.discrepancy import Usual, covariance, features_of
+from gritd.estimator.model.learnt import CHANNELS, ChannelForm, Domain, LearntForm, LearntSoil
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.result import Quantity
+from gritd.tools.diagnose.explain.soil import linear
+from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.problem import Problem
+from gritd.tools.diagnose.rig.form import usual_of
+from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
+from gritd.tools.diagnose.tuning import TUNING
+
+WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
+PLACES = 4  # decimals of means; directions, points and correlations have fewer
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One channel's δ where it acts: conditions (n, d), features (n, m), and as a linear map
+    (n, w) of the unknowns, in sizes.
+    """
+
+    conditions: Array
+    features: Array
+    map: Array
+    start: Array  # (n,) what the configuration held already
+    size: float
+    usual: float  # root mean square of the channel, in its unit
+
+
+def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) -> LearntForm | None:
+    """δ of a model, for a soil that is written beside it; None for a rig or model without one."""
+    stack, marginal = problem.stack, model.marginal
+    sources = [s for s in stack.rig.forms if not s.drive]
+    usual = usual_of(stack.rig.runs)
+    if marginal is None or usual is None or not {"torque", "sinkage"} <= {s.name for s in sources}:
+        return None
+
+    unknowns = _Unknowns(stack.rig, model, sources, soil)
+    points = np.round(_points(stack, sources), 2)
+    parts = {s.name: _source(problem, model, s, points, unknowns) for s in sources}
+    return _Reduced(unknowns, parts, points).form(_domain(stack, sources), usual)
+
+
+class _Unknowns:
+    """Mean (w,) and covariance (w, w) of constants, effect parameters and weights of the forms."""
+
+    def __init__(
+        self, rig: Rig, model: Model, sources: list[FormSource], soil: Mapping[str, Quantity]
+    ) -> None:
+        marginal, fitted = model.marginal, model.fitted
+        assert marginal is not None
+        names = [f.name for f in marginal.freedoms]
+        self.numbers = {s.name: names.index(s.name) for s in sources}
+        self.places, parts, known = {}, [np.arange(len(fitted.centre))], len(fitted.centre)
+        for name, number in self.numbers.items():
+            parts.append(marginal.place_of(number))
+            self.places[name] = slice(known, known + len(parts[-1]))
+            known += len(parts[-1])
+        self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))
+
+        count = len(fitted.u)
+        told = [k for k in rig.constants if k.soil]
+        self.soil_names = [k.name for k in told]
+        at = [linear(rig, k, self.mean[:count]) for k in told]
+        self.soil = np.zeros((len(told), len(self.mean)))
+        self.soil[:, :count] = np.array([slope for _, slope in at])
+        own = self.soil @ self.spread @ self.soil.T
+        sigma = np.sqrt(np.diag(own))
+        self.among = own / np.outer(sigma, sigma)
+        # correlation, times its own σ, of every unknown with the soil
+        self.beside = self.spread @ self.soil.T / sigma
+        # as it is once the soil is the one that is written
+        written = [soil[k.name].value - value for k, (value, _) in zip(told, at, strict=True)]
+        apart = np.linalg.lstsq(self.among, np.array(written) / sigma, rcond=None)[0]
+        self.told = self.mean + self.beside @ apart
+
+
+def _points(stack: Stack, sources: list[FormSource]) -> Array:
+    every = [conditions_at(stack, s)[_acting(stack, s)] for s in sources]
+    return features_of(np.vstack(every), TUNING.explain.learnt_points, LEFT_OUT).points
+
+
+def _acting(stack: Stack, source: FormSource) -> Bools:
+    own = np.any([stack.of(c) for c in source.channels], axis=0)
+    acting: Bools = own & (joined(stack, source.weight) != 0.0)
+    return acting
+
+
+def _source(
+    problem: Problem, model: Model, source: FormSource, points: Array, unknowns: _Unknowns
+) -> _Source:
+    stack, fitted, marginal = problem.stack, model.fitted, model.marginal
+    assert marginal is not None
+    number, rows = unknowns.numbers[source.name], _acting(stack, source)
+    columns = marginal.freedoms[number].columns[rows].copy()
+    columns[:, columns.shape[1] - 2 * len(TUNING.fit.form_harmonics) :] = 0.0
+
+    whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
+    whole[:, unknowns.places[source.name]] = columns
+    calibration = [
+        i
+        for i, k in enumerate(stack.rig.constants)
+        if not k.soil and not k.changes and not k.name.endswith(WHEN)
+    ]
+    whole[:, calibration] = fitted.raw[rows][:, calibration]
+
+    values = stack.measured[stack.of(source.channels[-1]) & rows]
+    usual = float(np.sqrt(np.mean(values**2))) if source.size is None else source.size
+    size = usual * max(marginal.size_of(model.chosen, number), TUNING.fit.tolerance)
+    scale = joined(stack, source.weight)[rows] * size
+    conditions = conditions_at(stack, source)[rows]
+    root = root_of(points)
+    features = solve_triangular(root, covariance(conditions, points).T, lower=True).T
+    held = stack.rig.held
+    start = np.zeros(len(scale)) if held is None else stack.joined(held.means)[rows] / scale
+    return _Source(conditions, features, whole / scale[:, None], start, size, usual)
+
+
+class _Reduced:
+    """Weights of the features of all channels (f,): their mean, and the leading directions of their
+    covariance.
+    """
+
+    def __init__(self, unknowns: _Unknowns, parts: Mapping[str, _Source], points: Array) -> None:
+        self._unknowns, self._parts, self._points = unknowns, parts, points
+        maps = [_fit_of(part.features) for part in parts.values()]
+        self._map = np.vstack([m @ p.map for m, p in zip(maps, parts.values(), strict=True)])
+        start = np.concatenate([m @ p.start for m, p in zip(maps, parts.values(), strict=True)])
+        self.mean = self._map @ unknowns.told + start
+        spread, shared = unknowns.spread, self._map @ unknowns.beside
+
+        root = _root(list(parts.values()))
+        values, vectors = np.linalg.eigh(root @ self._map @ spread @ self._map.T @ root.T)
+        values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1]
+        left = 1.0 - np.cumsum(values) / values.sum()
+        count = int(np.sum(left > TUNING.explain.learnt_left_out)) + 1
+        count = min(count, TUNING.explain.learnt_directions, int(np.sum(values > 0.0)))
+        sigmas = np.sqrt(values[:count])
+        self.directions = np.linalg.solve(root, vectors[:, :count] * sigmas)  # (f, r)
+        self.beside = shared.T @ root.T @ vectors[:, :count] / sigmas  # (soil, r) correlations
+
+    def form(self, domain: Domain, usual: Usual) -> LearntForm:
+        """Rounded, as it is written."""
+        size = len(self._points)
+        channels: dict[str, ChannelForm | None] = dict.fromkeys(CHANNELS)
+        for number, (name, part) in enumerate(self._parts.items()):
+            place = slice(number * size, (number + 1) * size)
+            mean = np.round(self.mean[place], PLACES)
+            spread = np.round(self.directions[place].T, PLACES - 1)
+            rest = self._rest(part, mean, spread)
+            channels[name] = ChannelForm(
+                float(f"{part.size:.4g}"),
+                tuple(mean.tolist()),
+                tuple(tuple(row) for row in spread.tolist()),
+                rest,
+            )
+        torque, pull, sinkage = (channels[name] for name in CHANNELS)
+        assert torque is not None and sinkage is not None
+        return LearntForm(
+            float(f"{usual.load:.4g}"),
+            float(f"{usual.rim_speed:.4g}"),
+            domain,
+            tuple(tuple(row) for row in self._points.tolist()),
+            torque,
+            sinkage,
+            pull,
+            self._soil(),
+        )
+
+    def _rest(self, part: _Source, mean: Array, spread: Array) -> float:
+        """e: root mean square of what mean and directions leave, in sizes; at most 1."""
+        left = part.map @ self._unknowns.told + part.start - part.features @ mean
+        whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
+        kept = np.sum((part.features @ spread.T) ** 2, axis=1)
+        squares = float(np.mean(np.maximum(whole - kept, 0.0) + left**2))
+        return float(np.round(min(np.sqrt(squares), 1.0), PLACES))
+
+    def _soil(self) -> LearntSoil:
+        """Correlations, a little less than they are, so that they hold together once rounded; the
+        values are those of the file, and are put in when it is written.
+        """
+        names = self._unknowns.soil_names
+        rows = [names.index(name) for name in ("c", "tan_phi", "k")]
+        beside = np.round(TUNING.explain.learnt_shrunk * self.beside[rows], PLACES - 1)
+        among = np.round(
+            TUNING.explain.learnt_shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], PLACES - 1
+        )
+        return LearntSoil(
+            0.0,
+            1.0,
+            1.0,
+            *(tuple(row) for row in beside.tolist()),
+            (float(among[0, 1]), float(among[0, 2]), float(among[1, 2])),
+        )
+
+
+def _fit_of(features: Array) -> Array:
+    """Least squares (m, n) of features (n, m), a little ridged."""
+    gram = features.T @ features
+    gram[np.diag_indices_from(gram)] += TUNING.explain.learnt_ridge * np.trace(gram) / len(gram)
+    return np.asarray(np.linalg.solve(gram, features.T))
+
+
+def _root(parts: list[_Source]) -> Array:
+    """R (f, f), such that |R γ|² is what weights γ of the features do to the channels, each in its
+    own size, in the mean over the recordings.
+    """
+    blocks = []
+    for part in parts:
+        gram = part.features.T @ part.features / len(part.features)
+        gram[np.diag_indices_from(gram)] += TUNING.explain.learnt_ridge * np.trace(gram) / len(gram)
+        blocks.append(np.linalg.cholesky(gram).T * part.size / part.usual)
+    return np.asarray(block_diag(*blocks))
+
+
+def _domain(stack: Stack, sources: list[FormSource]) -> Domain:
+    acting = np.any([_acting(stack, s) for s in sources], axis=0)
+    slip, load, speed, direction = (
+        stack.covariate(name)[acting] for name in ("slip", "load", "speed", "direction")
+    )
+    forward, backward = bool(np.any(direction > 0.0)), bool(np.any(direction < 0.0))
+    return Domain(
+        _ends(slip, 2),
+        _ends(load, 2),
+        _ends(speed, 5),
+        "both" if forward and backward else "forward" if forward else "backward",
+    )
+
+
+def _ends(values: Array, places: int) -> tuple[float, float]:
+    """The range of values, a few hundredths wider, outwards to so many decimals."""
+    low, high = (float(np.quantile(values, q)) for q in (0.005, 0.995))
+    margin, unit = TUNING.explain.learnt_margin * max(abs(low), abs(high)), 10.0**-places
+    low, high = low - margin, high + margin
+    return round(np.floor(low / unit) * unit, places), round(np.ceil(high / unit) * unit, places)

@@ -119,7 +119,10 @@ def compare(
         settings.testbed,
         _traces(rig, _names(rig, paths), (configured, fit.u if fit else configured), sigma),
         _soil(rig, fit) if fit else None,
-        tuple(effect.name for effect in rig.baseline),
+        (
+            *(effect.name for effect in rig.baseline),
+            *(["discrepancy"] if settings.discrepancy is not None else []),
+        ),
         tuple(rig.caveats),
         _redo(paths, configuration, command),
         tuple(f"{recording.path}: {line}" for recording in recordings for line in recording.damage),

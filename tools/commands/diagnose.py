@@ -28,7 +28,7 @@ from gritd.tools.cli.workers import add_cluster, cluster_of
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain import provenance
-from gritd.tools.diagnose.explain.apply import SOIL_KNOWN, rewritten
+from gritd.tools.diagnose.explain.apply import KNOWN, rewritten
 from gritd.tools.diagnose.explain.innovations import with_innovations
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
@@ -232,9 +232,11 @@ def _apply(
 
     if backup is not None:
         print(f"{arguments.apply}: changed; as it was: {backup}", file=sys.stderr)
-    if diagnosis.soil is not None and diagnosis.verdict not in SOIL_KNOWN:
+    if diagnosis.soil is not None and diagnosis.verdict not in KNOWN:
         reason = f"since the verdict is {diagnosis.verdict}"
-        print(f"{arguments.apply}: the soil stays as it was, {reason}", file=sys.stderr)
+        print(
+            f"{arguments.apply}: soil and discrepancy stay as they were, {reason}", file=sys.stderr
+        )
 
 
 def of_files(
@@ -319,7 +321,7 @@ def _parser() -> argparse.ArgumentParser:
         "--apply",
         type=Path,
         metavar="NEW.yaml",
-        help="write the configuration with the effects and the soil that were found",
+        help="write the configuration with effects, soil and discrepancy of form as found",
     )
     parser.add_argument(
         "--in-place",

@@ -20,7 +20,7 @@ from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.sensors import readings
-from gritd.tools.testbed.simulation import Run, soil_of
+from gritd.tools.testbed.simulation import Run, correction_of, soil_of
 
 PlantKind = Literal["original", "linear"]
 
@@ -82,7 +82,14 @@ def respond(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion) ->
     if plant == "linear":
         return linear_response(settings, soil, motion)
     constant, acting = settings.drive.torque_constant.value, configured(settings.effects)
-    return simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
+    return simulate_arrays(
+        settings.wheel,
+        soil,
+        motion,
+        acting,
+        torque_constant=constant,
+        correction=correction_of(settings),
+    )
 
 
 def linear_response(settings: Settings, soil: Soil, motion: Motion) -> Response:

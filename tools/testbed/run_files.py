@@ -36,6 +36,7 @@ def write_truth(
         "wheel": asdict(settings.wheel),
         "soil": asdict(soil),
         "effects": {effect.name: asdict(effect) for effect in acting},
+        "discrepancy": settings.discrepancy and asdict(settings.discrepancy),
         "seed": seed,
         "overloaded_samples": int(run.response.overloaded.sum()),
     }

@@ -10,6 +10,7 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.messages.readings import Reading
+from gritd.estimator.model.correction import Correction
 from gritd.estimator.model.forward import Response, simulate_arrays
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Soil
@@ -30,8 +31,20 @@ def simulate_run(
 ) -> Run:
     """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
     constant = settings.drive.torque_constant.value
-    response = simulate_arrays(settings.wheel, soil, motion, acting, torque_constant=constant)
+    response = simulate_arrays(
+        settings.wheel,
+        soil,
+        motion,
+        acting,
+        torque_constant=constant,
+        correction=correction_of(settings),
+    )
     return Run(motion, response, readings(settings, motion, response, np.random.default_rng(seed)))
+
+
+def correction_of(settings: Settings) -> Correction | None:
+    """The learnt discrepancy of form, where the configuration holds one."""
+    return None if settings.discrepancy is None else Correction(settings.discrepancy)
 
 
 def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> Soil:

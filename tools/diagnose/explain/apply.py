@@ -13,6 +13,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.visible import visible
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
+from gritd.tools.diagnose.explain.apply_form import set_discrepancy
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, SoilFit
 
 HEADER = "# made by gritd diagnose: "
@@ -22,7 +23,8 @@ MODULI = {
     "bekker": (("k_c", "Pa/m^(n-1)"), ("k_phi", "Pa/m^n")),
     "reece": (("k1", "Pa"), ("k2", "Pa/m")),
 }
-SOIL_KNOWN = ("consistent", "explained")  # verdicts under which the fitted soil can be believed
+# Verdicts under which soil and discrepancy are written, together: see docs/decisions/0011
+KNOWN = ("consistent", "explained", "unlisted")
 
 
 def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
@@ -33,13 +35,15 @@ def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
 
 
 def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> str:
-    """The text of a configuration file with the accepted effects, and the fitted soil where the
-    verdict lets it be believed. Its comments stay.
+    """The text of a configuration file with the accepted effects, the fitted soil and what was
+    learnt of the discrepancy of form, where the verdict lets them be believed. Its comments stay.
     """
     document = EditedYaml(_without_header(text), configuration.source)
     _set_effects(document, diagnosis)
-    if diagnosis.soil is not None and diagnosis.verdict in SOIL_KNOWN:
+    if diagnosis.soil is not None and diagnosis.verdict in KNOWN:
         _set_soil(document, configuration.settings, diagnosis.soil)
+        if diagnosis.learnt is not None:
+            set_discrepancy(document, diagnosis.learnt, configuration.source)
     return f"{HEADER}{visible(diagnosis.summary)}\n{document.text()}"
 
 

@@ -12,6 +12,7 @@ from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.diagnose.explain.doubts import doubts
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
+from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.remainder import discrepancies, remainders
 from gritd.tools.diagnose.explain.result import (
@@ -47,13 +48,14 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
     location = _located(search, accepted, before)
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     hypotheses = _hypotheses(search, decision, folds)
+    soil = soil_of(rig, base.fitted, decision)
     return Diagnosis(
         verdict=decision.verdict,
         summary=_summary(decision, location, search.first.p, _subject(rig)),
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
-        soil=soil_of(rig, base.fitted, decision),
+        soil=soil,
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
@@ -69,6 +71,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
             Explanation(w.names, w.nameless, w.evidence, w.probability) for w in decision.weighed
         ),
         candidates=len(rig.effects),
+        learnt=learnt_form(problem, accepted, soil.after) if soil is not None else None,
         baseline=tuple(e.name for e in rig.baseline),
         traces=traces(problem, before, after),
         scatters=scatters(problem, location, before, after),

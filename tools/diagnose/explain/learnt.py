@@ -29,10 +29,11 @@ from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.form import usual_of
-from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
+from gritd.tools.diagnose.rig.interface import Bools, FormSource, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
+HELD = "held"  # by an earlier δ
 PLACES = 4  # decimals of means; directions, points and correlations have fewer
 
 
@@ -58,7 +59,7 @@ def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) ->
     if marginal is None or usual is None or not {"torque", "sinkage"} <= {s.name for s in sources}:
         return None
 
-    unknowns = _Unknowns(stack.rig, model, sources, soil)
+    unknowns = _Unknowns(problem, model, sources, soil)
     points = np.round(_points(stack, sources), 2)
     parts = {s.name: _source(problem, model, s, points, unknowns) for s in sources}
     return _Reduced(unknowns, parts, points).form(_domain(stack, sources), usual)
@@ -68,9 +69,13 @@ class _Unknowns:
     """Mean (w,) and covariance (w, w) of constants, effect parameters and weights of the forms."""
 
     def __init__(
-        self, rig: Rig, model: Model, sources: list[FormSource], soil: Mapping[str, Quantity]
+        self,
+        problem: Problem,
+        model: Model,
+        sources: list[FormSource],
+        soil: Mapping[str, Quantity],
     ) -> None:
-        marginal, fitted = model.marginal, model.fitted
+        rig, marginal, fitted = problem.stack.rig, model.marginal, model.fitted
         assert marginal is not None
         names = [f.name for f in marginal.freedoms]
         self.numbers = {s.name: names.index(s.name) for s in sources}
@@ -79,6 +84,14 @@ class _Unknowns:
             parts.append(marginal.place_of(number))
             self.places[name] = slice(known, known + len(parts[-1]))
             known += len(parts[-1])
+        # what the configuration left open of an earlier δ stands last in the tolerance
+        self.held = (
+            np.zeros((problem.stack.size, 0))
+            if rig.held is None
+            else rig.held.doubts(problem.stack)
+        )
+        parts.append(marginal.last_of_tolerance(self.held.shape[1]))
+        self.places[HELD] = slice(known, known + len(parts[-1]))
         self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))
 
         count = len(fitted.u)
@@ -120,6 +133,7 @@ def _source(
 
     whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
     whole[:, unknowns.places[source.name]] = columns
+    whole[:, unknowns.places[HELD]] = unknowns.held[rows]
     calibration = [
         i
         for i, k in enumerate(stack.rig.constants)
@@ -168,8 +182,8 @@ class _Reduced:
         channels: dict[str, ChannelForm | None] = dict.fromkeys(CHANNELS)
         for number, (name, part) in enumerate(self._parts.items()):
             place = slice(number * size, (number + 1) * size)
-            mean = np.round(self.mean[place], PLACES)
-            spread = np.round(self.directions[place].T, PLACES - 1)
+            mean = np.asarray(np.round(self.mean[place], PLACES), float)
+            spread = np.asarray(np.round(self.directions[place].T, PLACES - 1), float)
             rest = self._rest(part, mean, spread)
             channels[name] = ChannelForm(
                 float(f"{part.size:.4g}"),
@@ -196,25 +210,19 @@ class _Reduced:
         whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
         kept = np.sum((part.features @ spread.T) ** 2, axis=1)
         squares = float(np.mean(np.maximum(whole - kept, 0.0) + left**2))
-        return float(np.round(min(np.sqrt(squares), 1.0), PLACES))
+        return float(round(min(squares**0.5, 1.0), PLACES))
 
     def _soil(self) -> LearntSoil:
         """Correlations, a little less than they are, so that they hold together once rounded; the
         values are those of the file, and are put in when it is written.
         """
-        names = self._unknowns.soil_names
+        names, shrunk = self._unknowns.soil_names, TUNING.explain.learnt_shrunk
         rows = [names.index(name) for name in ("c", "tan_phi", "k")]
-        beside = np.round(TUNING.explain.learnt_shrunk * self.beside[rows], PLACES - 1)
-        among = np.round(
-            TUNING.explain.learnt_shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], PLACES - 1
-        )
-        return LearntSoil(
-            0.0,
-            1.0,
-            1.0,
-            *(tuple(row) for row in beside.tolist()),
-            (float(among[0, 1]), float(among[0, 2]), float(among[1, 2])),
-        )
+        beside = np.round(shrunk * self.beside[rows], PLACES - 1)
+        among = np.round(shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], PLACES - 1)
+        cohesion, tan_phi, shear_modulus = (tuple(row) for row in beside.tolist())
+        three = float(among[0, 1]), float(among[0, 2]), float(among[1, 2])
+        return LearntSoil(0.0, 1.0, 1.0, cohesion, tan_phi, shear_modulus, three)
 
 
 def _fit_of(features: Array) -> Array:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Verdict
 
@@ -283,6 +284,8 @@ class Diagnosis:
     reference: Reference | None = None  # the campaign in which nothing is new
     explanations: tuple[Explanation, ...] = ()  # all that were weighed
     candidates: int = 0  # listed effects that were considered
+    # the discrepancy of form as a configuration holds it; not in the JSON
+    learnt: LearntForm | None = None
 
     @property
     def accepted(self) -> tuple[Hypothesis, ...]:
@@ -290,7 +293,8 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The contract of docs/diagnosis.md; more keys than those promised may appear."""
-        whole = asdict(self)
+        whole = asdict(replace(self, learnt=None))
+        del whole["learnt"]
         soil, fit = whole.pop("soil"), whole.pop("fit")
         whole["soil"] = soil and {**soil, "strain_words": self.soil.strained() if self.soil else ""}
         whole["fit"] = {

@@ -133,6 +133,10 @@ class Marginal:
         """Which of the unknowns are the weights of a freedom."""
         return np.arange(self._ends[1 + number], self._ends[2 + number])
 
+    def last_of_tolerance(self, count: int) -> Index:
+        """Which of the unknowns are the weights of the last columns of the tolerance."""
+        return np.arange(self._ends[1] - count, self._ends[1])
+
     def _weighed(self, chosen: Chosen) -> tuple[list[Chosen], Array]:
         """The sizes about the likeliest ones that count for what is not known, and their
         probabilities.

@@ -87,7 +87,7 @@ class HeldForm:
 
 
 def _kind(channel: str, channels: Sequence[str]) -> int | None:
-    """Which δ is a channel's: both torques have the same, unless one of them is the drive's loss."""
+    """Which δ is a channel's: both torques have the same, unless one is the drive's loss."""
     if channel == "torque" and "axle_torque" in channels:
         return None
     name = "torque" if channel == "axle_torque" else channel

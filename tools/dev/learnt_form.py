@@ -78,7 +78,7 @@ def trial(seed: int, world: str) -> dict[str, Any]:
         stated = config.load(given / handover.CONFIGURATION)
         verdict, whole = _applied(stated, _files(given / handover.REFERENCE), seed)
         ground = case.trial.world.ground
-        truth = {"c": ground.cohesion, "tan_phi": ground.tan_phi}
+        truth = {"c": float(ground.cohesion), "tan_phi": float(ground.tan_phi)}
         ways = (stated.settings, replace(whole.settings, discrepancy=None), whole.settings)
         files = _files(given / handover.NEW)
         ends = {name: _end(way, files) for name, way in zip(KINDS, ways, strict=True)}

@@ -2,7 +2,7 @@
 
 A campaign shows the sum of what the equations give and δ. What of it is soil and what is δ is known
 less well than either: their errors have opposite signs. A filter that took them for independent
-would learn c from the same sum a second time (docs/decisions/0011). So while the soil of the
+would learn c from the same sum a second time (docs/decisions/0009). So while the soil of the
 configuration is the one that δ was learnt with, the filter begins with their correlation, and with
 that of c, tan φ and k. Where the soil has been changed since, it is another soil, and independent.
 """

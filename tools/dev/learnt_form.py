@@ -28,6 +28,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Repeatability, Settings, settings_of_run
 from gritd.estimator.filter.estimate import KPA, Estimate
+from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.tools.cli.command import Parser
 from gritd.tools.diagnose.explain.apply import rewritten
@@ -76,17 +77,20 @@ def trial(seed: int, world: str) -> dict[str, Any]:
         given = Path(folder) / "given"
         handover.write(case, handover.driven(case), given)
         stated = config.load(given / handover.CONFIGURATION)
-        verdict, whole = _applied(stated, _files(given / handover.REFERENCE), seed)
+        verdict, names, whole = _applied(stated, _files(given / handover.REFERENCE), seed)
         ground = case.trial.world.ground
         truth = {"c": float(ground.cohesion), "tan_phi": float(ground.tan_phi)}
         ways = (stated.settings, replace(whole.settings, discrepancy=None), whole.settings)
         files = _files(given / handover.NEW)
         ends = {name: _end(way, files) for name, way in zip(KINDS, ways, strict=True)}
+        began = Tracker(whole.settings, "plain").prior
     return {
         "seed": seed,
         "world": world,
         "verdict": verdict,
+        "names": names,
         "truth": truth,
+        "applied": _beside(began, truth),
         "ends": {name: _beside(end, truth) for name, end in ends.items()},
     }
 
@@ -95,13 +99,16 @@ def _files(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.mcap"))
 
 
-def _applied(stated: Configuration, files: Sequence[Path], seed: int) -> tuple[str, Configuration]:
-    """The verdict of a diagnosis, and the configuration that --apply writes."""
+def _applied(
+    stated: Configuration, files: Sequence[Path], seed: int
+) -> tuple[str, list[str], Configuration]:
+    """The verdict of a diagnosis, the names it accepts, and the configuration that --apply writes."""
     rig, _ = rig_of(read_all(files), stated.settings)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         found = diagnose(rig, seed)
-    return found.verdict, config.loads(rewritten(stated.text, stated, found), "applied")
+    names = [h.effect for h in found.accepted]
+    return found.verdict, names, config.loads(rewritten(stated.text, stated, found), "applied")
 
 
 def _end(settings: Settings, files: Sequence[Path]) -> Estimate:
@@ -121,11 +128,12 @@ def _beside(end: Estimate, truth: Mapping[str, float]) -> dict[str, Any]:
 
 
 def _line(one: Mapping[str, Any]) -> str:
+    every = {"applied": one["applied"], **one["ends"]}
     parts = [
         f"{kind}: c {end['c']['off']:+.1f}, tan φ {end['tan_phi']['off']:+.1f} σ"
-        for kind, end in one["ends"].items()
+        for kind, end in every.items()
     ]
-    return f"{one['world']} {one['seed']} {one['verdict']}; {'; '.join(parts)}"
+    return f"{one['world']} {one['seed']} {one['verdict']} ({', '.join(one['names']) or 'no name'}); {'; '.join(parts)}"
 
 
 def summary(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:

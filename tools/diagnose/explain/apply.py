@@ -23,7 +23,7 @@ MODULI = {
     "bekker": (("k_c", "Pa/m^(n-1)"), ("k_phi", "Pa/m^n")),
     "reece": (("k1", "Pa"), ("k2", "Pa/m")),
 }
-# Verdicts under which soil and discrepancy are written, together: see docs/decisions/0011
+# Verdicts under which soil and discrepancy are written, together: see docs/decisions/0009
 KNOWN = ("consistent", "explained", "unlisted")
 
 

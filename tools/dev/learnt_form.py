@@ -102,7 +102,7 @@ def _files(folder: Path) -> list[Path]:
 def _applied(
     stated: Configuration, files: Sequence[Path], seed: int
 ) -> tuple[str, list[str], Configuration]:
-    """The verdict of a diagnosis, the names it accepts, and the configuration that --apply writes."""
+    """The verdict of a diagnosis, the names it accepts, and what --apply writes."""
     rig, _ = rig_of(read_all(files), stated.settings)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -133,7 +133,8 @@ def _line(one: Mapping[str, Any]) -> str:
         f"{kind}: c {end['c']['off']:+.1f}, tan φ {end['tan_phi']['off']:+.1f} σ"
         for kind, end in every.items()
     ]
-    return f"{one['world']} {one['seed']} {one['verdict']} ({', '.join(one['names']) or 'no name'}); {'; '.join(parts)}"
+    names = ", ".join(one["names"]) or "no name"
+    return f"{one['world']} {one['seed']} {one['verdict']} ({names}); {'; '.join(parts)}"
 
 
 def summary(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -83,11 +83,13 @@ def alone(chunk: Chunk) -> Pile:
     return Pile(chunk, np.array([0, len(chunk.starts)]), ())
 
 
-def opened(file: BinaryIO, blocks: Sequence[Block], sources: Mapping[int, Source]) -> Pile | None:
+def opened(
+    file: BinaryIO, blocks: Sequence[Block], sources: Mapping[int, Source], unpacker: Unpacker
+) -> Pile | None:
     """The messages of neighbouring blocks; None where anything about one of them is not as it
     should be, or its writer left no message index.
     """
-    contents, indexes = _unpacked(file, blocks)
+    contents, indexes = _unpacked(file, blocks, unpacker)
     if len(contents) < len(blocks) or not indexes:
         return None
 
@@ -136,7 +138,7 @@ def _sound(chunk: Chunk, sources: Mapping[int, Source]) -> bool:
 
 
 def _unpacked(
-    file: BinaryIO, blocks: Sequence[Block]
+    file: BinaryIO, blocks: Sequence[Block], unpacker: Unpacker
 ) -> tuple[list[bytes], list[tuple[int, memoryview]]]:
     """The blocks' records, as far as they unpack; and (number of the block, entries) of every
     message index, none where one cannot be read.
@@ -148,8 +150,7 @@ def _unpacked(
     file.seek(origin)
     packed = memoryview(file.read(reach))
 
-    unpacker, contents = Unpacker(), list[bytes]()
-    indexes: list[tuple[int, memoryview]] = []
+    contents, indexes = list[bytes](), list[tuple[int, memoryview]]()
     for number, block in enumerate(blocks):
         start = block.start - origin
         content = unpacker.whole(block, packed[start : start + block.stored])
@@ -178,7 +179,7 @@ def _starts(indexes: Sequence[tuple[int, memoryview]], bases: Starts, size: int)
     offsets = np.frombuffer(entries, "<i8")[1::2]
     counts = [len(index) // _ENTRY for _, index in indexes]
     starts = offsets + np.repeat(bases[[number for number, _ in indexes]], counts)
-    starts.sort()
+    starts.sort(kind="stable")  # each index is ascending: they are merged, seven times faster
     return starts if starts[0] >= 0 and starts[-1] <= size - _HEAD.itemsize else None
 
 

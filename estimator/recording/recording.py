@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.recording.blocks import Block, split, unpack
+from gritd.estimator.recording.blocks import Block, Unpacker, split, unpack
 from gritd.estimator.recording.cdr import Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source, select
 from gritd.estimator.recording.mcapfile import RecordingError, opened, reported
@@ -142,8 +142,9 @@ class Recording:
     def _opened(self) -> Iterator[Pile]:
         """Pile by pile in file order."""
         with reported(self.path, "read"), opened(self.path, buffering=0) as file:
+            unpacker = Unpacker()
             for number, blocks in enumerate(self._piles):
-                pile = self._kept.get(number) or open_pile(file, blocks, self.sources)
+                pile = self._kept.get(number) or open_pile(file, blocks, self.sources, unpacker)
                 if pile is not None:
                     yield pile
                     continue

@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 
 from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.recording.blocks import Block, Damaged, records, split, unpack
+from gritd.estimator.recording.blocks import Block, Damaged, Unpacker, records, split, unpack
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.decoding import Chunk, select
 from gritd.estimator.recording.definitions import Definitions
@@ -116,6 +116,7 @@ class _Check:
         self._definitions = Definitions(recording.path, known)
         recording.sources = self._definitions.sources
         self._tables = tables
+        self._unpacker = Unpacker()
         self._sequence = Numbers()
         self._numbered = False  # its messages are numbered as ours are
         self._preambles: set[bytes] = {b""}  # definitions that are known, as they stand in a chunk
@@ -180,7 +181,7 @@ class _Check:
         """
         if self._ends_within(blocks):
             return False
-        pile = opened(file, blocks, self._recording.sources)
+        pile = opened(file, blocks, self._recording.sources, self._unpacker)
         if pile is None or not all(map(self._is_known, pile.preambles)):
             return False
 

@@ -181,26 +181,24 @@ class Walk:
         return start + length
 
     def _chunk(self, start: int, length: int) -> int:
-        """The position after a chunk and the message indexes that lie in the window with it."""
+        """The position after a chunk and its message indexes."""
         block, end = self._chunk_head(start, length), start + length
         after = self._indexes(end)
         self._found(replace(block, index=(end, after)) if after > end else block)
         return after
 
     def _indexes(self, position: int) -> int:
-        """The end of the message indexes from `position` on; `_message_index` takes the others."""
-        self._read(position, _INDEX.size)
-        at = position - self._window_start
-        while 0 <= at <= len(self._window) - _INDEX.size:
-            opcode, length, _, entries = _INDEX.unpack_from(self._window, at)
-            after = at + RECORD_HEAD.size + length
-            if opcode != Opcode.MESSAGE_INDEX or entries + 6 != length:
-                break
-            if self._window_start + after > self._limit:
+        """The end of the message indexes from `position` on, as far as they are whole."""
+        while len(head := self._read(position, _INDEX.size)) == _INDEX.size:
+            opcode, length, _, entries = _INDEX.unpack(head)
+            after = position + RECORD_HEAD.size + length
+            if opcode != Opcode.MESSAGE_INDEX or entries + 6 != length or after > self._limit:
                 break
             self._idle += 1
-            at = after
-        return self._window_start + at
+            position = after
+            if self._too_many():
+                break
+        return position
 
     def _chunk_head(self, start: int, length: int) -> Block:
         fields = Texts(self._read(start, min(length, 64)))

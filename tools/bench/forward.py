@@ -108,7 +108,7 @@ def _adaptive(low: float, high: float, given: tuple[Wheel, Soil, float, float]) 
 def _by_nodes(low: float, high: float, given: tuple[Wheel, Soil, float, float]) -> float:
     """The same by Gauss-Legendre on NODES nodes, in plain floats."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    return half * sum(w * _vertical(middle + half * u, *given) for u, w in NODES)
+    return float(half * sum(w * _vertical(middle + half * u, *given) for u, w in NODES))
 
 
 def _scalar(

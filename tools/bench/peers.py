@@ -82,7 +82,7 @@ def write_by_mcap(path: Path, messages: Encoded) -> None:
             channels[topic.name] = writer.register_channel(topic.name, "cdr", schema)
         for name, time, data in messages:
             writer.add_message(channels[name], time, data, time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def write_by_rosbags(path: Path, messages: Encoded) -> None:

@@ -35,7 +35,7 @@ def start(repeats: int) -> dict[str, float]:
         for engine, found in taken.items():
             found.append(_ready(engine))
 
-    figures = {}
+    figures: dict[str, float] = {}
     for engine, found in taken.items():
         seconds, memory = (statistics.median(column) for column in zip(*found, strict=True))
         figures |= {f"{engine}_seconds": seconds, f"{engine}_memory": memory}

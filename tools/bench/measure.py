@@ -30,6 +30,7 @@ from gritd.estimator.offline.snapshots import recorded_streams, snapshots
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
+from gritd.estimator.recording.tables import Fields
 from gritd.estimator.recording.topics import RAW_TOPICS, TOPICS, messages_of
 from gritd.estimator.terramechanics import linear, original, scalar
 from gritd.tools.bench import against, peers
@@ -246,9 +247,8 @@ def recording(subject: Subject) -> Figures:
     written = subject.repeated(
         lambda: _write(subject, subject.path.with_suffix(f".{next(copies)}.mcap"))
     )
-    arrays = subject.repeated(
-        lambda: [read(subject.path).arrays(topic.name) for topic in RAW_TOPICS]
-    )
+    raw: dict[str, Fields] = {topic.name: None for topic in RAW_TOPICS}
+    arrays = subject.repeated(lambda: read(subject.path, tables=raw).tables(raw))
     singly = subject.repeated(lambda: sum(1 for _ in read(subject.path).messages()))
 
     times = {"write": written, "read_as_arrays": arrays, "read_one_by_one": singly}

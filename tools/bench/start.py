@@ -11,7 +11,7 @@ from gritd.estimator.config.settings import ENGINES
 
 # The path of `gritd run` up to the first tick, on the packaged testbed, without its devices.
 _READY = """
-import json, resource, sys, time
+import json, sys, time
 import gritd.tools.commands.run, gritd.tools.service.serve
 from gritd.config import packaged
 from gritd.drivers.build import build_readers
@@ -21,8 +21,10 @@ configuration = with_engine(load(packaged()), sys.argv[1])
 build_readers(configuration.settings, lambda: 0, None)
 pipeline = Pipeline(configuration.settings)
 pipeline.step(pipeline.start(), (), 1_000_000_000)
-used = resource.getrusage(resource.RUSAGE_SELF)
-print(json.dumps([time.process_time(), used.ru_maxrss * 1024]))
+# ru_maxrss would be that of the process which started this one, where that is the larger
+lines = open("/proc/self/status", encoding="ascii").read().splitlines()
+memory = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+print(json.dumps([time.process_time(), 1024 * memory]))
 """
 
 

@@ -78,3 +78,11 @@ def test_each_replay_runs_the_engine_it_names(tmp_path, monkeypatch):
     monkeypatch.setattr(measure, "ENGINES", ("filterpy",))
     measure.replay(subject)
     assert applied
+
+
+def test_a_start_is_that_of_a_process_of_its_own(figures):
+    """Neither this process's memory nor its time: scipy is loaded here, and there for one engine
+    alone.
+    """
+    started = figures["start"]
+    assert started["plain_memory"] < 100e6 < started["filterpy_memory"] < 200e6

@@ -28,7 +28,7 @@ from gritd.tools.cli.workers import add_cluster, cluster_of
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain import provenance
-from gritd.tools.diagnose.explain.apply import KNOWN, rewritten
+from gritd.tools.diagnose.explain.apply import is_known, rewritten
 from gritd.tools.diagnose.explain.innovations import with_innovations
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
@@ -232,7 +232,7 @@ def _apply(
 
     if backup is not None:
         print(f"{arguments.apply}: changed; as it was: {backup}", file=sys.stderr)
-    if diagnosis.soil is not None and diagnosis.verdict not in KNOWN:
+    if diagnosis.soil is not None and not is_known(diagnosis):
         reason = f"since the verdict is {diagnosis.verdict}"
         print(
             f"{arguments.apply}: soil and discrepancy stay as they were, {reason}", file=sys.stderr

@@ -23,8 +23,7 @@ MODULI = {
     "bekker": (("k_c", "Pa/m^(n-1)"), ("k_phi", "Pa/m^n")),
     "reece": (("k1", "Pa"), ("k2", "Pa/m")),
 }
-# Verdicts under which soil and discrepancy are written, together: see docs/decisions/0009
-KNOWN = ("consistent", "explained", "unlisted")
+KNOWN = ("consistent", "explained")  # verdicts under which the fitted soil is believed alone
 
 
 def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
@@ -40,11 +39,19 @@ def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> 
     """
     document = EditedYaml(_without_header(text), configuration.source)
     _set_effects(document, diagnosis)
-    if diagnosis.soil is not None and diagnosis.verdict in KNOWN:
+    if diagnosis.soil is not None and is_known(diagnosis):
         _set_soil(document, configuration.settings, diagnosis.soil)
         if diagnosis.learnt is not None:
             set_discrepancy(document, diagnosis.learnt, configuration.source)
     return f"{HEADER}{visible(diagnosis.summary)}\n{document.text()}"
+
+
+def is_known(diagnosis: Diagnosis) -> bool:
+    """Whether the fitted soil is written. Where something without a name remains it needs δ beside
+    it, which carries what is left: see docs/decisions/0009.
+    """
+    beside = diagnosis.verdict == "unlisted" and diagnosis.learnt is not None
+    return diagnosis.verdict in KNOWN or beside
 
 
 def _without_header(text: str) -> str:

@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from gritd.estimator.config import configuration as config
+from gritd.estimator.filter.learnt_soil import learnt_soil
+from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.commands import diagnose, init
 from gritd.tools.diagnose.explain.apply import applied, rewritten
 from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity
+from tests import forms
 from tests.tools.report.cases import base, soil
 
 REECE = ("  k1: 100 kPa\n  k2: 900 kN/m^3\n", "k_c: 0.9 kN/m^(n+1)", "k_phi: 1523.4 kN/m^(n+2)")
@@ -111,3 +114,39 @@ def test_in_place_keeps_what_was_there(rig: Path, capsys: pytest.CaptureFixture[
     backup = rig.with_name("testbed.yaml.bak")
     assert backup.read_text() == before != rig.read_text()
     assert str(backup) in capsys.readouterr().err
+
+
+def learnt() -> LearntForm:
+    return forms.form(7, soil=forms.soil((1.0, 1.0, 1.0)))
+
+
+def test_the_discrepancy_stands_beside_the_soil_that_is_written(rig: Path) -> None:
+    """Also where the verdict is unlisted; and the soil is the one its correlation is with."""
+    for verdict in ("explained", "unlisted", "consistent"):
+        diagnosis = replace(found(), verdict=verdict, learnt=learnt())
+        settings = config.loads(
+            rewritten(rig.read_text(), config.load(rig), diagnosis), "new.yaml", rig.parent
+        ).settings
+        form = settings.discrepancy
+        assert form is not None and form.soil is not None and settings.soil.cohesion.value == 812.0
+        prior = settings.soil.cohesion.value, settings.soil.tan_phi.value
+        assert (form.soil.cohesion, form.soil.tan_phi) == prior
+        assert replace(form, soil=None) == replace(learnt(), soil=None)
+        assert learnt_soil(settings) == form.soil
+
+
+def test_the_discrepancy_stays_out_where_the_recordings_show_little(rig: Path) -> None:
+    diagnosis = replace(found(), verdict="insufficient", learnt=learnt())
+    after = rewritten(rig.read_text(), config.load(rig), diagnosis)
+    settings = config.loads(after, "new.yaml", rig.parent).settings
+    assert settings.discrepancy is None
+    assert settings.soil == config.load(rig).settings.soil
+
+
+def test_a_second_discrepancy_takes_the_place_of_the_first(rig: Path) -> None:
+    first = rewritten(rig.read_text(), config.load(rig), replace(found(), learnt=learnt()))
+    again = replace(found(), learnt=replace(learnt(), load=50.0))
+    second = rewritten(first, config.loads(first, "first", rig.parent), again)
+    form = config.loads(second, "second", rig.parent).settings.discrepancy
+    assert form is not None and form.load == 50.0
+    assert second.count("discrepancy:") == 1

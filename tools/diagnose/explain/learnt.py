@@ -34,7 +34,6 @@ from gritd.tools.diagnose.tuning import TUNING
 
 WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
 HELD = "held"  # by an earlier δ
-PLACES = 4  # decimals of means; directions, points and correlations have fewer
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) ->
         return None
 
     unknowns = _Unknowns(problem, model, sources, soil)
-    points = np.round(_points(stack, sources), 2)
+    points = np.round(_points(stack, sources), TUNING.explain.learnt_places - 2)
     parts = {s.name: _source(problem, model, s, points, unknowns) for s in sources}
     return _Reduced(unknowns, parts, points).form(_domain(stack, sources), usual)
 
@@ -182,8 +181,10 @@ class _Reduced:
         channels: dict[str, ChannelForm | None] = dict.fromkeys(CHANNELS)
         for number, (name, part) in enumerate(self._parts.items()):
             place = slice(number * size, (number + 1) * size)
-            mean = np.asarray(np.round(self.mean[place], PLACES), float)
-            spread = np.asarray(np.round(self.directions[place].T, PLACES - 1), float)
+            mean = np.asarray(np.round(self.mean[place], TUNING.explain.learnt_places), float)
+            spread = np.asarray(
+                np.round(self.directions[place].T, TUNING.explain.learnt_places - 1), float
+            )
             rest = self._rest(part, mean, spread)
             channels[name] = ChannelForm(
                 float(f"{part.size:.4g}"),
@@ -210,7 +211,7 @@ class _Reduced:
         whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
         kept = np.sum((part.features @ spread.T) ** 2, axis=1)
         squares = float(np.mean(np.maximum(whole - kept, 0.0) + left**2))
-        return float(round(min(squares**0.5, 1.0), PLACES))
+        return float(round(min(squares**0.5, 1.0), TUNING.explain.learnt_places))
 
     def _soil(self) -> LearntSoil:
         """Correlations, a little less than they are, so that they hold together once rounded; the
@@ -218,8 +219,10 @@ class _Reduced:
         """
         names, shrunk = self._unknowns.soil_names, TUNING.explain.learnt_shrunk
         rows = [names.index(name) for name in ("c", "tan_phi", "k")]
-        beside = np.round(shrunk * self.beside[rows], PLACES - 1)
-        among = np.round(shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], PLACES - 1)
+        beside = np.round(shrunk * self.beside[rows], TUNING.explain.learnt_places - 1)
+        among = np.round(
+            shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], TUNING.explain.learnt_places - 1
+        )
         cohesion, tan_phi, shear_modulus = (tuple(row) for row in beside.tolist())
         three = float(among[0, 1]), float(among[0, 2]), float(among[1, 2])
         return LearntSoil(0.0, 1.0, 1.0, cohesion, tan_phi, shear_modulus, three)

@@ -110,6 +110,9 @@ class Explain:
     # --- learnt.py: δ as a configuration holds it ---
     learnt_points: int = tuned(20, "points", "at most: a configuration stays readable")
     learnt_directions: int = tuned(8, "directions", "at most: a configuration stays readable")
+    learnt_places: int = tuned(
+        4, "decimals", "of means; directions and correlations have one less, points two"
+    )
     learnt_left_out: float = tuned(
         1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
     )

@@ -29,7 +29,7 @@ from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.form import usual_of
-from gritd.tools.diagnose.rig.interface import Bools, FormSource, Stack
+from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
@@ -133,12 +133,8 @@ def _source(
     whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
     whole[:, unknowns.places[source.name]] = columns
     whole[:, unknowns.places[HELD]] = unknowns.held[rows]
-    calibration = [
-        i
-        for i, k in enumerate(stack.rig.constants)
-        if not k.soil and not k.changes and not k.name.endswith(WHEN)
-    ]
-    whole[:, calibration] = fitted.raw[rows][:, calibration]
+    told = _calibration(stack.rig)
+    whole[:, told] = fitted.raw[rows][:, told]
 
     values = stack.measured[stack.of(source.channels[-1]) & rows]
     usual = float(np.sqrt(np.mean(values**2))) if source.size is None else source.size
@@ -150,6 +146,21 @@ def _source(
     held = stack.rig.held
     start = np.zeros(len(scale)) if held is None else stack.joined(held.means)[rows] / scale
     return _Source(conditions, features, whole / scale[:, None], start, size, usual)
+
+
+def _calibration(rig: Rig) -> list[int]:
+    """Constants that stay as the configuration states them, so that δ holds what they were moved
+    by. Where the motor tells the torque too, that of the axle's sensor is not the filter's.
+    """
+    other = ("axle_torque_",) if {"torque", "axle_torque"} <= set(rig.channels) else ()
+    return [
+        number
+        for number, constant in enumerate(rig.constants)
+        if not constant.soil
+        and not constant.changes
+        and not constant.name.endswith(WHEN)
+        and not constant.name.startswith(other)
+    ]
 
 
 class _Reduced:
@@ -266,4 +277,5 @@ def _ends(values: Array, places: int) -> tuple[float, float]:
     low, high = (float(np.quantile(values, q)) for q in (0.005, 0.995))
     margin, unit = TUNING.explain.learnt_margin * max(abs(low), abs(high)), 10.0**-places
     low, high = low - margin, high + margin
-    return round(np.floor(low / unit) * unit, places), round(np.ceil(high / unit) * unit, places)
+    ends = np.floor(low / unit) * unit, np.ceil(high / unit) * unit
+    return round(float(ends[0]), places), round(float(ends[1]), places)

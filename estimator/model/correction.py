@@ -6,7 +6,6 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.model.discrepancy import (
     DIRECTION,
@@ -47,7 +46,7 @@ class Correction:
         self._root = root_of(self._points)
         parts = [_columns(channel, form) for channel in form.channels]
         # (m, 3 (1 + r)) means and directions in units of the kernel
-        self._weights = solve_triangular(self._root.T, np.hstack(parts), lower=False)
+        self._weights = np.linalg.solve(self._root.T, np.hstack(parts))
         given = [channel or ChannelForm(0.0, (), ()) for channel in form.channels]
         self._size = np.array([channel.size for channel in given])
         self._kept = np.array([1.0 - channel.rest**2 for channel in given])
@@ -56,7 +55,7 @@ class Correction:
     def features(self, conditions: Array) -> Array:
         """φ (n, m) at conditions (n, d)."""
         between = covariance(conditions, self._points)
-        return np.asarray(solve_triangular(self._root, between.T, lower=True).T)
+        return np.asarray(np.linalg.solve(self._root, between.T).T)
 
     def inside(self, conditions: Array) -> Array:
         """ρ (n,) at conditions (n, d): 1 inside the domain, 0 far outside."""
@@ -72,7 +71,7 @@ class Correction:
         """δ at conditions (n, d) and weights (n, 3): see discrepancy.weight_of."""
         between = covariance(conditions, self._points)
         inside = self.inside(conditions)
-        half = solve_triangular(self._root, between.T, lower=True, check_finite=False)
+        half = np.linalg.solve(self._root, between.T)
         told = self.told(inside, np.sum(half**2, axis=0))
 
         scale = weight * self._size
@@ -104,7 +103,7 @@ class Correction:
 
 def root_of(points: Array) -> Array:
     """Cholesky root (m, m) of the covariance of points (m, d)."""
-    return np.asarray(cholesky(covariance(points, points) + NUGGET * np.eye(len(points)), True))
+    return np.asarray(np.linalg.cholesky(covariance(points, points) + NUGGET * np.eye(len(points))))
 
 
 def weights_of(load: Array, speed: Array, direction: Array, usual: Usual) -> Array:

@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 
@@ -56,7 +55,7 @@ class Features:
     def at(self, conditions: Array) -> Array:
         """φ (n, m) at conditions (n, d)."""
         between = covariance(conditions, self.points)
-        return np.asarray(solve_triangular(self.root, between.T, lower=True).T)
+        return np.asarray(np.linalg.solve(self.root, between.T).T)
 
 
 def features_of(conditions: Array, most: int, least: float) -> Features:

@@ -97,7 +97,8 @@ def compare(
     """
     settings = configuration.settings
     recordings = read_all(paths)
-    rig = WheelRig([signals(recording, settings, RATE) for recording in recordings], settings)
+    series = [signals(recording, settings, RATE) for recording in recordings]
+    rig = WheelRig(series, settings, read_off=False)
     stack = Stack(rig)
 
     if stack.size == 0:

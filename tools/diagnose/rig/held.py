@@ -6,7 +6,7 @@ directions, the rest that it has where it was learnt, and its prior where it was
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -23,10 +23,18 @@ class HeldForm:
     """See interface.Held."""
 
     def __init__(
-        self, form: LearntForm, runs: Sequence[Run], channels: Sequence[str], radius: float
+        self,
+        form: LearntForm,
+        runs: Sequence[Run],
+        channels: Sequence[str],
+        radius: float,
+        lost: Collection[str] = (),
     ) -> None:
+        """lost: channels that tell the drive's loss, in which no soil acts."""
         self._correction = Correction(form)
-        self._kinds = {c: kind for c in channels if (kind := _kind(c, channels)) is not None}
+        self._kinds = {
+            c: kind for c in channels if c not in lost and (kind := _kind(c)) is not None
+        }
         told = [_told(run, radius, self._correction) for run in runs]
         self._conditions = [conditions for conditions, _ in told]
         self._weights = [weights for _, weights in told]
@@ -86,10 +94,8 @@ class HeldForm:
         return np.column_stack(placed) if placed else np.zeros((stack.size, 0))
 
 
-def _kind(channel: str, channels: Sequence[str]) -> int | None:
-    """Which δ is a channel's: both torques have the same, unless one is the drive's loss."""
-    if channel == "torque" and "axle_torque" in channels:
-        return None
+def _kind(channel: str) -> int | None:
+    """Which δ is a channel's: both torques have the same."""
     name = "torque" if channel == "axle_torque" else channel
     return CHANNELS.index(name) if name in CHANNELS else None
 

@@ -70,9 +70,11 @@ class WheelRig:
         settings: Settings,
         reference: int = 0,
         bed: Bed = "prepared",
+        read_off: bool = True,
     ) -> None:
         """reference: how many of the runs, the first ones, are of a reference campaign, in which no
-        candidate acts; bed: whether the others drive on the same bed or on one prepared anew.
+        candidate acts; bed: whether the others drive on the same bed or on one prepared anew;
+        read_off: where both torques are measured, channel torque is the loss between them.
         """
         self.settings = settings
         self.new = [number >= reference for number in range(len(signals))]
@@ -83,7 +85,7 @@ class WheelRig:
             new: min(s.start for s, n in zip(signals, self.new, strict=True) if n == new)
             for new in set(self.new)
         }
-        self.loss_of_drive = {"torque", "axle_torque"} <= set(self.channels)
+        self.loss_of_drive = read_off and {"torque", "axle_torque"} <= set(self.channels)
         if self.loss_of_drive:
             self.caveats.append(LOSS_NOTE)
         self._motions = [
@@ -130,9 +132,9 @@ class WheelRig:
         self._doubt = [s.doubt for s in signals]
         self.runs = self._without_held_torque([self._run(s, n) for n, s in enumerate(signals)])
         driven = [measured_of(s, "torque", self._constant) for s in signals]
-        learnt = settings.discrepancy
+        learnt, lost = settings.discrepancy, ("torque",) if self.loss_of_drive else ()
         self.held = (
-            HeldForm(learnt, self.runs, self.channels, settings.wheel.radius)
+            HeldForm(learnt, self.runs, self.channels, settings.wheel.radius, lost)
             if learnt is not None
             else None
         )

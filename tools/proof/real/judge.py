@@ -31,9 +31,8 @@ class Judge:
 
     def __init__(self, recordings: Sequence[Path], configuration: Path) -> None:
         self.settings: Settings = config.load(configuration).settings
-        self.rig = WheelRig(
-            [signals(r, self.settings, RATE) for r in read_all(sorted(recordings))], self.settings
-        )
+        series = [signals(r, self.settings, RATE) for r in read_all(sorted(recordings))]
+        self.rig = WheelRig(series, self.settings, read_off=False)
 
     def time(self, run: int) -> Array:
         """Seconds since the beginning of a run (n,)."""

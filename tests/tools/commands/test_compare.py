@@ -4,6 +4,7 @@ for.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,8 +13,12 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli.command import CommandError
+from gritd.tools.cli.yaml_edit import EditedYaml
 from gritd.tools.commands import simulate
 from gritd.tools.commands.compare import compare, main
+from gritd.tools.diagnose.explain.apply_form import set_discrepancy
+from gritd.tools.report import comparison
+from tests import forms
 
 ODD = "<i>&$x_{"
 SCHEDULE = """
@@ -58,6 +63,26 @@ def test_what_the_model_knows_is_off_by_noise_alone(
     for channel, most in (("torque", 0.01), ("drawbar_pull", 0.3), ("sinkage", 1e-4)):
         for of in (None, *found.runs):
             assert 0.0 < found.rms(channel, of, "before") < most, (channel, of)
+
+
+def test_a_learnt_discrepancy_is_simulated_and_compared(
+    tmp_path: Path, testbed: config.Configuration
+) -> None:
+    """A rig that has it is off by noise alone where the configuration knows, by more where not."""
+    document = EditedYaml(packaged().read_text(encoding="utf-8"), "testbed.yaml")
+    set_discrepancy(document, forms.form(2), "testbed.yaml")
+    path = tmp_path / "learnt.yaml"
+    path.write_text(document.text(), encoding="utf-8")
+    (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
+
+    made = [run(tmp_path, "learnt", 60.0, "--config", str(path))]
+    truth = json.loads(made[0].with_suffix(".truth.json").read_text())
+    assert truth["discrepancy"]["load"] == 60.0
+    knowing, blind = (compare(made, c, fitted=False) for c in (config.load(path), testbed))
+    for channel, most in (("torque", 0.01), ("drawbar_pull", 0.3), ("sinkage", 1e-4)):
+        assert knowing.rms(channel, None, "before") < most < blind.rms(channel, None, "before")
+    assert "discrepancy" in knowing.baseline and "discrepancy" not in blind.baseline
+    assert "discrepancy" in comparison.render(knowing)
 
 
 def test_residual_is_what_was_left_out(tmp_path: Path, testbed: config.Configuration) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gritd.config import packaged
-from gritd.estimator.config.configuration import load, with_engine
+from gritd.estimator.config.configuration import load, loads, with_engine
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.pipeline import Pipeline
@@ -21,7 +21,10 @@ from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
 from gritd.tools import main as cli
 from gritd.tools.cli.command import CommandError
+from gritd.tools.cli.yaml_edit import EditedYaml
 from gritd.tools.commands import replay
+from gritd.tools.diagnose.explain.apply_form import set_discrepancy
+from tests import forms
 from tests.linear_plant import readings
 
 ROOT = Path(__file__).parents[3]
@@ -36,11 +39,11 @@ def configuration():
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory, configuration):
-    """A run logged as the daemon logs it: the readings a tick consumed, then the tick."""
     return logged(tmp_path_factory.mktemp("run") / "run.mcap", configuration)
 
 
 def logged(path, configuration):
+    """A run logged as the daemon logs it: the readings a tick consumed, then the tick."""
     pipeline = Pipeline(configuration.settings)
     state = pipeline.start()
     writer = RunWriter(path, TOPICS, configuration.text, RunInfo(name="test"))
@@ -77,6 +80,15 @@ def test_a_recording_of_the_former_default_engine_is_verified_with_that_engine(
     assert "engine: filterpy" in str(read(path).config_yaml)
     assert configuration.settings.filter.engine == "plain"
 
+    assert replay.main([str(path), "--verify"]) == 0
+    assert "identical bit for bit" in capsys.readouterr().out
+
+
+def test_a_replay_with_a_learnt_discrepancy_is_identical_too(tmp_path, capsys, configuration):
+    """From the effective text that stands in the recording."""
+    document = EditedYaml(configuration.text, "testbed.yaml")
+    set_discrepancy(document, forms.form(2), "testbed.yaml")
+    path = logged(tmp_path / "run.mcap", loads(document.text(), "testbed.yaml"))
     assert replay.main([str(path), "--verify"]) == 0
     assert "identical bit for bit" in capsys.readouterr().out
 

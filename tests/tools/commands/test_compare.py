@@ -60,7 +60,7 @@ def test_what_the_model_knows_is_off_by_noise_alone(
 ) -> None:
     found = compare(plain, testbed, fitted=False)
     assert found.runs == ["at 45 N", ODD] and found.soil is None
-    for channel, most in (("torque", 0.01), ("drawbar_pull", 0.3), ("sinkage", 1e-4)):
+    for channel, most in (("torque", 0.01), ("drawbar_pull", 0.12), ("sinkage", 1e-4)):
         for of in (None, *found.runs):
             assert 0.0 < found.rms(channel, of, "before") < most, (channel, of)
 
@@ -79,7 +79,7 @@ def test_a_learnt_discrepancy_is_simulated_and_compared(
     truth = json.loads(made[0].with_suffix(".truth.json").read_text())
     assert truth["discrepancy"]["load"] == 60.0
     knowing, blind = (compare(made, c, fitted=False) for c in (config.load(path), testbed))
-    for channel, most in (("torque", 0.01), ("drawbar_pull", 0.3), ("sinkage", 1e-4)):
+    for channel, most in (("torque", 0.01), ("drawbar_pull", 0.12), ("sinkage", 1e-4)):
         assert knowing.rms(channel, None, "before") < most < blind.rms(channel, None, "before")
     assert "discrepancy" in knowing.baseline and "discrepancy" not in blind.baseline
     assert "discrepancy" in comparison.render(knowing)

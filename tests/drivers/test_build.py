@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gritd.drivers.build import build_decoder, build_readers, used_devices
+from gritd.drivers.can_signals import MAX_DBC_BYTES
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.wire import CanWire, SerialWire
@@ -157,6 +160,19 @@ def test_wiring_that_cannot_work_is_one_clear_line(settings, expected):
     with pytest.raises(DeviceSettingsError) as error:
         build(settings)
     assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+def test_what_is_no_database_is_one_clear_line(tmp_path):
+    large = tmp_path / "large.dbc"
+    large.write_bytes(b"\n" * (MAX_DBC_BYTES + 1))
+    named = replace(can_device(), dbc="", signals={"Volts": {"id": 1, "start": 0, "length": 8}})
+    for device, expected in (
+        (can_device(dbc=str(large)), f"{large} is larger than {MAX_DBC_BYTES} bytes"),
+        (named, "signal Volts: expected a name of the form Message.Signal"),
+    ):
+        with pytest.raises(DeviceSettingsError, match=re.escape(expected)) as error:
+            build_decoder(wiring([device], [channel("sinkage_pot", "bus", "A.B")]), device)
+        assert "\n" not in str(error.value)
 
 
 def test_wrench_messages_without_a_cycle_are_refused():

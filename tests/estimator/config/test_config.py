@@ -103,6 +103,53 @@ def test_inline_signals_and_bus_options() -> None:
     assert config.loads(read.text, "b.yaml").settings == read.settings
 
 
+def test_bus_options_of_every_kind_are_handed_on_as_they_are() -> None:
+    options = "{rate: 1.5, fast: true, ids: [1, two, {mask: 0x7ff}], deep: {a: -3}}"
+    bus = f"  bus: {{kind: can, interface: virtual, options: {options}, signals: {SIGNAL}}}\n"
+    read = config.loads(changed("channels:\n", bus + "channels:\n"), "rig.yaml")
+    assert read.settings.devices["bus"].options == {
+        "rate": 1.5, "fast": True, "ids": [1, "two", {"mask": 0x7FF}], "deep": {"a": -3},
+    }  # fmt: skip
+    assert config.loads(read.text, "b.yaml").settings == read.settings
+
+
+SIGNAL = "{Pot.z: {id: 0x120, start: 0, length: 16}}"
+
+
+@pytest.mark.parametrize(
+    "bus, words",
+    [
+        (f"signals: {SIGNAL}, options: {{when: 2026-11-02}}", "found 2026-11-02"),
+        (
+            f"signals: {SIGNAL}, options: {{none: }}",
+            "found nothing; expected a number, true, false, or text",
+        ),
+        ("signals: {Pot.z: {id: 1, start: 0, length: 16, signed: 1}}", "expected true or false"),
+        ("signals: {Pot.z: {id: 1, start: 0, length: 16, signed: yes}}", "found yes"),
+    ],
+)
+def test_what_a_bus_cannot_be_told_is_one_line(bus: str, words: str) -> None:
+    line = f"  bus: {{kind: can, interface: virtual, {bus}}}\n"
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        config.loads(changed("channels:\n", line + "channels:\n"), "rig.yaml")
+
+
+def test_effects_of_a_recording_are_read_without_a_library() -> None:
+    """Another version of gritd may know others; a shape that is not given has no default there."""
+    named = EFFECTS.replace("coulomb_friction", "of_tomorrow")
+    read = config.loads(MINIMAL + named, "rig.yaml", effect_schema=None)
+    with pytest.raises(ConfigError, match="the name 'a b'; expected letters"):
+        config.loads(MINIMAL + "effects: {new: {'a b': 1}}\n", "rig.yaml", effect_schema=None)
+    (effect,) = read.settings.effects
+    assert effect.name == "of_tomorrow" and effect.parameters.keys() == {"loss"}
+
+    def schema(name: str) -> dict[str, Quantity]:
+        return {"loss": Quantity("N*m"), "rate": Quantity("1/s")}
+
+    with pytest.raises(ConfigError, match=re.escape("effects.of_tomorrow.rate: found nothing")):
+        config.loads(MINIMAL + named, "rig.yaml", effect_schema=schema)
+
+
 EFFECTS = "effects: {coulomb_friction: {loss: {value: 1.8 N*m, sigma: 100 mN*m}}}\n"
 
 

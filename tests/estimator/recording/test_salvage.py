@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import random
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from gritd.estimator.recording.mcapfile import MAGIC, RecordingError
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import RAW_TOPICS
-from tests.estimator.recording.hostile import HOSTILE, probe
+from tests.estimator.recording.hostile import HOSTILE, probe, record, text
 from tests.estimator.recording.samples import FOREIGN, T0, write_foreign, write_sample
 
 ENCODER = RAW_TOPICS[0]
@@ -230,6 +231,47 @@ def test_a_contradicting_definition_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "c.mcap").write_bytes(data)
     recording = read(tmp_path / "c.mcap")
     assert any("defined twice, differently" in line for line in recording.damage)
+    assert list(recording.messages()) == list(read(tmp_path / "b.mcap").messages())
+
+
+def definition(number: int, name: str, fields: str = "int32 data") -> bytes:
+    """A schema's record."""
+    body = struct.pack("<H", number) + text(name) + text("ros2msg") + text(fields)
+    return record(Opcode.SCHEMA, body)
+
+
+def channel(number: int, schema: int, topic: str) -> bytes:
+    body = struct.pack("<HH", number, schema) + text(topic) + text("cdr") + struct.pack("<I", 0)
+    return record(Opcode.CHANNEL, body)
+
+
+MANY = b"".join(definition(n, f"m/msg/M{n}", "int32 data\n" * 80_000) for n in range(100, 122))
+
+
+@pytest.mark.parametrize(
+    "records, words",
+    [
+        (definition(99, "a/msg/A") + definition(99, "b/msg/B"), "schema 99 is defined twice"),
+        (channel(99, 98, "/a"), "channel 99 refers to schema 98, which is missing"),
+        (
+            definition(99, "a/msg/A") + channel(99, 99, "/a") + channel(99, 99, "/b"),
+            "channel 99 is",
+        ),
+        (MANY, "bytes of definitions"),
+        (record(Opcode.MESSAGE_INDEX, struct.pack("<HI", 1, 99)), "of a message index contradict"),
+        (record(Opcode.METADATA, text("a") + bytes(17 << 20)), "bytes of metadata"),
+        (record(Opcode.HEADER, text("a") * (1 << 20)), "a header of"),
+    ],
+)
+def test_what_contradicts_itself_is_said_and_costs_no_more(
+    tmp_path: Path, records: bytes, words: str
+) -> None:
+    """Before and after it stand whole recordings' chunks."""
+    write_sample(tmp_path / "b.mcap", 20, close=False)
+    whole = (tmp_path / "b.mcap").read_bytes()
+    (tmp_path / "c.mcap").write_bytes(whole + records)
+    recording = read(tmp_path / "c.mcap")
+    assert any(words in line for line in recording.damage), recording.damage
     assert list(recording.messages()) == list(read(tmp_path / "b.mcap").messages())
 
 

@@ -1,8 +1,9 @@
 """δ as a configuration holds it (estimator/model/learnt.py), from the posterior of a fitted model.
 
-What is written is all that the recordings show beyond the equations at the configured calibration:
-the discrepancy of form, and what the fit moved calibration constants by (a torque constant that is
-1 % off looks like a δ of 1 %). Few directions hold most of what stays uncertain of it, in all
+What is written is all that the recordings show beyond the equations and the accepted effects at the
+configured calibration: the discrepancy of form, how far the form of an effect differs from the
+library's, and what the fit moved calibration constants by (a torque constant that is 1 % off looks
+like a δ of 1 %). Few directions hold most of what stays uncertain of it, in all
 channels together; the rest is one number a channel. The soil that is written may be an average over
 several explanations. The mean of δ is then the one that belongs to that soil: their sum, which the
 recordings show, stays what it is.
@@ -33,7 +34,6 @@ from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
-HELD = "held"  # by an earlier δ
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,11 @@ class _Unknowns:
         assert marginal is not None
         names = [f.name for f in marginal.freedoms]
         self.numbers = {s.name: names.index(s.name) for s in sources}
-        self.places, parts, known = {}, [np.arange(len(fitted.centre))], len(fitted.centre)
-        for name, number in self.numbers.items():
+        self.places: list[slice] = []  # of each freedom
+        parts, known = [np.arange(len(fitted.centre))], len(fitted.centre)
+        for number in range(len(names)):
             parts.append(marginal.place_of(number))
-            self.places[name] = slice(known, known + len(parts[-1]))
+            self.places.append(slice(known, known + len(parts[-1])))
             known += len(parts[-1])
         # what the configuration left open of an earlier δ stands last in the tolerance
         self.held = (
@@ -90,7 +91,7 @@ class _Unknowns:
             else rig.held.doubts(problem.stack)
         )
         parts.append(marginal.last_of_tolerance(self.held.shape[1]))
-        self.places[HELD] = slice(known, known + len(parts[-1]))
+        self.place_of_held = slice(known, known + len(parts[-1]))
         self.mean, self.spread = marginal.moments(model.chosen, np.concatenate(parts))
 
         count = len(fitted.u)
@@ -127,12 +128,12 @@ def _source(
     stack, fitted, marginal = problem.stack, model.fitted, model.marginal
     assert marginal is not None
     number, rows = unknowns.numbers[source.name], _acting(stack, source)
-    columns = marginal.freedoms[number].columns[rows].copy()
-    columns[:, columns.shape[1] - 2 * len(TUNING.fit.form_harmonics) :] = 0.0
-
     whole = np.zeros((int(rows.sum()), len(unknowns.mean)))
-    whole[:, unknowns.places[source.name]] = columns
-    whole[:, unknowns.places[HELD]] = unknowns.held[rows]
+    for freedom, place in zip(marginal.freedoms, unknowns.places, strict=True):
+        whole[:, place] = freedom.columns[rows]
+    end = unknowns.places[number].stop  # what goes with the wheel's angle stands last
+    whole[:, end - 2 * len(TUNING.fit.form_harmonics) : end] = 0.0
+    whole[:, unknowns.place_of_held] = unknowns.held[rows]
     told = _calibration(stack.rig)
     whole[:, told] = fitted.raw[rows][:, told]
 
@@ -192,17 +193,7 @@ class _Reduced:
         channels: dict[str, ChannelForm | None] = dict.fromkeys(CHANNELS)
         for number, (name, part) in enumerate(self._parts.items()):
             place = slice(number * size, (number + 1) * size)
-            mean = np.asarray(np.round(self.mean[place], TUNING.explain.learnt_places), float)
-            spread = np.asarray(
-                np.round(self.directions[place].T, TUNING.explain.learnt_places - 1), float
-            )
-            rest = self._rest(part, mean, spread)
-            channels[name] = ChannelForm(
-                float(f"{part.size:.4g}"),
-                tuple(mean.tolist()),
-                tuple(tuple(row) for row in spread.tolist()),
-                rest,
-            )
+            channels[name] = self._channel(part, place)
         torque, pull, sinkage = (channels[name] for name in CHANNELS)
         assert torque is not None and sinkage is not None
         return LearntForm(
@@ -216,13 +207,22 @@ class _Reduced:
             self._soil(),
         )
 
-    def _rest(self, part: _Source, mean: Array, spread: Array) -> float:
-        """e: root mean square of what mean and directions leave, in sizes; at most 1."""
+    def _channel(self, part: _Source, place: slice) -> ChannelForm:
+        """Where the points cannot follow by more than its size, the size is that."""
+        mean, spread = self.mean[place], self.directions[place].T
         left = part.map @ self._unknowns.told + part.start - part.features @ mean
         whole = np.sum((part.map @ self._unknowns.spread) * part.map, axis=1)
         kept = np.sum((part.features @ spread.T) ** 2, axis=1)
-        squares = float(np.mean(np.maximum(whole - kept, 0.0) + left**2))
-        return float(round(min(squares**0.5, 1.0), TUNING.explain.learnt_places))
+        rest = float(np.sqrt(np.mean(np.maximum(whole - kept, 0.0) + left**2)))
+
+        factor, places = max(rest, 1.0), TUNING.explain.learnt_places
+        rows = np.round(spread / factor, places - 1).tolist()
+        return ChannelForm(
+            float(f"{factor * part.size:.4g}"),
+            tuple(np.round(mean / factor, places).tolist()),
+            tuple(tuple(row) for row in rows),
+            round(rest / factor, places),
+        )
 
     def _soil(self) -> LearntSoil:
         """Correlations, a little less than they are, so that they hold together once rounded; the

@@ -8,7 +8,8 @@ from math import nan, sqrt
 
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
-from gritd.estimator.filter.tracker import Account, TrackState
+from gritd.estimator.filter.track import TrackState
+from gritd.estimator.filter.tracker import Account
 from gritd.estimator.messages.tick import (
     Aid,
     FilterHealth,

@@ -160,6 +160,11 @@ class Memory(NamedTuple):
         """The stretches on the present soil that are complete."""
         return tuple([s for s in self.stretches[self.since : -1] if s.line is not None])
 
+    def along(self, lines: Sequence[Line]) -> Memory:
+        """The memory with a tangent for each stretch."""
+        both = zip(self.stretches, lines, strict=True)
+        return self._replace(stretches=tuple([s._replace(line=line) for s, line in both]))
+
     def changed_at(self, number: int, known: Estimate) -> Memory:
         """The memory with a change of the soil before the complete stretch of this number. What
         failed its gate since then belongs to the new soil, and that may go on changing.

@@ -4,6 +4,8 @@ ends.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
@@ -16,7 +18,7 @@ from gritd.estimator.filter.estimate import (
     Vector,
     predict,
 )
-from gritd.estimator.filter.line import line_of
+from gritd.estimator.filter.line import Line, line_of
 from gritd.estimator.filter.measurement import Measurement, selected
 from gritd.estimator.filter.segments import CAPACITY, Memory, Stretch
 
@@ -29,7 +31,7 @@ class Smoother:
     ) -> None:
         self._measurement = measurement
         self._engine = engine
-        self._prior_sigma = prior_sigma
+        self.prior_sigma = prior_sigma
         self._radius = measurement.chain.wheel.radius
         walk = settings.filter
         self._rates = (walk.cohesion_walk / KPA, walk.tan_phi_walk, walk.ln_k_walk)
@@ -38,7 +40,7 @@ class Smoother:
         """Random walk of the soil over the elapsed time [s]; unrest: more of it after a change,
         [prior σ/√s].
         """
-        rates = zip(self._rates, self._prior_sigma, strict=True)
+        rates = zip(self._rates, self.prior_sigma, strict=True)
         return predict(
             estimate,
             tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates]),
@@ -72,20 +74,21 @@ class Smoother:
         variances, windows = self._measurement.variances, [stretch.windows for stretch in told]
         return judge(before, variances, self._doubted(doubt), lines, windows)
 
-    def linearised(self, memory: Memory, x: Vector) -> Memory:
-        """All stretches along the tangent at x."""
-        lined = [s._replace(line=line_of(self._measurement, s.mean, x)) for s in memory.stretches]
-        return memory._replace(stretches=tuple(lined))
+    def tangents(self, stretches: Sequence[Stretch], x: Vector) -> tuple[Line, ...]:
+        """Stretches along the tangents at x (3,)."""
+        return tuple([line_of(self._measurement, stretch.mean, x) for stretch in stretches])
 
-    def smoothed(self, memory: Memory, consider_k: bool, doubt: float) -> tuple[Memory, Estimate]:
-        """The filter over all stretches of a memory that is linearised; where the soil changed, the
-        memory notes what is still known.
+    def over(
+        self, estimate: Estimate, stretches: Sequence[Stretch], consider_k: bool, doubt: float
+    ) -> tuple[tuple[Stretch, ...], Estimate]:
+        """The filter over stretches that have their tangents; where the soil changed, a stretch
+        notes what is still known.
         """
-        estimate, stretches = memory.anchor, []
-        for stretch in memory.stretches:
+        passed = []
+        for stretch in stretches:
             stretch, estimate = self._absorbed(estimate, stretch, consider_k, doubt)
-            stretches.append(stretch)
-        return memory._replace(stretches=tuple(stretches)), estimate
+            passed.append(stretch)
+        return tuple(passed), estimate
 
     def _absorbed(
         self, estimate: Estimate, stretch: Stretch, consider_k: bool, doubt: float
@@ -104,7 +107,7 @@ class Smoother:
 
     def _doubted(self, doubt: float) -> Vector:
         """The prior's σ (3,), so many times."""
-        return tuple([doubt * sigma for sigma in self._prior_sigma])
+        return tuple([doubt * sigma for sigma in self.prior_sigma])
 
     def widened(self, estimate: Estimate, doubt: float = 1.0) -> Estimate:
         """As uncertain as the prior, about where it is; its correlation with the calibration errors

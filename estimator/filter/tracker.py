@@ -6,11 +6,11 @@ done. It reads no clock and keeps nothing between calls.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import hypot, log, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
     KPA,
@@ -20,29 +20,23 @@ from gritd.estimator.filter.estimate import (
     Estimate,
     Update,
     Vector,
-    project,
     variance,
 )
 from gritd.estimator.filter.learnt_soil import with_learnt_soil
-from gritd.estimator.filter.measurement import Columns, Measurement, selected, soil
-from gritd.estimator.filter.segments import LONGEST, Memory
+from gritd.estimator.filter.measurement import Measurement, selected, soil
+from gritd.estimator.filter.review import Reviewer
+from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother
-from gritd.estimator.filter.trust import Trust
+from gritd.estimator.filter.track import TrackState, slip_varies
 from gritd.estimator.filter.tuning import CHANGE, TRUST
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import Aid
-from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.chain import Context
 from gritd.estimator.wheel.sync import Snapshot
 from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
 
-SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …
-CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
-MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
-
-Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
 
 
 class Account(NamedTuple):
@@ -62,26 +56,6 @@ class Account(NamedTuple):
         return self.snapshot.ready and self.now.theta_1.value > 0.0
 
 
-class TrackState(NamedTuple):
-    """Everything the tracker remembers from window to window."""
-
-    estimate: Estimate
-    memory: Memory
-    recall: Mapping[str, Recall]  # what configured effects remember, by name
-    columns: Columns = ()  # of the uncertain effect parameters, at the last update
-    linearised: Point | None = None  # where the memory was linearised last
-    unlinearised: int = 0  # windows since then
-    began: int = -1  # end of the first window [ns]
-    window_end: int = -1  # end of the last window looked at [ns]
-    before: WheelState | None = None
-    slip_varied: bool = False  # from one steady stretch to another, on the present soil
-    trust: Trust = Trust()
-    updates: int = 0
-    resets: int = 0
-    started: bool = False  # every required channel has filled a window once
-    origin: float | None = None  # where the carriage stood in the first full window [m]
-
-
 class Tracker:
     """The settings turned into a filter; the state lives with the caller."""
 
@@ -95,7 +69,6 @@ class Tracker:
         )
         # half of what the memory of innovations holds of one component
         self._experienced = 0.5 * TRUST.memory * NS / self._window
-        self._bounds = _bounds(settings)
         soil = settings.soil
         self._prior_sigma = (
             soil.cohesion.sigma / KPA,
@@ -109,7 +82,9 @@ class Tracker:
             ),
             settings,
         )
+        self._bounds = Bounds(settings, self.prior.x, self._prior_sigma)
         self.smoother = Smoother(settings, self.measurement, self.engine, self._prior_sigma)
+        self.reviewer = Reviewer(settings, self.smoother, self._bounds)
 
     def start(self) -> TrackState:
         """The prior."""
@@ -125,14 +100,17 @@ class Tracker:
 
     def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
         """Classify the window; when a whole new one has passed, and it is fit for it, update the
-        filter.
+        filter. In the ticks between, a share of what is done with the record.
         """
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
+        closes = state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window
+        state = self.reviewer.finished(state) if closes else self.reviewer.step(state)
+
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
         status = classify(self.settings, snapshot, now, state.before, self._required, state.started)
         aids: tuple[Aid, ...] = ()
-        if state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window:
+        if closes:
             state = self._closed(state, snapshot, now, elapsed)
             if status == Status.TRACKING:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
@@ -184,46 +162,24 @@ class Tracker:
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float
     ) -> tuple[TrackState, tuple[Aid, ...]]:
-        """Walk over the elapsed time, gate, update, remember; judge the record where a stretch
-        ends.
+        """Walk over the elapsed time, gate, update, remember; where a stretch ends, begin a review
+        of the record.
         """
-        trust = state.trust.passed(elapsed)
-        walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
-        state = state._replace(estimate=walked, trust=trust)
+        state = self._set_back(state._replace(trust=state.trust.passed(elapsed)))
+        walked = self.smoother.walked(state.estimate, elapsed, state.trust.unrest)
+        state = state._replace(estimate=walked)
 
         update = self.measurement.linearise(now, self.measurement.predict(walked, now))
         aids = self._gate(walked, now, update)
         taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
         if taken:
             update = selected(update, taken)
-            estimate = self.engine.update(walked, update, not self.estimates_k(state))
-            state = self._moved_to(state, estimate, elapsed)
+            estimate = self.engine.update(walked, update, not self.reviewer.estimates_k(state))
+            state = self._bounds.moved(state, estimate, elapsed)
             state = state._replace(updates=state.updates + 1)
 
         state = self._remember(state, now, taken, elapsed)
-        return self._judge(state, aids, elapsed), aids
-
-    def _moved_to(self, state: TrackState, estimate: Estimate, elapsed: float = 0.0) -> TrackState:
-        """The estimate inside its bounds, and for how long it has stood at one."""
-        estimate = project(estimate, self._bounds)
-        at_bound = state.trust.at_bound + elapsed if self._at_bound(estimate) else 0.0
-        return state._replace(estimate=estimate, trust=state.trust._replace(at_bound=at_bound))
-
-    def _at_bound(self, estimate: Estimate) -> bool:
-        """Whether a state stands at a bound that the prior calls improbable."""
-        return any(
-            [
-                value in bounds and abs(value - mean) > TRUST.improbable * sigma
-                for value, bounds, mean, sigma in zip(
-                    estimate.x, self._bounds, self.prior.x, self._prior_sigma, strict=True
-                )
-            ]
-        )
-
-    def estimates_k(self, state: TrackState) -> bool:
-        """Whether ln k is a state; otherwise it is considered."""
-        choice = self.settings.filter.estimate_k
-        return choice == "always" or (choice == "auto" and state.slip_varied)
+        return state._replace(trust=state.trust.surprised(aids, elapsed)), aids
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate, variances = self.settings.filter.gate, self.measurement.variances
@@ -239,78 +195,26 @@ class Tracker:
     def _remember(
         self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
     ) -> TrackState:
-        """Add the window to the memory; where a stretch ends, judge the record."""
+        """Add the window to the memory; where a stretch ends, begin a review of the record."""
         radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
         memory, begun = state.memory.extended(now, taken, radius, elapsed, state.trust.unrest)
-        varied = state.slip_varied or self._slip_varies(memory, now)
+        varied = state.slip_varied or slip_varies(memory, now.slip.sigma)
         state = state._replace(
             memory=memory, slip_varied=varied, unlinearised=state.unlinearised + 1
         )
         if not begun or not before:
             return state
+        return self.reviewer.begun(state, before[0].like(now, taken))
 
-        memory = self.smoother.completed(
-            memory, state.estimate.x, not self.estimates_k(state), state.trust.doubt
-        )
-        state = self._changed(state._replace(memory=memory))
-
-        same = before[0].like(now, taken) and state.unlinearised < LONGEST
-        point = (self.estimates_k(state), state.estimate.x)
-        if same or not self._moved(state.linearised, point):
-            return state
-        return self._smoothed(state, point)
-
-    def _slip_varies(self, memory: Memory, now: WheelState) -> bool:
-        return memory.slip_span() > max(SLIP_VARIES, CLEARLY * now.slip.sigma)
-
-    def _smoothed(self, state: TrackState, point: Point) -> TrackState:
-        """The filter over the whole memory, linearised at a point."""
-        memory = self.smoother.linearised(state.memory, point[1])
-        memory, estimate = self.smoother.smoothed(memory, not point[0], state.trust.doubt)
-        state = state._replace(memory=memory, linearised=point, unlinearised=0)
-        return self._moved_to(state, estimate)
-
-    def _moved(self, before: Point | None, now: Point) -> bool:
-        """Whether the state is so far from where the memory was linearised that its Jacobians no
-        longer serve.
+    def _set_back(self, state: TrackState) -> TrackState:
+        """Back to the prior's covariance, or a wider one, when the innovations were out of all
+        measure and no change of the soil explained them. From a bound, back to its mean as well.
         """
-        if before is None or before[0] != now[0]:
-            return True
-        steps = zip(before[1], now[1], self._prior_sigma, strict=True)
-        return any(abs(b - a) > MOVED * sigma for a, b, sigma in steps)
-
-    def _changed(self, state: TrackState) -> TrackState:
-        """The state with σ widened where the soil changed."""
-        smoother = self.smoother
-        judgement = smoother.judgement(state.memory, state.trust.doubt)
-        if judgement is None or not judgement.change:
-            return state
-
-        # tangents taken at a poor estimate mislead: once more, along those at the best fit
-        x = project(state.estimate._replace(x=judgement.x), self._bounds).x
-        state = state._replace(memory=smoother.linearised(state.memory, x), linearised=None)
-        judgement = smoother.judgement(state.memory, state.trust.doubt)
-        if judgement is None or not judgement.change:
-            return state
-        return self._restarted(state, state.memory.changed_at(judgement.change, state.estimate))
-
-    def _restarted(self, state: TrackState, memory: Memory) -> TrackState:
-        """The state with a memory in which the soil changed."""
-        before = state.before
-        varied = before is not None and self._slip_varies(memory, before)
-        state = state._replace(memory=memory, slip_varied=varied, trust=state.trust.changed())
-        return self._smoothed(state, (self.estimates_k(state), state.estimate.x))
-
-    def _judge(self, state: TrackState, aids: tuple[Aid, ...], elapsed: float) -> TrackState:
-        """Keep the account of the innovations; back to the prior's covariance, or a wider one, when
-        they are out of all measure. From a bound, back to its mean as well.
-        """
-        state = state._replace(trust=state.trust.surprised(aids, elapsed))
         if not state.trust.inconsistent(self._experienced):
             return state
 
         trust = state.trust.reset()
-        x = self.prior.x if self._at_bound(state.estimate) else state.estimate.x
+        x = self.prior.x if self._bounds.improbable(state.estimate) else state.estimate.x
         estimate = self._unsure(x, trust.doubt)
         return state._replace(
             estimate=estimate,
@@ -337,7 +241,7 @@ class Tracker:
         torque, drawbar_pull = trust.surprise
         return (
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
-            + Flag.K_ESTIMATED * self.estimates_k(state)
+            + Flag.K_ESTIMATED * self.reviewer.estimates_k(state)
             + Flag.GATED * (not all([aid.accepted for aid in aids]))
             + Flag.RESET * (bool(aids) and trust.since_reset == 0.0)
             + Flag.MISMATCH * disagrees
@@ -359,10 +263,3 @@ def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
     time = 0.0 if state.began < 0 else (snapshot.evaluated - state.began) / NS
     origin = snapshot.carriage_position if state.origin is None else state.origin
     return Context(time, *soil(state.estimate), acceleration, sinking, state.recall, origin)
-
-
-def _bounds(settings: Settings) -> tuple[tuple[float, float], ...]:
-    """Bounds of the scaled state."""
-    low_c, high_c = settings.filter.cohesion_bounds
-    low_k, high_k = settings.filter.shear_modulus_bounds
-    return (low_c / KPA, high_c / KPA), settings.filter.tan_phi_bounds, (log(low_k), log(high_k))

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
 from gritd.estimator.filter.estimate import Estimate, Vector
-from gritd.estimator.filter.tracker import Account, Tracker, TrackState
+from gritd.estimator.filter.track import TrackState
+from gritd.estimator.filter.tracker import Account, Tracker
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import (
@@ -137,6 +138,7 @@ def followed(
             advance(begin + len(rows), len(chosen))
         tables.append(np.array(rows, dtype=_WINDOW_DTYPE))
 
+    state = tracker.reviewer.finished(state)
     return Replayed(
         np.concatenate(tables),
         state.estimate,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import Repeatability, Settings
 from gritd.estimator.filter.estimate import KPA, STATES, Estimate, Vector
 from gritd.estimator.filter.segments import Memory
-from gritd.estimator.filter.tracker import TrackState
+from gritd.estimator.filter.track import TrackState
 
 Array = NDArray[np.float64]
 LEAST = 1e-9  # of the largest narrowing: a direction that was narrowed by less was not measured

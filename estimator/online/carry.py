@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.segments import Memory
-from gritd.estimator.filter.tracker import TrackState
+from gritd.estimator.filter.track import TrackState
 from gritd.estimator.online.pipeline import Pipeline, State
 
 _FIXED = ("testbed", "wheel", "pulley_radius", "devices", "rates", "place")

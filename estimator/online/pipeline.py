@@ -16,7 +16,8 @@ from gritd.estimator.filter.account import (
     soil_estimate,
 )
 from gritd.estimator.filter.pull import UNKNOWN, Pull, Search, search_on
-from gritd.estimator.filter.tracker import Account, Tracker, TrackState
+from gritd.estimator.filter.track import TrackState
+from gritd.estimator.filter.tracker import Account, Tracker
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import Head, LargestPull, Tick, TickRow, row

@@ -1,0 +1,83 @@
+"""What the tracker remembers from window to window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from gritd.estimator.filter.estimate import Estimate, Vector
+from gritd.estimator.filter.line import Line
+from gritd.estimator.filter.measurement import Columns
+from gritd.estimator.filter.segments import Memory, Stretch
+from gritd.estimator.filter.trust import Trust
+from gritd.estimator.stages.situation import Recall
+from gritd.estimator.wheel.wheel_state import WheelState
+
+SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …
+CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
+
+Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
+
+
+class Ended(NamedTuple):
+    """A stretch has ended: it is to be completed."""
+
+    same: bool  # the next is of the same condition, and the memory was linearised lately
+
+
+class Judging(NamedTuple):
+    """The record is to be judged."""
+
+    same: bool
+
+
+class Again(NamedTuple):
+    """The soil seems to have changed: tangents at the best fit, so far, to judge the record by."""
+
+    same: bool
+    x: Vector
+    lines: tuple[Line, ...] = ()
+
+
+class Relining(NamedTuple):
+    """The memory is linearised anew: its tangents so far."""
+
+    point: Point
+    lines: tuple[Line, ...] = ()
+
+
+class Passing(NamedTuple):
+    """The filter runs over the memory that was linearised anew: the stretches it has been over."""
+
+    point: Point
+    estimate: Estimate
+    stretches: tuple[Stretch, ...] = ()
+
+
+Task = Ended | Judging | Again | Relining | Passing
+
+
+class TrackState(NamedTuple):
+    """Everything the tracker remembers from window to window."""
+
+    estimate: Estimate
+    memory: Memory
+    recall: Mapping[str, Recall]  # what configured effects remember, by name
+    columns: Columns = ()  # of the uncertain effect parameters, at the last update
+    linearised: Point | None = None  # where the memory was linearised last
+    unlinearised: int = 0  # windows since then
+    began: int = -1  # end of the first window [ns]
+    window_end: int = -1  # end of the last window looked at [ns]
+    before: WheelState | None = None
+    slip_varied: bool = False  # from one steady stretch to another, on the present soil
+    trust: Trust = Trust()
+    updates: int = 0
+    resets: int = 0
+    started: bool = False  # every required channel has filled a window once
+    origin: float | None = None  # where the carriage stood in the first full window [m]
+    task: Task | None = None  # of the review of the record that is under way
+
+
+def slip_varies(memory: Memory, sigma: float) -> bool:
+    """Whether slip has varied enough to tell k; sigma: of the slip of a window."""
+    return memory.slip_span() > max(SLIP_VARIES, CLEARLY * sigma)

@@ -1,0 +1,110 @@
+"""The record is judged and linearised anew a share a tick, with the result of doing it at once."""
+
+from __future__ import annotations
+
+from itertools import groupby, pairwise
+
+import pytest
+
+from gritd.config import packaged
+from gritd.estimator.config.configuration import load
+from gritd.estimator.filter import review, smoother
+from gritd.estimator.filter.review import Reviewer
+from gritd.estimator.messages.status import Flag
+from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.online import checkpoint
+from gritd.estimator.online.pipeline import Pipeline
+from tests.linear_plant import readings
+
+SETTINGS = load(packaged()).settings
+TRUTH = (720.0, 0.62, 0.025)
+SCHEDULE = [(2.0, 50.0, 0.2), (2.0, 90.0, 0.4), (2.0, 60.0, 0.1), (2.0, 80.0, 0.5)]
+JUMP, MORE_VOLTS = 6.0, 0.05  # [s] from which on the shunt reads so much more: a change of the soil
+
+
+def _more(reading):
+    late = reading.channel == "motor_shunt" and reading.stamp > JUMP * 1e9
+    return reading._replace(value=reading.value + MORE_VOLTS) if late else reading
+
+
+@pytest.fixture(scope="module")
+def consumed():
+    """(stamp, readings) of every tick at 250 Hz."""
+    plant = readings(SETTINGS, TRUTH, SCHEDULE, seed=4, rate=250)
+    each = (_more(reading) for _, batch in plant for reading in batch)
+    return [(stamp, list(group)) for stamp, group in groupby(each, key=lambda r: r.stamp)]
+
+
+def _finished(reviewer, state, step):
+    while state.task is not None:
+        state = step(reviewer, state)
+    return state
+
+
+def run(consumed):
+    """The states after each tick, and the ticks as dictionaries."""
+    pipeline = Pipeline(SETTINGS)
+    state, states, ticks = pipeline.start(), [], []
+    for stamp, batch in consumed:
+        state, row = pipeline.step(state, batch, stamp)
+        states.append(state)
+        ticks.append(dict(zip(TICK_NAMES, row, strict=True)))
+    return states, ticks
+
+
+def test_spread_over_ticks_or_at_once_a_window_leaves_the_same(consumed, monkeypatch):
+    spread, told = run(consumed)
+    step = Reviewer.step
+    monkeypatch.setattr(Reviewer, "step", lambda self, state: state)
+    monkeypatch.setattr(Reviewer, "finished", lambda self, state: _finished(self, state, step))
+    at_once, _ = run(consumed)
+
+    windows = [n for n, tick in enumerate(told) if tick["torque_z"] != 0.0]
+    assert len(windows) > 60
+    for n in windows:
+        assert spread[n].track == at_once[n].track
+    assert any(tick["flags"] & Flag.CHANGED for tick in told)
+
+
+def test_no_tick_takes_more_than_its_share_of_tangents(consumed, monkeypatch):
+    taken, line_of = [], smoother.line_of
+
+    def counted(*arguments):
+        taken.append(1)
+        return line_of(*arguments)
+
+    monkeypatch.setattr(smoother, "line_of", counted)
+    pipeline, most, under_way = Pipeline(SETTINGS), 0, 0
+    state = pipeline.start()
+    for stamp, batch in consumed:
+        taken.clear()
+        state, _ = pipeline.step(state, batch, stamp)
+        most = max(most, len(taken))
+        under_way += state.track.task is not None
+    assert most == review.LINES
+    assert under_way > 50
+
+
+def test_the_estimate_stays_what_the_window_left_until_the_review_is_complete(consumed):
+    states, _ = run(consumed)
+    under_way = [
+        (before.track, after.track)
+        for before, after in pairwise(states)
+        if before.track.task is not None and after.track.task is not None
+    ]
+    assert under_way
+    assert all(before.estimate == after.estimate for before, after in under_way)
+
+
+def test_every_step_of_a_review_is_read_back_from_a_checkpoint_to_the_same_bits(consumed):
+    states, _ = run(consumed)
+    pipeline = Pipeline(SETTINGS)
+    seen = {}
+    for n, state in enumerate(states):
+        if state.track.task is not None:
+            seen.setdefault(type(state.track.task).__name__, n)
+    assert {"Ended", "Judging", "Again", "Relining", "Passing"} <= seen.keys()
+
+    for n in seen.values():
+        restored = checkpoint.decode(checkpoint.encode(states[n]), pipeline.settings)
+        assert restored.track == states[n].track

@@ -1,26 +1,22 @@
-"""The disk fills, goes read-only, or the process dies while it writes."""
+"""The disk fills, goes read-only or hangs, parts are deleted, and the daemon is told to end."""
 
 from __future__ import annotations
 
 import os
 import pwd
 import random
+import re
 import shutil
-import signal
-import struct
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.parts import part_path, parts
+from gritd.estimator.recording.parts import part_path
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import CHECKPOINT
-from tests.scenarios import killed_writer
 from tests.scenarios.rig import (
     ROOT,
     WIRES,
@@ -37,10 +33,7 @@ from tests.scenarios.users import as_root, hand_over
 
 FULL = "disk full"
 READ_ONLY = "log folder read-only"
-KILLED = "kill -9 while logging"
-POWER = "power cut while logging"
 TERM = "SIGTERM"
-KILLS = 500
 
 
 @pytest.fixture
@@ -72,15 +65,14 @@ def test_disk_full(tmp_path, small_disk, seed, figure):
         time.sleep(rng.uniform(0.5, 1.0))
         ballast = fill(small_disk)
         daemon.heard("log degraded")
+        before = daemon.status()["loop"]["ticks"]
         time.sleep(rng.uniform(1.0, 2.0))
-        before = daemon.status()["loop"]
+        daemon.wait_status(lambda report: report["loop"]["ticks"] > before)
         ballast.unlink()
         room = time.monotonic()
         back = daemon.heard("log writing") - room
-        after = daemon.status()
         daemon.stop()
         kept = copied(daemon, tmp_path)
-    assert after["loop"]["ticks"] > before["ticks"]
     stamps, missed = rows(kept, "/tick")["stamp"], rows(kept, "/loop")["missed"]
     gone = (
         round((stamps[-1] - stamps[0]) / 4e6) + 1 - len(stamps) - (int(missed[-1]) - int(missed[0]))
@@ -186,8 +178,9 @@ def test_log_folder_read_only_during_a_run(folder_of_nobody, seed, figure):
             logs.chmod(0o555)
             degraded = daemon.heard("log degraded")
             assert "Permission denied" in daemon.text
+            before = daemon.status()["loop"]["ticks"]
             time.sleep(0.5)
-            assert daemon.status()["loop"]["ticks"] > 100
+            daemon.wait_status(lambda report: report["loop"]["ticks"] > before)
             logs.chmod(0o755)
             back = daemon.heard("log writing") - degraded
             daemon.stop()
@@ -221,123 +214,13 @@ def parts_asked(path):
     ]
 
 
-# ---- the process dies ----------------------------------------------------------------------------
-
-
-def test_killed_while_logging(tmp_path, seed, figure):
-    rng = random.Random(seed)
-    with service(tmp_path, driven(40.0, seed, skip=1.0)) as (_, daemon):
-        time.sleep(rng.uniform(1.0, 2.0))
-        killed = time.time_ns()
-        daemon.signal(signal.SIGKILL)
-        daemon.exit_code()
-    recording = read(daemon.path())
-    assert not recording.closed and not recording.lost
-    lost = (killed - rows(daemon.path(), "/tick")["stamp"][-1]) * 1e-9
-    figure(KILLED, WIRES, "data lost", lost, "s", 0.25, real=True)
-    assert verified(daemon.path())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "kills"), [("logging", KILLS), ("rotating", 150), ("closing", 150)]
-)
-def test_many_kills(tmp_path, kind, kills, figure):
-    """The writer in a process of its own, killed at a random time: in the middle of a run, while a
-    part begins every 0.1 s, or within the few milliseconds in which it closes. What was lost counts
-    from what had been handed over.
-    """
-    command = [sys.executable, "-m", killed_writer.__name__, str(tmp_path), kind, str(kills)]
-    parent, rng = subprocess.Popen(command, stdout=subprocess.PIPE, cwd=ROOT), random.Random(1)
-    for _ in range(kills):
-        child = int(parent.stdout.readline())
-        if kind == "closing":
-            assert parent.stdout.readline() == killed_writer.MARK
-        time.sleep(rng.uniform(0.0, 0.02) if kind == "closing" else rng.uniform(0.25, 0.7))
-        os.kill(child, signal.SIGKILL)
-    assert parent.wait() == 0
-    found = [survived(tmp_path / f"{name}.mcap", tmp_path / f"{name}.put") for name in range(kills)]
-    level, lost = (
-        f"writer thread in a process of its own, {kind}",
-        [loss for loss in found if loss is not None],
-    )
-    figure(KILLED, level, f"of {kills} runs not readable", found.count(None), "", 0)
-    figure(KILLED, level, "data lost, worst", max(lost), "s", 0.25, real=True)
-    figure(KILLED, level, "data lost, 99 %", float(np.quantile(lost, 0.99)), "s", 0.25, real=True)
-
-
-def survived(path, shared):
-    """How much of what had been handed over is missing at the end [s]; None if not all before it is
-    there, in order.
-    """
-    count, last = struct.unpack("<qq", shared.read_bytes())
-    if not count:
-        return 0.0  # killed before it had begun
-    try:
-        encoder = np.concatenate([read(part).arrays("/raw/wheel_encoder") for part in parts(path)])
-    except RecordingError:
-        return None
-    whole = (
-        np.array_equal(encoder["count"][::5], np.arange(len(encoder) // 5))
-        and len(encoder) % 5 == 0
-    )
-    if not whole or len(encoder) > 5 * (count + 1):
-        return None
-    return (last - (encoder["stamp"][-1] if len(encoder) else last - 4_000_000 * count)) * 1e-9
-
-
-def test_power_cut(tmp_path, seed, figure):
-    """Cut at 300 random bytes; what is read is always the beginning of what was written."""
-    check_cuts(
-        tmp_path, seed, figure, lambda size: sorted(random.Random(seed).sample(range(size), 300))
-    )
-
-
-@pytest.mark.slow
-def test_power_cut_at_every_byte(tmp_path, figure):
-    check_cuts(tmp_path, 1, figure, range)
-
-
-def check_cuts(folder, seed, figure, places):
-    whole = short_recording(folder, seed)
-    messages = list(map(repr, read(whole).messages()))
-    data, cut = whole.read_bytes(), folder / "cut.mcap"
-    wrong, unreadable = 0, 0
-    offsets = places(len(data))
-    for size in offsets:
-        cut.write_bytes(data[:size])
-        try:
-            found = list(map(repr, read(cut).messages()))
-        except RecordingError:
-            unreadable += size > 64  # without its header it is no MCAP file
-            continue
-        wrong += found != messages[: len(found)]
-    level = "a daemon's recording, the cut simulated"
-    figure(
-        POWER,
-        level,
-        f"wrong results, cut at {'every byte' if len(offsets) == len(data) else '300 bytes'}",
-        wrong,
-        "",
-        0,
-    )
-    figure(POWER, level, "cuts after the header that cannot be read", unreadable, "", 0)
-
-
-def short_recording(folder, seed):
-    """Of 0.3 s of a daemon without sensors: a few chunks."""
-    with service(folder, logging={"flush_interval": "50 ms"}) as (_, daemon):
-        time.sleep(0.1 * seed)
-        daemon.stop()
-    return daemon.path()
-
-
 def test_the_open_part_is_deleted_by_somebody(tmp_path, figure):
     """What was in it is gone; what comes goes into a new part, and the log says so."""
     with service(tmp_path, driven(40.0, 1, skip=1.0)) as (_, daemon):
         time.sleep(1.5)
         daemon.path().unlink()
         daemon.heard("logging to", 2)
+        daemon.heard("was deleted while it was written")
         time.sleep(1.0)
         daemon.stop()
     (part,) = tmp_path.glob("run-*.mcap")
@@ -369,11 +252,15 @@ def test_sigterm_under_load(tmp_path, seed, figure):
         for process in busy:
             process.kill()
             process.wait()
+    # what a starved loop had to drop before is counted; what is there at SIGTERM is all written
     accepted, written, dropped, queued = daemon.account()
-    (queue,) = [line for _, line in daemon.said if line.startswith("queue:")]
-    assert dropped == queued == 0 and accepted == written and queue.endswith("dropped 0 + queued 0")
+    assert queued == 0 and accepted == written + dropped
+    (queue,) = [line for _, line in daemon.said if re.match("queue: received", line)]
+    received, processed, lost, waiting = map(int, re.findall(r"\d+", queue))
+    assert waiting == 0 and received == processed + lost
+
     recording = read(daemon.path())
-    assert recording.complete
+    assert recording.complete and sum(1 for _ in recording.messages()) == written
     figure(
         TERM,
         f"{WIRES}, two busy processes",
@@ -383,9 +270,7 @@ def test_sigterm_under_load(tmp_path, seed, figure):
         2.0,
         real=True,
     )
-    assert verified(daemon.path()) and not any(
-        "hanging" in line for line in log_lines(daemon.path())
-    )
+    assert verified(daemon.path())
 
 
 SLOW_MEDIUM = """
@@ -421,10 +306,13 @@ def test_the_open_part_is_never_deleted(tmp_path, figure):
         tmp_path, driven(40.0, 1, skip=1.0), logging={"part_time": "1 s", "disk_cap": "1 MB"}
     ) as (_, daemon):
         daemon.heard("old.mcap: deleted, over logging.disk_cap")
+        daemon.heard("logging to", 5)
         time.sleep(0.5)
         daemon.stop()
     parts = sorted(tmp_path.glob("run-*.mcap"), key=lambda path: path.stat().st_mtime)
-    assert len(parts) >= 4 and sum(part.stat().st_size for part in parts) <= 1.2e6
+    kept = sum(part.stat().st_size for part in parts) / 1e6
+    figure("disk cap and rotation", WIRES, "kept, of a cap of 1 MB", kept, "MB", 1.2, real=True)
+    assert len(parts) >= 4
     assert verified(daemon.path())
     assert all(verified(part) for part in parts[1:])
     figure("disk cap and rotation", WIRES, "parts written and verified one by one", len(parts), "")
@@ -444,8 +332,8 @@ def test_links_and_folders_named_like_recordings(tmp_path, figure):
     (tmp_path / "folder.mcap").mkdir()
     changes = {"part_time": "1 s", "disk_cap": "1 MB"}
     with service(tmp_path, driven(40.0, 1, skip=1.0), logging=changes) as (_, daemon):
-        part_path(daemon.path(), 3).mkdir()
-        part_path(daemon.path(), 4).symlink_to(tmp_path / "nothing")
+        last = put_in_the_way(daemon.path(), tmp_path / "nothing")
+        daemon.until(lambda: newest(daemon) > last, "did not go past what is in its way")
         daemon.heard("old.mcap: deleted, over logging.disk_cap")
         daemon.heard(".mcap: deleted, over logging.disk_cap", 4)
         time.sleep(0.5)
@@ -460,3 +348,28 @@ def test_links_and_folders_named_like_recordings(tmp_path, figure):
     row = "links and folders named like recordings"
     figure(row, WIRES, "kept, of a cap of 1 MB", kept / 1e6, "MB", 1.2, real=True)
     figure(row, WIRES, "messages lost", dropped, "", 0)
+
+
+def put_in_the_way(path, target):
+    """A folder and a dangling link in the place of the next two parts that nobody has begun yet;
+    the number of the second.
+    """
+    number, left = 3, 2
+    while left:
+        try:
+            if left == 2:
+                part_path(path, number).mkdir()
+            else:
+                part_path(path, number).symlink_to(target)
+            left -= 1
+        except FileExistsError:
+            pass  # a part was begun there meanwhile
+        number += 1
+    return number - 1
+
+
+def newest(daemon):
+    """The number of the part that it began last."""
+    line = daemon.lines("logging to ")[-1][1]
+    found = re.search(r"\.(\d+)\.mcap$", line)
+    return int(found[1]) if found else 0

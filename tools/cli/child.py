@@ -16,7 +16,7 @@ from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.offspring import ends_with_us
 
-STOP = 20.0  # [s] the longest a child may take to end
+STOP = 60.0  # [s] the longest a child may take to end, on a starved computer
 
 
 @contextmanager

@@ -28,7 +28,7 @@ from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.testbed import NAME, PLAYED, SHORTEST
 from gritd.tools.testbed.wires import CanKind
 
-READY = 60.0  # [s] the longest that testbed or daemon may take to start
+READY = 300.0  # [s] the longest that testbed or daemon may take to start, on a starved computer
 DEVICES = 2  # of the packaged testbed
 
 

@@ -84,9 +84,9 @@ def test_a_demo_that_is_stopped_leaves_no_process_behind(number, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        assert wait_until(lambda: len(children(tmp_path)) == 2 or process.poll() is not None)
+        assert wait_until(lambda: len(children(tmp_path)) == 2 or process.poll() is not None, 600.0)
         process.send_signal(number)
-        assert process.wait(120) == 130
+        assert process.wait(600) == 130
         assert process.stderr.read() == ""
     assert not children(tmp_path)
 

@@ -32,9 +32,14 @@ class RunInfo:
     lost_before: int = 0
     bed: str = ""  # whose earlier runs the estimate began with
     operator: str = ""  # who ran it
+    # a table's means, with scatter that an importer drew: no course of time, place or wheel angle
+    steady_states: bool = False
 
     def entries(self) -> dict[str, str]:
-        return {key: "" if value is None else str(value) for key, value in asdict(self).items()}
+        every = asdict(self)
+        if not self.steady_states:
+            del every["steady_states"]
+        return {key: "" if value is None else str(value) for key, value in every.items()}
 
     @classmethod
     def from_entries(cls, entries: Mapping[str, str]) -> tuple[RunInfo, list[str]]:
@@ -63,6 +68,7 @@ class RunInfo:
             lost_before=number("lost_before", int, 0, 0, MOST_LOST),
             bed=entries.get("bed", ""),
             operator=entries.get("operator", ""),
+            steady_states=entries.get("steady_states", "") == "True",
         )
         return run, wrong
 

@@ -311,12 +311,13 @@ def _ripples(
     screening: Screening, projection: Projection, projected: Projected, families: list[Family]
 ) -> list[Place]:
     """The strongest order of the wheel angle in each channel beside all smooth functions, against
-    every surrogate's.
+    every surrogate's. A ripple in any channel by noise alone is as rare as order_chance.
     """
     stack = screening.problem.stack
     orders = np.arange(TUNING.explain.lowest_order, highest_order(stack))
     places = []
-    for channel in stack.rig.channels if orders.size else ():
+    channels = stack.rig.channels if orders.size else ()
+    for channel in channels:
         here, size = [f for f in families if f.shape.channel == channel], size_of(stack, channel)
         if size <= 0.0 or not here:
             continue
@@ -327,10 +328,11 @@ def _ripples(
         p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
         whole = _gain(projected, _joined(here))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
-        if p <= TUNING.explain.order_chance and share >= TUNING.explain.least_share:
+        q = min(p * len(channels), 1.0)  # any of them may ripple by noise (Bonferroni)
+        if q <= TUNING.explain.order_chance and share >= TUNING.explain.least_share:
             amplitude = size * _amplitude(left, best, best + orders.size)
             words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
-            location = Location(channel, "wheel_angle", share, p, p, words)
+            location = Location(channel, "wheel_angle", share, p, q, words)
             places.append(Place(float(nats[best, 0]), location))
     return places
 

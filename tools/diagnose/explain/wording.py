@@ -185,6 +185,21 @@ def _value(stack: Stack, covariate: str, value: float) -> str:
     return spaced(value * factor, unit, _digits(covariate, value * factor))
 
 
+def _apart(stack: Stack, covariate: str, values: Sequence[float]) -> list[str]:
+    """Values of a covariate, each in as many digits as tell it from the others; 0 for one that is
+    nothing beside them.
+    """
+    unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
+    least = TUNING.explain.reads_nothing * max(abs(v) for v in values)
+    known = [v * factor if abs(v) > least else 0.0 for v in values]
+    texts: list[str] = []
+    for more in range(TUNING.explain.more_digits + 1):
+        texts = [spaced(v, unit, _digits(covariate, v) + more) for v in known]
+        if len(set(texts)) == len(texts):
+            break
+    return texts
+
+
 def _digits(covariate: str, value: float) -> int:
     return 3 if covariate in ("position", "time") and abs(value) >= 10.0 else 2
 
@@ -201,8 +216,9 @@ def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) 
     if outside <= TUNING.explain.middle_stands_out * abs(high - low):
         ends = [ends[0], ends[2]]
     (first, mean), *rest = ends
-    others = [f"{_brief(say(m))} at {_value(stack, covariate, v)}" for v, m in rest]
-    return ", ".join([f"{say(mean)} at {value_of(stack, covariate, first)}", *others])
+    at, *beyond = _apart(stack, covariate, [first, *(v for v, _ in rest)])
+    others = [f"{_brief(say(m))} at {v}" for (_, m), v in zip(rest, beyond, strict=True)]
+    return ", ".join([f"{say(mean)} at {AT.get(covariate, '{}').format(at)}", *others])
 
 
 def _quantiles(

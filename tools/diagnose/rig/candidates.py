@@ -18,16 +18,26 @@ TURN = 2.0 * np.pi  # [rad] a recording that goes on for so long is no table
 def candidates(signals: Sequence[Signals], left_out: Collection[str]) -> dict[str, type[Effect]]:
     """The effects to look for, by name: of steady states only what they can show."""
     listed = {n: e for n, e in EFFECTS.items() if not e.filter_only and n not in left_out}
-    if not all(steady_states(s) for s in signals):
+    if not tables(signals):
         return listed
     shown = {name: effect.in_steady_states() for name, effect in listed.items()}
     return {name: effect for name, effect in shown.items() if effect is not None}
 
 
+def tables(signals: Sequence[Signals]) -> bool:
+    """Whether all recordings are tables of steady states."""
+    return all(steady_states(s) for s in signals)
+
+
 def steady_states(signals: Signals) -> bool:
-    """Whether a recording is a table of steady states: no speed changes but across a silence, and
-    no stretch lasts a whole turn. Time, place and wheel angle in it mean nothing.
+    """Whether a recording is a table of steady states. Time, place and wheel angle in it mean
+    nothing.
+
+    Its importer says so. Else no speed changes but across a silence, and no stretch lasts a whole
+    turn.
     """
+    if signals.info.steady_states:
+        return True
     known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
     stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
     return not any(

@@ -68,9 +68,7 @@ def usual_of(runs: Sequence[Run]) -> Usual | None:
 
 def _conditions(run: Run, usual: Usual, radius: float) -> Array:
     known = run.covariates
-    travel = radius * np.cumsum(
-        np.abs(np.diff(known["wheel_angle"], prepend=known["wheel_angle"][0]))
-    )
+    travel = radius * known["rolled"]
     return conditions_of(
         known["slip"], known["load"], known["speed"], known["direction"], travel, usual
     )

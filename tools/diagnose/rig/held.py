@@ -103,8 +103,7 @@ def _kind(channel: str) -> int | None:
 def _told(run: Run, radius: float, correction: Correction) -> tuple[Array, Array]:
     """Conditions (n, d) and weights (n, 3) of a run."""
     known = run.covariates
-    angle = known["wheel_angle"]
-    travel = radius * np.cumsum(np.abs(np.diff(angle, prepend=angle[0])))
+    travel = radius * known["rolled"]
     conditions = conditions_of(
         known["slip"], known["load"], known["speed"], known["direction"], travel, correction.usual
     )

@@ -17,18 +17,17 @@ from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.model.forward import simulate_arrays
-from gritd.estimator.stages.history import rate_of
-from gritd.estimator.stages.situation import Motion, situation_of
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
-from gritd.tools.diagnose.rig.candidates import candidates
+from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, wheel_constants
+from gritd.tools.diagnose.rig.covariates import covariates
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.held import HeldForm
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
-from gritd.tools.diagnose.rig.recorded import channels_of, filled, measured_of, motion_of
+from gritd.tools.diagnose.rig.recorded import channels_of, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import states
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
@@ -88,6 +87,7 @@ class WheelRig:
         self.loss_of_drive = read_off and {"torque", "axle_torque"} <= set(self.channels)
         if self.loss_of_drive:
             self.caveats.append(LOSS_NOTE)
+        self._tabled = tables(signals)
         self._motions = [
             motion_of(s, w.values, settings, s.start - began[new])
             for s, w, new in zip(signals, self._weights, self.new, strict=True)
@@ -323,13 +323,14 @@ class WheelRig:
         measured = {c: measured_of(signals, c, self._constant) for c in self.channels}
         if self.loss_of_drive:
             measured["torque"] = measured["torque"] - measured["axle_torque"]
-        covariates = self._covariates(signals, motion) | {"sinkage": self._depth(number)}
+        along = covariates(signals, motion, self.settings.wheel, self._tabled)
+        along["sinkage"] = self._depth(number)
         driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
         known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
         known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
         used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
-        return Run(signals.name, np.asarray(motion.time), measured, used, covariates)
+        return Run(signals.name, np.asarray(motion.time), measured, used, along)
 
     def _without_held_torque(self, runs: list[Run]) -> list[Run]:
         """A servo may hold torque at rest: where the current at rest differs from rest to rest,
@@ -373,24 +374,3 @@ class WheelRig:
         return simulate_arrays(
             self.settings.wheel, soil, motion, self.baseline, order=TUNING.rig.quadrature_order
         ).sinkage
-
-    def _covariates(self, signals: Signals, motion: Motion) -> dict[str, Array]:
-        situation = situation_of(motion, self.settings.wheel)
-        current = filled(signals.analogue.get("current", np.zeros(signals.time.size)))
-        speed = self.settings.wheel.radius * np.abs(motion.wheel_speed)
-        step = float(np.median(np.diff(signals.time)))
-        ones = np.ones(signals.time.size)
-
-        return {
-            "slip": np.asarray(situation.slip),
-            "speed": np.asarray(speed),
-            "load": np.asarray(motion.load) * ones,
-            "wheel_angle": np.asarray(motion.wheel_angle),
-            "position": np.asarray(situation.position),
-            "time": np.asarray(motion.time),
-            "acceleration": rate_of(motion.time, motion.wheel_speed),
-            "heat": np.cumsum(current**2) * step,
-            "direction": np.asarray(situation.direction),
-            "pass": motion.pass_number * ones,
-            "constant": ones,
-        }

@@ -73,7 +73,9 @@ class Explain:
     # --- locate.py ---
     false_discovery: float = tuned(0.05, "probability", "false-discovery rate of the list")
     places_listed: int = tuned(8, "places", "listed at most")
-    order_chance: float = tuned(0.01, "probability", "of the strongest order by noise alone")
+    order_chance: float = tuned(
+        0.01, "probability", "of the strongest order in any channel by noise alone"
+    )
     strain_far: float = tuned(3.0, "σ", "from its calibration: a constant is a place")
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
     beside_gain: float = tuned(3.0, "nats", "a covariate must gain beside those already named")
@@ -96,6 +98,8 @@ class Explain:
     pictures: int = tuned(4, "scatters", "at most")
 
     # --- wording.py ---
+    reads_nothing: float = tuned(1e-3, "-", "of the largest of several values: less reads 0")
+    more_digits: int = tuned(3, "digits", "at most, that tell values apart")
     low_end: Range = tuned((0.0, 0.15), "choice", "quantiles between which a mean is taken")
     middle: Range = tuned((0.4, 0.6), "choice", "quantiles between which a mean is taken")
     high_end: Range = tuned((0.85, 1.0), "choice", "quantiles between which a mean is taken")

@@ -162,6 +162,7 @@ def _import_table(
             name=name,
             nominal_load=round(condition.load.value, 2),
             notes=f"{wheel} wheel; a steady state",
+            steady_states=True,
         )
         made = streams([condition], COUNTING, round(speed), repeat)
         written.append(write(output / f"{wheel}-table" / f"{name}.mcap", made, configured, info))

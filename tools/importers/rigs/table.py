@@ -175,7 +175,7 @@ def _import_group(
 
     load = float(np.mean([condition.load.value for condition in conditions]))
     notes = f"{len(conditions)} steady states from a table"
-    info = RunInfo(name=name, nominal_load=round(load, 2), notes=notes)
+    info = RunInfo(name=name, nominal_load=round(load, 2), notes=notes, steady_states=True)
     made = streams(conditions, COUNTING, zlib.crc32(name.encode()))  # no two scatter alike
     recording = write(args.output / f"{name}.mcap", made, configured, info)
     return [args.output / f"{name}.yaml", recording]

@@ -25,6 +25,7 @@ from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import Screening, prepare_screening
+from gritd.tools.diagnose.tuning import replaced
 from gritd.tools.proof.ours.cases import draw, record
 from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
@@ -126,6 +127,17 @@ def test_what_is_told_of_a_fit_is_told_by_no_other() -> None:
     assert ("drawbar_pull", "time") in {(place.channel, place.covariate) for place in told}
     begun_elsewhere = replace(screening, base=accepted)
     assert locate(begun_elsewhere, held, held.fitted.predicted) == told
+
+
+def test_a_ripple_by_chance_in_one_of_many_channels_is_none() -> None:
+    """The chance of the loudest ripple is that of any channel, not that of the one it is in."""
+    drawn = plan(seconds=48.0, seed=5)
+    screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
+    channels = len(screening.problem.stack.rig.channels)
+    with replaced("explain", order_chance=1.0, least_share=0.0, places_listed=99):
+        told = [p for p in locate(screening, screening.base) if p.covariate == "wheel_angle"]
+    assert told
+    assert [p.q for p in told] == [pytest.approx(min(p.p * channels, 1.0)) for p in told]
 
 
 @pytest.mark.slow

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from gritd.estimator.effects import EFFECTS
+from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.rig.candidates import candidates, steady_states
+from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
@@ -43,6 +46,20 @@ def test_a_table_shows_what_needs_neither_time_nor_place_nor_angle(driven: list[
     gone = {"gear_ripple", "hub_runout", "soil_patch", "motor_heating", "contact_relaxation"}
     assert not gone & left.keys()
     assert {"slip_sinkage", "bulldozing", "coulomb_friction", "rim_friction"} <= left.keys()
+
+
+def test_a_table_says_so_itself_however_far_its_wheel_turns(driven: list[Signals]) -> None:
+    """Its scatter was drawn by an importer: trends, places and ripples of it are nobody's."""
+    told = [replace(run, info=replace(run.info, steady_states=True)) for run in driven]
+    rig, as_driven = WheelRig(told, settings()), WheelRig(driven, settings())
+    assert "gear_ripple" in as_driven.effects and "gear_ripple" not in rig.effects
+    assert highest_order(Stack(as_driven)) > 0.0 == highest_order(Stack(rig))
+    along = {along for s in smooth_signatures(Stack(rig)) for along in s.shape.along}
+    assert {"slip", "load"} <= along
+    assert not {"time", "position", "heat", "wheel_angle", "acceleration"} & along
+    assert [f.conditions[0].tolist() for f in rig.forms] == [
+        f.conditions[0].tolist() for f in as_driven.forms
+    ]
 
 
 def test_lugs_dig_and_grip_in_a_table_without_a_count(driven: list[Signals]) -> None:

@@ -17,6 +17,7 @@ from tests.real_recordings import REAL, Physical, needs
 def test_every_point_of_the_table_is_a_segment(tmp_path: Path) -> None:
     assert main(["table", str(REAL / "ding"), "-o", str(tmp_path)]) == 0
     trial = Physical(tmp_path / "ding2011_smooth.mcap")
+    assert trial.recording.run.steady_states  # nobody may look for ripples in its scatter
     torque = trial.value("motor_shunt") * trial.settings.drive.torque_constant.value
     found = []
 

@@ -8,7 +8,7 @@ import tarfile
 import venv
 from collections.abc import Iterator
 from pathlib import Path
-from shutil import copytree, ignore_patterns
+from shutil import copytree, ignore_patterns, which
 from zipfile import ZipFile
 
 import pytest
@@ -38,7 +38,9 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the sources, with the links of gritd/ as links: building leaves files behind."""
     copy = tmp_path_factory.mktemp("checkout")
     for folder in SOURCES:
-        copytree(ROOT / folder, copy / folder, symlinks=True, ignore=ignore_patterns("*.pyc"))
+        copytree(
+            ROOT / folder, copy / folder, symlinks=True, ignore=ignore_patterns("*.pyc", "*.so")
+        )
     for page in PAGES:
         (copy / page).write_bytes((ROOT / page).read_bytes())
     return copy
@@ -62,7 +64,8 @@ def expected() -> Iterator[str]:
     for folder in SOURCES[1:]:
         for path in (ROOT / folder).rglob("*"):
             name = f"gritd/{path.relative_to(ROOT)}"
-            if path.is_file() and path.suffix != ".pyc" and not name.startswith(DEVELOPMENT):
+            made = path.suffix in (".pyc", ".so")
+            if path.is_file() and not made and not name.startswith(DEVELOPMENT):
                 yield name
 
 
@@ -73,11 +76,31 @@ def own() -> Iterator[str]:
             yield str(path.relative_to(ROOT))
 
 
+def names_in(wheel: Path) -> set[str]:
+    """The files of a wheel, but for those that describe it."""
+    return {name for name in ZipFile(wheel).namelist() if ".dist-info/" not in name}
+
+
 def test_the_wheel_holds_every_file_but_those_for_development(wheel: Path) -> None:
-    held = {name for name in ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    held = {name for name in names_in(wheel) if not name.endswith(".so")}
     packed = set(expected()) - {"gritd/tools/install"}  # a script of the checkout
 
     assert held == packed | set(own())
+
+
+@pytest.mark.skipif(which("gcc") is None, reason="found no compiler")
+def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel: Path) -> None:
+    compiled = [name for name in names_in(wheel) if name.endswith(".so")]
+    assert {Path(name).name.partition(".")[0] for name in compiled} == {"algebra", "closed"}
+
+
+def test_without_a_compiler_the_wheel_is_built_all_the_same(
+    checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = tmp_path / "copy"
+    copytree(checkout, copy, symlinks=True, ignore=ignore_patterns("build", "dist", "*.egg-info"))
+    monkeypatch.setenv("CC", "false")  # a compiler that fails
+    assert not any(name.endswith(".so") for name in names_in(built("wheel", copy)))
 
 
 def test_the_source_archive_holds_what_the_wheel_does(checkout: Path, wheel: Path) -> None:
@@ -85,7 +108,7 @@ def test_the_source_archive_holds_what_the_wheel_does(checkout: Path, wheel: Pat
         names = [m.name.partition("/")[2] for m in archive.getmembers() if not m.isdir()]
         assert all(m.isfile() or m.isdir() for m in archive.getmembers()), "holds links"
 
-    packed = {name for name in ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    packed = {name for name in names_in(wheel) if not name.endswith(".so")}
     assert {name for name in names if name.startswith("gritd/")} == packed
 
 

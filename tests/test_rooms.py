@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 
 # the lowest first; a room imports itself and those of lower rows
 ROOMS = (
-    ("config", "estimator.visible", "estimator.plugins"),
+    ("config", "estimator.compiled", "estimator.visible", "estimator.plugins"),
     ("estimator.terramechanics", "estimator.messages", "estimator.threads"),
     ("estimator.stages",),
     ("estimator.effects",),

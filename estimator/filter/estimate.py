@@ -12,6 +12,8 @@ from __future__ import annotations
 from operator import mul
 from typing import NamedTuple
 
+from gritd.estimator.compiled import arithmetic
+
 C = 0  # cohesion [kPa]
 TAN_PHI = 1  # tangent of the internal friction angle [-]
 LN_K = 2  # logarithm of the shear modulus k/m [-]
@@ -69,9 +71,16 @@ def cross_covariances(
 
 
 def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
-    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances; never
-    negative.
+    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances, or ()
+    where none of them is felt; never negative.
     """
+    if arithmetic.BUILT:
+        return arithmetic.variance(estimate.P, estimate.cross, variances, h, g)
+    return plain_variance(estimate, variances, h, g)
+
+
+def plain_variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
+    """`variance` in plain floats, to the same bits as compiled."""
     (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
     (h0, h1, h2), (c0, c1, c2) = h, estimate.cross
     own = (
@@ -85,7 +94,12 @@ def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> flo
 
 
 def dot(a: Vector, b: Vector) -> float:
-    total: float = sum(map(mul, a, b))
+    """Σ aᵢbᵢ over the shorter of both, term by term: newer versions of Python compensate what `sum`
+    rounds.
+    """
+    total = 0.0
+    for u, v in zip(a, b, strict=False):
+        total += u * v
     return total
 
 

@@ -7,11 +7,12 @@ from __future__ import annotations
 from math import cos, hypot, log, sin
 from typing import NamedTuple
 
+from gritd.estimator.compiled import arithmetic
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects.stress_linearisation import StressLinearisation
-from gritd.estimator.filter.shift import IntegralShift
+from gritd.estimator.filter.shift import SLIP, THETA_1, IntegralShift
 from gritd.estimator.terramechanics import linear, scalar
-from gritd.estimator.terramechanics.soil import Soil
+from gritd.estimator.terramechanics.soil import Soil, Wheel
 from gritd.estimator.wheel.chain import Chain
 from gritd.estimator.wheel.sync import Measured
 
@@ -43,11 +44,17 @@ class WheelModel:
         self._modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
         self._exponent_error = exponent_error
         self._shift = _shift(settings, chain)
+        self._closed = _compiled(self._wheel, self._shift)
 
     def predict(
         self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float
     ) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
+        if self._closed is not None:
+            known = self._closed.predict(c, tan_phi, k, theta_1, slip, load, self._exponent_error)
+            if known is not None:
+                return Prediction(*known)
+
         p = scalar.predict(
             self._wheel, c, tan_phi, k, theta_1, slip, load, self._at(k, theta_1, slip)
         )
@@ -74,14 +81,34 @@ class WheelModel:
             return Measured(0.0, 0.0)
 
         sigma_m = self._modulus * depth**soil.exponent.value
-        shift = self._at(k, theta_1.value, slip)
-        load = scalar.load(self._wheel, c, tan_phi, k, theta_1.value, slip, sigma_m, shift)
+        load = self._carried(c, tan_phi, k, theta_1.value, slip, sigma_m)
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
         relative = hypot(
             soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma
         )
 
         return Measured(load, abs(load) * relative)
+
+    def _carried(
+        self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, sigma_m: float
+    ) -> float:
+        """W [N] for a peak stress σₘ [Pa]."""
+        if self._closed is not None:
+            known = self._closed.load(c, tan_phi, k, theta_1, slip, sigma_m, self._exponent_error)
+            if known is not None:
+                return known
+        shift = self._at(k, theta_1, slip)
+        return scalar.load(self._wheel, c, tan_phi, k, theta_1, slip, sigma_m, shift)
+
+
+def _compiled(wheel: Wheel, shift: IntegralShift | None) -> arithmetic.Closed | None:
+    """The compiled closed forms, where they were built and the wheel is of plain numbers."""
+    if not arithmetic.BUILT:
+        return None
+    numbers = (float(wheel.radius), float(wheel.width), float(wheel.c1), float(wheel.c2))
+    if shift is None:
+        return arithmetic.Closed(Quantity, numbers, 0.0, THETA_1, SLIP, None)
+    return arithmetic.Closed(Quantity, numbers, shift.ln_k, THETA_1, SLIP, shift.coefficients)
 
 
 def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:

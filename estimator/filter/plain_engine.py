@@ -9,6 +9,7 @@ of the innovations, Joseph's form reads, for any gain K,
 
 from __future__ import annotations
 
+from gritd.estimator.compiled import arithmetic
 from gritd.estimator.filter.estimate import (
     LN_K,
     STATES,
@@ -82,6 +83,19 @@ class PlainEngine:
         ]
 
         return Estimate(x, _symmetric(P), cross)
+
+
+class CompiledEngine:
+    """The same, compiled (compiled/algebra.c), to the same bits."""
+
+    def __init__(self, nuisance_variances: Vector) -> None:
+        self._variances = nuisance_variances
+
+    def update(self, estimate: Estimate, update: Update, consider_k: bool) -> Estimate:
+        states = LN_K if consider_k else STATES
+        x, P, cross = estimate
+        y, H, G, R = update
+        return Estimate(*arithmetic.update(x, P, cross, self._variances, y, H, G, R, states))
 
 
 def _kept(gain: list[float], states: int) -> list[float]:

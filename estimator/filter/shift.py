@@ -7,18 +7,20 @@ equations with eight other integrals, whatever c, tan φ and W are. What separat
 therefore eight functions of θ₁ and i for a soil of given k and n. They are tabulated once, as
 Chebyshev polynomials, together with their derivatives with respect to ln k and n: the filter stays
 exact in c, tan φ and W, and is first-order in ln k and n.
+
+Polynomials are summed in a stated order, by numpy along axes that it does not reorder, and never by
+BLAS, whose order depends on the processor: compiled/closed.c gives the same bits.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from math import acos, log, sin
+from math import log
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from gritd.estimator.effects import in_order
 from gritd.estimator.effects.base import Effect
@@ -36,23 +38,21 @@ DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
-ORDERS = tuple(np.arange(degree + 1) for degree in DEGREE)  # of the polynomials in θ₁ and i
-INSIDE = 1.0 - 1e-12  # as near to an edge as sin t allows
 ORDER = 24  # quadrature nodes in each zone
 PEAK = 0.999  # of θₘ/θ₁: at the entry itself σₘ says nothing of the modulus
 INTEGRALS = len(Integrals._fields)
 PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
 
+Vector = tuple[float, ...]
+
 
 class Point(NamedTuple):
-    """The tables at one θ₁ and i: each (3, 8), the integrals' values and derivatives with respect
-    to θ₁ and i.
-    """
+    """The tables at one θ₁ and i."""
 
-    plain: Array  # the shift at the soil's k and n
-    by_ln_k: Array
-    by_n: Array
-    ln_k: Integrals  # first row of by_ln_k
+    # (3, q): values and derivatives with respect to θ₁ and i, of PLAIN, BY_LN_K and where it is
+    # asked for BY_N, the shift at the soil's k and n and its derivatives
+    tables: Array
+    ln_k: Integrals  # values of BY_LN_K
 
 
 class IntegralShift:
@@ -66,7 +66,7 @@ class IntegralShift:
     def __init__(
         self, wheel: Wheel, soil: Soil, effects: tuple[Effect, ...] = (), share: float = 1.0
     ) -> None:
-        self._ln_k = log(float(soil.shear_modulus))
+        self.ln_k = log(float(soil.shear_modulus))
         theta_1, slip = np.meshgrid(
             _nodes(THETA_1, NODES[0]), _nodes(SLIP, NODES[1]), indexing="ij"
         )
@@ -75,35 +75,37 @@ class IntegralShift:
             varied = replace(soil, shear_modulus=float(np.exp(ln_k)), exponent=n)
             return _shift(wheel, varied, in_order(effects), share, theta_1, slip)
 
-        k, n = self._ln_k, float(soil.exponent)
+        k, n = self.ln_k, float(soil.exponent)
         by_ln_k = (shift(k + STEP, n) - shift(k - STEP, n)) / (2.0 * STEP)
         by_n = (shift(k, n + STEP) - shift(k, n - STEP)) / (2.0 * STEP)
         coefficients = _fitted(np.concatenate((shift(k, n), by_ln_k, by_n)))
-        self._coefficients = coefficients.transpose(1, 0, 2).reshape(DEGREE[0] + 1, -1).copy()
+        # (DEGREE[0] + 1, DEGREE[1] + 1, 24)
+        self.coefficients: Array = np.ascontiguousarray(coefficients.transpose(1, 2, 0))
+        self._without_n = self.coefficients[..., : BY_N.start].copy()
         self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
     def at(self, k: float, theta_1: float, slip: float, exponent_error: float = 0.0) -> Shift:
         """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's
         exponent n.
         """
-        plain, by_ln_k, by_n, ln_k = self._table(theta_1, slip)
-        shift = plain + (log(k) - self._ln_k) * by_ln_k
+        tables, ln_k = self._table(theta_1, slip, exponent_error != 0.0)
+        shift = tables[:, PLAIN] + (log(k) - self.ln_k) * tables[:, BY_LN_K]
         if exponent_error:
-            shift = shift + exponent_error * by_n
+            shift = shift + exponent_error * tables[:, BY_N]
         value, by_theta_1, by_slip = map(Integrals._make, shift.tolist())
         return Shift(value, by_theta_1, by_slip, ln_k)
 
-    def _tabulated(self, theta_1: float, slip: float) -> Point:
+    def _tabulated(self, theta_1: float, slip: float, with_n: bool) -> Point:
         """The tables at one point."""
-        u, du = _unit(theta_1, THETA_1)
-        v, dv = _unit(slip, SLIP)
-        rows, columns = _polynomials(u, ORDERS[0], du), _polynomials(v, ORDERS[1], dv)
-        # (2 for θ₁ · quantities, powers of i)
-        along_slip = (rows @ self._coefficients).reshape(-1, DEGREE[1] + 1)
-        by_value, by_slip = (along_slip @ columns.T).T.reshape(2, 2, -1)
-        tables = np.array((by_value[0], by_value[1], by_slip[0]))
-        by_ln_k = tables[:, BY_LN_K]
-        return Point(tables[:, PLAIN], by_ln_k, tables[:, BY_N], Integrals(*by_ln_k[0].tolist()))
+        coefficients = self.coefficients if with_n else self._without_n
+        rows = np.array(_polynomials(*_unit(theta_1, THETA_1), DEGREE[0]))
+        columns = np.array(_polynomials(*_unit(slip, SLIP), DEGREE[1]))
+
+        # sums over an axis that is not the last are made term by term; (2 for θ₁, powers of i, q)
+        along = np.add.reduce(rows[:, :, None, None] * coefficients, axis=1)
+        value, by_slip = np.add.reduce(columns[:, :, None] * along[0], axis=1)
+        by_theta_1 = np.add.reduce(columns[0][:, None] * along[1], axis=0)
+        return Point(np.array((value, by_theta_1, by_slip)), Integrals(*value[BY_LN_K].tolist()))
 
 
 def true_integrals(
@@ -214,10 +216,12 @@ def _unit(x: float, span: tuple[float, float]) -> tuple[float, float]:
     return (-1.0 if x < low else 1.0), 0.0
 
 
-def _polynomials(x: float, orders: NDArray[np.int_], slope: float) -> Array:
-    """(2, m): Tₙ at x = cos t for the orders n (m,), and their derivatives n sin(nt)/sin t times
-    slope.
+def _polynomials(x: float, slope: float, degree: int) -> tuple[Vector, Vector]:
+    """T₀ … Tₙ at x, and their derivatives m Uₘ₋₁ times slope, by the recurrence
+    p₊ = 2x p − p₋ of both kinds.
     """
-    angle = acos(min(max(x, -INSIDE), INSIDE))
-    phase = orders * angle
-    return np.array((np.cos(phase), slope / sin(angle) * orders * np.sin(phase)))
+    first, second = [1.0, x], [0.0, 1.0]
+    for _ in range(degree - 1):
+        first.append(2.0 * x * first[-1] - first[-2])
+        second.append(2.0 * x * second[-1] - second[-2])
+    return tuple(first), tuple([slope * (m * u) for m, u in enumerate(second)])

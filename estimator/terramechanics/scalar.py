@@ -47,7 +47,8 @@ def predict(
     `linear.predict`.
     """
     lam = wheel.c1 + wheel.c2 * slip
-    rise, scale = sin(0.5 * theta_1) ** 2, wheel.radius / k
+    half, scale = sin(0.5 * theta_1), wheel.radius / k
+    rise = half * half
     f = scale * (slip + (1.0 - slip) * rise)  # Eq. (19)
     if _delicate(theta_1, f, slip, lam):
         return linear.predict(wheel, c, tan_phi, k, theta_1, slip, load, shift=shift)
@@ -120,7 +121,8 @@ def load(
 ) -> float:
     """W [N] by Eq. (21) for a given peak stress σₘ [Pa]: that of `linear.forces`."""
     lam = wheel.c1 + wheel.c2 * slip
-    f = wheel.radius / k * (slip + (1.0 - slip) * sin(0.5 * theta_1) ** 2)  # Eq. (19)
+    half = sin(0.5 * theta_1)
+    f = wheel.radius / k * (slip + (1.0 - slip) * (half * half))  # Eq. (19)
     if _delicate(theta_1, f, slip, lam):
         return float(linear.forces(wheel, c, tan_phi, k, theta_1, slip, sigma_m, shift=shift).load)
     x, _, _ = _integrals(theta_1, f * theta_1, lam)

@@ -1,0 +1,18 @@
+"""The arithmetic that a tick spends most of its time in, as C, where it was built.
+
+Pure Python with the same bits stands beside each function: what computes a recording does not show
+in it. `closed.c` is terramechanics/scalar.py with filter/shift.py, `algebra.c` is
+filter/estimate.py with filter/plain_engine.py. A test compares them on drawn values.
+"""
+
+from __future__ import annotations
+
+try:
+    from gritd.estimator.compiled.algebra import update, variance
+    from gritd.estimator.compiled.closed import Closed
+except ImportError:  # no compiler where gritd was installed
+    BUILT = False
+else:
+    BUILT = True
+
+__all__ = ["BUILT", "Closed", "update", "variance"]

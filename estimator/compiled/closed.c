@@ -1,0 +1,402 @@
+/* The closed forms (20)-(22) of one sample under a load, with gradients, and the shift of their integrals.
+
+   This is terramechanics/scalar.py and the evaluation in filter/shift.py, operation for operation: the same bits, a
+   tenth of the time. Complex numbers are multiplied, divided and raised as CPython does. No sum is reordered and no
+   product fused with a sum (-ffp-contract=off). A test compares the two on drawn values. */
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#include <math.h>
+
+#define INTEGRALS 8               /* A1, A2, B1, B2, B3, C1, C2, C3 */
+#define PARTS 3                   /* the shift, its derivative by ln k, by n */
+#define COLUMNS (PARTS * INTEGRALS)
+#define POWERS 14                 /* of the polynomials in theta_1 and in slip */
+#define SMALLEST 0.1              /* as in scalar.py */
+#define NEAREST 0.02
+
+typedef struct { double re, im; } number;
+
+/* A1, A2, B1 + iC3, C1 + iB2, C2 + iB3 */
+typedef struct { double a1, a2; number bare, one, hat; } integrals;
+typedef struct { double torque, pull, drag, load; } change;
+
+typedef struct {
+    PyObject_HEAD
+    double radius, width, c1, c2, ln_k;
+    double low[2], high[2];       /* range of theta_1 and of slip */
+    int shifted;
+    double table[POWERS][POWERS][COLUMNS];
+    PyObject *quantity;           /* the named tuple of a result */
+} Closed;
+
+/* --- complex numbers as CPython calculates them --- */
+
+static number plus(number a, number b) { return (number){a.re + b.re, a.im + b.im}; }
+static number minus(number a, number b) { return (number){a.re - b.re, a.im - b.im}; }
+static number real(double a) { return (number){a, 0.0}; }
+
+static number times(number a, number b) {
+    return (number){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+}
+
+static number over(number a, number b) {
+    if (fabs(b.re) >= fabs(b.im)) {
+        const double ratio = b.im / b.re, whole = b.re + b.im * ratio;
+        return (number){(a.re + a.im * ratio) / whole, (a.im - a.re * ratio) / whole};
+    }
+    const double ratio = b.re / b.im, whole = b.re * ratio + b.im;
+    return (number){(a.re * ratio + a.im) / whole, (a.im * ratio - a.re) / whole};
+}
+
+static number turn(number a) {
+    const double size = exp(a.re);
+    return (number){size * cos(a.im), size * sin(a.im)};
+}
+
+/* --- the integrals and their derivatives by ln theta_1 and by ln f --- */
+
+/* E, H, s dE/ds, s dH/ds of a complex s; end = e^-s, peak = e^-(alpha s). */
+static void transforms(number s, number end, number peak, double lam, number out[4]) {
+    const number one = over(minus(real(1.0), end), s);
+    const number fall = over(minus(peak, end), real(lam));
+    const number rise = over(minus(real(1.0), peak), real(1.0 - lam));
+    const number hat = over(minus(rise, fall), times(s, s));
+    out[0] = one;
+    out[1] = hat;
+    out[2] = minus(end, one);
+    out[3] = minus(over(fall, s), times(real(2.0), hat));
+}
+
+static void transforms_real(double s, double end, double peak, double lam, double out[4]) {
+    const double one = (1.0 - end) / s, fall = (peak - end) / lam;
+    const double hat = ((1.0 - peak) / (1.0 - lam) - fall) / (s * s);
+    out[0] = one;
+    out[1] = hat;
+    out[2] = end - one;
+    out[3] = fall / s - 2.0 * hat;
+}
+
+static number opposite(number a) { return (number){-a.re, -a.im}; }
+
+static void all_integrals(double theta_1, double eta, double lam, integrals *x, integrals *by_theta_1,
+                          integrals *by_f) {
+    const number turning = {0.0, theta_1}, both = {eta, theta_1};
+    const double alpha = 1.0 - lam;
+    const number ahead = turn(turning);
+    double e0[4];
+    number e1[4], e2[4];
+    transforms_real(eta, exp(-eta), exp(-eta * alpha), lam, e0);
+    transforms(turning, turn(opposite(turning)), turn(times(opposite(turning), real(alpha))), lam, e1);
+    transforms(both, turn(opposite(both)), turn(times(opposite(both), real(alpha))), lam, e2);
+
+    const number bare = times(ahead, e1[1]);
+    const number one = times(ahead, minus(e1[0], e2[0])), hat = times(ahead, minus(e1[1], e2[1]));
+    const number share = times(opposite(ahead), over(real(eta), both));
+
+    *x = (integrals){1.0 - e0[0], 0.5 - e0[1], bare, one, hat};
+    *by_theta_1 = (integrals){
+        -e0[2], -e0[3],
+        plus(times(turning, bare), times(ahead, e1[3])),
+        plus(times(turning, one), times(ahead, minus(e1[2], e2[2]))),
+        plus(times(turning, hat), times(ahead, minus(e1[3], e2[3])))};
+    *by_f = (integrals){-e0[2], -e0[3], real(0.0), times(share, e2[2]), times(share, e2[3])};
+}
+
+static number by_ratio_of_hat(number s, double alpha, double lam) {
+    const number peak = turn(times(opposite(s), real(alpha)));
+    const number lost = minus(over(minus(real(1.0), peak), real(alpha)), times(s, peak));
+    const number fallen = over(minus(peak, turn(opposite(s))), real(lam));
+    const number rest = over(minus(fallen, times(s, peak)), real(lam));
+    return over(plus(over(lost, real(alpha)), rest), times(s, s));
+}
+
+/* Derivatives by the ratio theta_m / theta_1. */
+static integrals by_ratio(double theta_1, double eta, double lam) {
+    const double alpha = 1.0 - lam;
+    const number turning = {0.0, theta_1}, ahead = turn(turning);
+    const number bare = times(ahead, by_ratio_of_hat(turning, alpha, lam));
+    const number hat = times(ahead, by_ratio_of_hat((number){eta, theta_1}, alpha, lam));
+    const number straight = by_ratio_of_hat(real(eta), alpha, lam);
+    return (integrals){0.0, -straight.re, bare, real(0.0), minus(bare, hat)};
+}
+
+/* The integrals with a multiple of eight real ones added. */
+static integrals added(integrals x, const double *change, double factor) {
+    return (integrals){
+        x.a1 + factor * change[0],
+        x.a2 + factor * change[1],
+        plus(x.bare, times(real(factor), (number){change[2], change[7]})),
+        plus(x.one, times(real(factor), (number){change[5], change[3]})),
+        plus(x.hat, times(real(factor), (number){change[6], change[4]}))};
+}
+
+/* --- the shift (filter/shift.py) --- */
+
+/* T_0 .. at the place of x in its range, and their derivatives by x. */
+static void polynomials(double x, double low, double high, double first[POWERS], double slopes[POWERS]) {
+    double slope = 2.0 / (high - low), u = (x - low) * slope - 1.0;
+    if (!(low <= x && x <= high)) {
+        u = x < low ? -1.0 : 1.0;
+        slope = 0.0;
+    }
+    double second[POWERS] = {0.0, 1.0};
+    first[0] = 1.0;
+    first[1] = u;
+    for (int n = 2; n < POWERS; n++) {
+        first[n] = 2.0 * u * first[n - 1] - first[n - 2];
+        second[n] = 2.0 * u * second[n - 1] - second[n - 2];
+    }
+    for (int n = 0; n < POWERS; n++) slopes[n] = slope * (n * second[n]);
+}
+
+/* out: the first `columns` of the table at a point: values, derivatives by theta_1 and by slip. */
+static void tabulated(const Closed *self, double theta_1, double slip, int columns, double out[3][COLUMNS]) {
+    double rows[POWERS], by_rows[POWERS], across[POWERS], by_across[POWERS];
+    polynomials(theta_1, self->low[0], self->high[0], rows, by_rows);
+    polynomials(slip, self->low[1], self->high[1], across, by_across);
+
+    for (int b = 0; b < POWERS; b++) {
+        double value[COLUMNS], by_theta_1[COLUMNS];
+        for (int q = 0; q < columns; q++) {
+            value[q] = rows[0] * self->table[0][b][q];
+            by_theta_1[q] = by_rows[0] * self->table[0][b][q];
+        }
+        for (int a = 1; a < POWERS; a++)
+            for (int q = 0; q < columns; q++) {
+                value[q] += rows[a] * self->table[a][b][q];
+                by_theta_1[q] += by_rows[a] * self->table[a][b][q];
+            }
+        for (int q = 0; q < columns; q++) {
+            const double parts[3] = {across[b] * value[q], across[b] * by_theta_1[q], by_across[b] * value[q]};
+            for (int p = 0; p < 3; p++) out[p][q] = b ? out[p][q] + parts[p] : parts[p];
+        }
+    }
+}
+
+/* value, by theta_1, by slip of the shift at k, and its derivative by ln k: each of eight integrals. */
+static void shift_at(const Closed *self, double k, double theta_1, double slip, double exponent_error,
+                     double out[4][INTEGRALS]) {
+    double point[3][COLUMNS];
+    const double ln_k = log(k) - self->ln_k;
+    tabulated(self, theta_1, slip, exponent_error != 0.0 ? COLUMNS : 2 * INTEGRALS, point);
+    for (int q = 0; q < INTEGRALS; q++) {
+        for (int p = 0; p < 3; p++) {
+            out[p][q] = point[p][q] + ln_k * point[p][INTEGRALS + q];
+            if (exponent_error != 0.0) out[p][q] = out[p][q] + exponent_error * point[p][2 * INTEGRALS + q];
+        }
+        out[3][q] = point[0][INTEGRALS + q];
+    }
+}
+
+/* --- the forces --- */
+
+typedef struct { double area, arm, cohesion, s, friction; } under;
+
+/* Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same formulas. */
+static change forces(const under *u, integrals x) {
+    const double drag = u->area * u->s * x.bare.im;
+    return (change){
+        u->arm * (u->cohesion * x.a1 + u->friction * x.a2),
+        u->area * (u->cohesion * x.one.re + u->friction * x.hat.re) - drag,
+        drag,
+        u->area * (u->cohesion * x.one.im + u->s * x.bare.re + u->friction * x.hat.im)};
+}
+
+/* Whether the transforms lose digits here, or a number is none: then the general form answers. */
+static int delicate(double theta_1, double f, double slip, double lam) {
+    return !(slip >= 0.0 && theta_1 >= SMALLEST && f * theta_1 >= SMALLEST && NEAREST < lam && lam < 1.0 - NEAREST);
+}
+
+static PyObject *quantity(const Closed *self, double value, const double gradient[6]) {
+    PyObject *items = PyTuple_New(7), *arguments, *made;
+    if (items == NULL) return NULL;
+    for (int n = 0; n < 7; n++) {
+        PyObject *item = PyFloat_FromDouble(n ? gradient[n - 1] : value);
+        if (item == NULL) { Py_DECREF(items); return NULL; }
+        PyTuple_SET_ITEM(items, n, item);
+    }
+    arguments = PyTuple_Pack(1, items);
+    Py_DECREF(items);
+    if (arguments == NULL) return NULL;
+    made = PyTuple_Type.tp_new((PyTypeObject *)self->quantity, arguments, NULL);
+    Py_DECREF(arguments);
+    return made;
+}
+
+static int numbers(PyObject *const *arguments, Py_ssize_t given, Py_ssize_t wanted, double *out) {
+    if (given != wanted) {
+        PyErr_Format(PyExc_TypeError, "expected %zd numbers, got %zd", wanted, given);
+        return 0;
+    }
+    for (Py_ssize_t n = 0; n < wanted; n++) {
+        out[n] = PyFloat_AsDouble(arguments[n]);
+        if (out[n] == -1.0 && PyErr_Occurred()) return 0;
+    }
+    return 1;
+}
+
+PyDoc_STRVAR(predict_doc,
+"predict(c, tan_phi, k, theta_1, slip, load, exponent_error)\n--\n\n"
+"T, DP and resistance with gradients, each a Quantity; None where the general form is to answer.");
+
+static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_t given) {
+    const Closed *self = (Closed *)object;
+    double in[7], shift[4][INTEGRALS], gradients[3][6];
+    if (!numbers(arguments, given, 7, in)) return NULL;
+    const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3], slip = in[4], load = in[5];
+
+    const double lam = self->c1 + self->c2 * slip;
+    const double half = sin(0.5 * theta_1), scale = self->radius / k, rise = half * half;
+    const double f = scale * (slip + (1.0 - slip) * rise); /* Eq. (19) */
+    if (!isfinite(c + tan_phi + load + in[6]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
+
+    integrals x, by_theta, by_f;
+    all_integrals(theta_1, f * theta_1, lam, &x, &by_theta, &by_f);
+    if (self->shifted) {
+        shift_at(self, k, theta_1, slip, in[6], shift);
+        x = added(x, shift[0], 1.0);
+        by_theta = added(by_theta, shift[1], theta_1);
+    }
+    const double area = self->radius * self->width, arm = self->radius * self->radius * self->width;
+    const double cohesion = c * theta_1, carry = x.bare.re + tan_phi * x.hat.im;
+    if (carry == 0.0) Py_RETURN_NONE;
+    const double s = (load / area - cohesion * x.one.im) / carry; /* sigma_m theta_1 by Eq. (21) */
+    const under at = {area, arm, cohesion, s, s * tan_phi};
+
+    const integrals nothing = {0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
+    const change none = {0.0, 0.0, 0.0, 0.0};
+    change columns[7] = {
+        {arm * theta_1 * x.a1, area * theta_1 * x.one.re, 0.0, area * theta_1 * x.one.im},
+        {arm * s * x.a2, area * s * x.hat.re, 0.0, area * s * x.hat.im},
+        forces(&at, by_f),
+        forces(&at, (integrals){x.a1 + by_theta.a1, by_theta.a2, by_theta.bare, plus(x.one, by_theta.one), by_theta.hat}),
+        self->c2 != 0.0 ? forces(&at, by_ratio(theta_1, f * theta_1, lam)) : none,
+        self->shifted ? forces(&at, added(nothing, shift[3], 1.0)) : none,
+        self->shifted ? forces(&at, added(nothing, shift[2], 1.0)) : none};
+
+    /* s gives way to each of them so that W stays the same */
+    const double ds = -1.0 / (area * carry);
+    const double torque_s = arm * tan_phi * x.a2 * ds, drag_s = area * x.bare.im * ds;
+    const double pull_s = area * tan_phi * x.hat.re * ds - drag_s;
+    for (int n = 0; n < 7; n++) {
+        columns[n].torque = columns[n].torque + torque_s * columns[n].load;
+        columns[n].pull = columns[n].pull + pull_s * columns[n].load;
+        columns[n].drag = columns[n].drag + drag_s * columns[n].load;
+    }
+    /* of ln f by theta_1 and by slip */
+    const double f_theta_1 = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f, f_slip = scale * (1.0 - rise) / f;
+    const double by_w[3] = {torque_s, pull_s, drag_s};
+    for (int q = 0; q < 3; q++) {
+        double by[7];
+        for (int n = 0; n < 7; n++)
+            by[n] = q == 0 ? columns[n].torque : q == 1 ? columns[n].pull : columns[n].drag;
+        gradients[q][0] = by[0];
+        gradients[q][1] = by[1];
+        gradients[q][2] = by[5] - by[2];
+        gradients[q][3] = by[3] / theta_1 + f_theta_1 * by[2];
+        gradients[q][4] = by[6] + f_slip * by[2] + self->c2 * by[4];
+        gradients[q][5] = -by_w[q];
+    }
+    const change now = forces(&at, x);
+    PyObject *torque = quantity(self, now.torque, gradients[0]);
+    PyObject *pull = quantity(self, now.pull, gradients[1]);
+    PyObject *drag = quantity(self, now.drag, gradients[2]);
+    PyObject *all = torque && pull && drag ? PyTuple_Pack(3, torque, pull, drag) : NULL;
+    Py_XDECREF(torque);
+    Py_XDECREF(pull);
+    Py_XDECREF(drag);
+    return all;
+}
+
+PyDoc_STRVAR(load_doc,
+"load(c, tan_phi, k, theta_1, slip, sigma_m, exponent_error)\n--\n\n"
+"W [N] by Eq. (21) for a given peak stress; None where the general form is to answer.");
+
+static PyObject *load_of(PyObject *object, PyObject *const *arguments, Py_ssize_t given) {
+    const Closed *self = (Closed *)object;
+    double in[7], shift[4][INTEGRALS];
+    if (!numbers(arguments, given, 7, in)) return NULL;
+    const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3], slip = in[4], sigma_m = in[5];
+
+    const double lam = self->c1 + self->c2 * slip, half = sin(0.5 * theta_1);
+    const double f = self->radius / k * (slip + (1.0 - slip) * (half * half)); /* Eq. (19) */
+    if (!isfinite(c + tan_phi + sigma_m + in[6]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
+
+    integrals x, by_theta_1, by_f;
+    all_integrals(theta_1, f * theta_1, lam, &x, &by_theta_1, &by_f);
+    if (self->shifted) {
+        shift_at(self, k, theta_1, slip, in[6], shift);
+        x = added(x, shift[0], 1.0);
+    }
+    const double supported = sigma_m * (x.bare.re + tan_phi * x.hat.im) + c * x.one.im;
+    return PyFloat_FromDouble(self->radius * self->width * theta_1 * supported);
+}
+
+/* --- the type --- */
+
+static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
+    Closed *self = (Closed *)object;
+    PyObject *type, *table;
+    Py_buffer given;
+    if (names != NULL && PyDict_Size(names) > 0) {
+        PyErr_SetString(PyExc_TypeError, "Closed takes no names");
+        return -1;
+    }
+    if (!PyArg_ParseTuple(arguments, "O!(dddd)d(dd)(dd)O", &PyType_Type, &type, &self->radius, &self->width, &self->c1,
+                          &self->c2, &self->ln_k, &self->low[0], &self->high[0], &self->low[1], &self->high[1], &table))
+        return -1;
+    if (!PyType_IsSubtype((PyTypeObject *)type, &PyTuple_Type)) {
+        PyErr_SetString(PyExc_TypeError, "expected a named tuple for results");
+        return -1;
+    }
+    self->shifted = table != Py_None;
+    if (self->shifted) {
+        if (PyObject_GetBuffer(table, &given, PyBUF_C_CONTIGUOUS) < 0) return -1;
+        const int fits = given.len == (Py_ssize_t)sizeof self->table;
+        if (fits) memcpy(self->table, given.buf, sizeof self->table);
+        PyBuffer_Release(&given);
+        if (!fits) {
+            PyErr_Format(PyExc_ValueError, "expected a table of %d x %d x %d doubles", POWERS, POWERS, COLUMNS);
+            return -1;
+        }
+    }
+    Py_INCREF(type);
+    Py_XSETREF(self->quantity, type);
+    return 0;
+}
+
+static void closed_dealloc(PyObject *object) {
+    Py_XDECREF(((Closed *)object)->quantity);
+    Py_TYPE(object)->tp_free(object);
+}
+
+static PyMethodDef methods[] = {
+    {"predict", (PyCFunction)(void (*)(void))predict, METH_FASTCALL, predict_doc},
+    {"load", (PyCFunction)(void (*)(void))load_of, METH_FASTCALL, load_doc},
+    {NULL, NULL, 0, NULL}};
+
+static PyTypeObject ClosedType = {
+    PyVarObject_HEAD_INIT(NULL, 0).tp_name = "gritd.estimator.compiled.closed.Closed",
+    .tp_doc = "The closed forms of one wheel and soil.",
+    .tp_basicsize = sizeof(Closed),
+    .tp_flags = Py_TPFLAGS_DEFAULT,
+    .tp_new = PyType_GenericNew,
+    .tp_init = closed_init,
+    .tp_dealloc = closed_dealloc,
+    .tp_methods = methods};
+
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "closed", "The closed forms, compiled.", -1, NULL,
+                                    NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit_closed(void) {
+    PyObject *made;
+    if (PyType_Ready(&ClosedType) < 0) return NULL;
+    made = PyModule_Create(&module);
+    if (made == NULL) return NULL;
+    if (PyModule_AddObjectRef(made, "Closed", (PyObject *)&ClosedType) < 0) {
+        Py_DECREF(made);
+        return NULL;
+    }
+    return made;
+}

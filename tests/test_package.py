@@ -91,7 +91,11 @@ def test_the_wheel_holds_every_file_but_those_for_development(wheel: Path) -> No
 @pytest.mark.skipif(which("gcc") is None, reason="found no compiler")
 def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel: Path) -> None:
     compiled = [name for name in names_in(wheel) if name.endswith(".so")]
-    assert {Path(name).name.partition(".")[0] for name in compiled} == {"algebra", "closed"}
+    assert {Path(name).name.partition(".")[0] for name in compiled} == {
+        "algebra",
+        "closed",
+        "record",
+    }
 
 
 def test_without_a_compiler_the_wheel_is_built_all_the_same(

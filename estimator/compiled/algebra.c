@@ -3,8 +3,7 @@
    This is `variance` of filter/estimate.py and filter/plain_engine.py, operation for operation: the same bits. No sum
    is reordered and no product fused with a sum (-ffp-contract=off). A test compares the two on drawn values. */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "tuples.h"
 
 #define STATES 3
 #define COMPONENTS 2
@@ -14,41 +13,6 @@ typedef struct {
     double x[STATES], P[STATES][STATES], cross[STATES][MOST];
     Py_ssize_t nuisances;
 } estimate;
-
-/* --- tuples of floats, in and out --- */
-
-static int read_vector(PyObject *given, Py_ssize_t size, double *out) {
-    if (!PyTuple_Check(given) || PyTuple_GET_SIZE(given) != size) {
-        PyErr_Format(PyExc_ValueError, "expected a tuple of %zd numbers", size);
-        return 0;
-    }
-    for (Py_ssize_t n = 0; n < size; n++) {
-        out[n] = PyFloat_AsDouble(PyTuple_GET_ITEM(given, n));
-        if (out[n] == -1.0 && PyErr_Occurred()) return 0;
-    }
-    return 1;
-}
-
-/* rows of `size` numbers, `stride` apart in out */
-static int read_matrix(PyObject *given, Py_ssize_t rows, Py_ssize_t size, Py_ssize_t stride, double *out) {
-    if (!PyTuple_Check(given) || PyTuple_GET_SIZE(given) != rows) {
-        PyErr_Format(PyExc_ValueError, "expected a tuple of %zd rows", rows);
-        return 0;
-    }
-    for (Py_ssize_t n = 0; n < rows; n++)
-        if (!read_vector(PyTuple_GET_ITEM(given, n), size, out + n * stride)) return 0;
-    return 1;
-}
-
-static PyObject *made_vector(const double *values, Py_ssize_t size) {
-    PyObject *made = PyTuple_New(size);
-    for (Py_ssize_t n = 0; made != NULL && n < size; n++) {
-        PyObject *value = PyFloat_FromDouble(values[n]);
-        if (value == NULL) { Py_CLEAR(made); break; }
-        PyTuple_SET_ITEM(made, n, value);
-    }
-    return made;
-}
 
 static PyObject *made_matrix(const double *values, Py_ssize_t rows, Py_ssize_t size, Py_ssize_t stride) {
     PyObject *made = PyTuple_New(rows);
@@ -73,12 +37,6 @@ static int enough(Py_ssize_t given, Py_ssize_t wanted, PyObject *variances) {
 }
 
 /* --- the algebra --- */
-
-static double dot(const double *a, const double *b, Py_ssize_t size) {
-    double total = 0.0;
-    for (Py_ssize_t n = 0; n < size; n++) total += a[n] * b[n];
-    return total;
-}
 
 PyDoc_STRVAR(variance_doc, "variance(P, cross, variances, h, g)\n--\n\nSee filter/estimate.py.");
 

@@ -2,7 +2,8 @@
 
 Pure Python with the same bits stands beside each function: what computes a recording does not show
 in it. `closed.c` is terramechanics/scalar.py with filter/shift.py, `algebra.c` is
-filter/estimate.py with filter/plain_engine.py. A test compares them on drawn values.
+filter/estimate.py with filter/plain_engine.py, `record.c` is filter/evidence.py. A test compares
+them on drawn values.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from __future__ import annotations
 try:
     from gritd.estimator.compiled.algebra import update, variance
     from gritd.estimator.compiled.closed import Closed
+    from gritd.estimator.compiled.record import evidence
 except ImportError:  # no compiler where gritd was installed
     BUILT = False
 else:
     BUILT = True
 
-__all__ = ["BUILT", "Closed", "update", "variance"]
+__all__ = ["BUILT", "Closed", "evidence", "update", "variance"]

@@ -15,6 +15,8 @@ import pytest
 from gritd.estimator.compiled import arithmetic
 from gritd.estimator.filter import estimate as algebra
 from gritd.estimator.filter.estimate import STATES, Estimate, Update
+from gritd.estimator.filter.evidence import evidence
+from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.plain_engine import CompiledEngine, PlainEngine
 from gritd.estimator.online.pipeline import Pipeline
@@ -127,6 +129,29 @@ def _drawn(rng, components, nuisances):
         rows(spread(components)),
     )
     return estimate, update
+
+
+@pytest.mark.parametrize("components", [1, 2])
+@pytest.mark.parametrize("nuisances", [0, 2, 9, 20])
+@pytest.mark.parametrize("stretches", [1, 2, 36])
+def test_the_evidence_of_a_change_is_that_of_python_to_the_bit(components, nuisances, stretches):
+    rng = np.random.default_rng(components + 10 * nuisances + stretches)
+    variances = tuple((0.1 + rng.uniform(0.0, 1.0, nuisances)).tolist())
+    for _ in range(20):
+        before, _ = _drawn(rng, components, nuisances)
+        before = before._replace(cross=tuple((0.01 * v,) * nuisances for v in before.x))
+        lines = [_line(rng, components, nuisances) for _ in range(stretches)]
+        windows = rng.integers(1, 40, stretches).tolist()
+        known = (before, variances, (0.3, 0.06, 0.1), lines, windows)
+        python = evidence(*known)
+        assert arithmetic.evidence(*before, *known[1:]) == python
+        assert all(np.isfinite(python[0]))
+
+
+def _line(rng, components, nuisances):
+    _, (y, H, G, R) = _drawn(rng, components, nuisances)
+    _, (_, _, _, D) = _drawn(rng, components, nuisances)
+    return Line(y, H, G, R, D)
 
 
 def test_ticks_are_those_of_python_to_the_bit(consumed, monkeypatch):

@@ -1,0 +1,248 @@
+/* Whether the soil changed: the Bayes factors of filter/evidence.py, operation for operation, to the same bits. */
+
+#include "tuples.h"
+#include <math.h>
+
+#define STATES 3
+#define COMPONENTS 2
+#define TINY 1e-9                 /* as in evidence.py */
+
+/* A record of s stretches with q nuisances; d = 3 + q normals are the prior. */
+typedef struct {
+    Py_ssize_t s, q, d;
+    double *A;                    /* (s, 2, d) H and G of unit noise */
+    double *y;                    /* (s, 2) */
+    double *F;                    /* (s, 2, d) of the normals */
+    double *root, *gram, *factor; /* (d, d) */
+    double *best, *sigma, *scale; /* (d,) */
+    double *shared, *V;           /* (d, 3) sums from a stretch to the last */
+    double x[STATES], spread[STATES];
+    double *block;                /* that all of these lie in */
+} record;
+
+static int room(record *r) {
+    const Py_ssize_t d = r->d, rows = COMPONENTS * r->s;
+    const Py_ssize_t size = rows * (2 * d + 1) + 3 * d * d + 3 * d + 2 * d * STATES;
+    double *next = r->block = PyMem_Calloc((size_t)size, sizeof(double));
+    if (next == NULL) { PyErr_NoMemory(); return 0; }
+    r->A = next; next += rows * d;
+    r->F = next; next += rows * d;
+    r->y = next; next += rows;
+    r->root = next; next += d * d;
+    r->gram = next; next += d * d;
+    r->factor = next; next += d * d;
+    r->best = next; next += d;
+    r->sigma = next; next += d;
+    r->scale = next; next += d;
+    r->shared = next; next += d * STATES;
+    r->V = next;
+    return 1;
+}
+
+/* --- what is given --- */
+
+/* One line with unit noise: rows of H and G side by side, and y. */
+static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
+    const Py_ssize_t d = r->d;
+    double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
+    double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS];
+    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 || !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
+        PyErr_SetString(PyExc_ValueError, "expected a line of y, H, G, R and D");
+        return 0;
+    }
+    const Py_ssize_t m = PyTuple_GET_SIZE(PyTuple_GET_ITEM(line, 0));
+    if (m < 1 || m > COMPONENTS) {
+        PyErr_SetString(PyExc_ValueError, "expected one or two components");
+        return 0;
+    }
+    if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) || !read_matrix(PyTuple_GET_ITEM(line, 1), m, STATES, d, A) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 2), m, r->q, d, A + STATES) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &R[0][0]) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 4), m, m, COMPONENTS, &D[0][0]))
+        return 0;
+
+    const double first = sqrt(R[0][0] / windows + D[0][0]);
+    for (Py_ssize_t n = 0; n < d; n++) A[n] = A[n] / first;
+    y[0] = y[0] / first;
+    if (m == 1) return 1;
+
+    const double slope = (R[1][0] / windows + D[1][0]) / first;
+    const double second = sqrt(R[1][1] / windows + D[1][1] - slope * slope);
+    for (Py_ssize_t n = 0; n < d; n++) A[d + n] = (A[d + n] - slope * A[n]) / second;
+    y[1] = (y[1] - slope * y[0]) / second;
+    return 1;
+}
+
+static int read_lines(record *r, PyObject *lines, PyObject *windows) {
+    for (Py_ssize_t at = 0; at < r->s; at++) {
+        const double count = PyFloat_AsDouble(PyList_GET_ITEM(windows, at));
+        if (count == -1.0 && PyErr_Occurred()) return 0;
+        if (!read_line(r, at, PyList_GET_ITEM(lines, at), count)) return 0;
+    }
+    return 1;
+}
+
+/* --- roots and solutions --- */
+
+static int cholesky(const double *A, double *L, Py_ssize_t d) {
+    for (Py_ssize_t i = 0; i < d; i++)
+        for (Py_ssize_t j = 0; j <= i; j++) {
+            const double left = A[i * d + j] - dot(L + i * d, L + j * d, j);
+            if (i == j && !(left > 0.0)) {
+                PyErr_SetString(PyExc_ValueError, "a covariance is not positive definite");
+                return 0;
+            }
+            L[i * d + j] = i == j ? sqrt(left) : left / L[j * d + j];
+        }
+    return 1;
+}
+
+/* A root of the covariance of state and nuisances, d = 3 + q. */
+static int root_of(record *r, PyObject *P, PyObject *cross, PyObject *variances) {
+    const Py_ssize_t d = r->d, q = r->q;
+    double *joint = r->gram;
+    if (!read_matrix(P, STATES, STATES, d, joint) || !read_matrix(cross, STATES, q, d, joint + STATES)) return 0;
+    if (!read_vector(variances, q, r->best)) return 0;
+    for (Py_ssize_t i = STATES; i < d; i++) {
+        for (Py_ssize_t j = 0; j < STATES; j++) joint[i * d + j] = joint[j * d + i];
+        for (Py_ssize_t j = STATES; j < d; j++) joint[i * d + j] = i == j ? r->best[i - STATES] : 0.0;
+    }
+    for (Py_ssize_t i = 0; i < d; i++) {
+        r->sigma[i] = sqrt(joint[i * d + i]);
+        r->scale[i] = r->sigma[i] > 0.0 ? r->sigma[i] : 1.0;
+    }
+    for (Py_ssize_t i = 0; i < d; i++)
+        for (Py_ssize_t j = 0; j < d; j++)
+            joint[i * d + j] = joint[i * d + j] / (r->scale[i] * r->scale[j]) + (i == j ? TINY : 0.0);
+    if (!cholesky(joint, r->root, d)) return 0;
+    for (Py_ssize_t i = 0; i < d; i++)
+        for (Py_ssize_t j = 0; j < d; j++) r->root[i * d + j] = r->sigma[i] * r->root[i * d + j];
+    return 1;
+}
+
+/* One soil for all: the normals that fit best. */
+static int fitted(record *r) {
+    const Py_ssize_t d = r->d, rows = COMPONENTS * r->s;
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        const double *A = r->A + row * d;
+        double *F = r->F + row * d;
+        r->y[row] = r->y[row] - dot(A, r->x, STATES);
+        for (Py_ssize_t n = 0; n < d; n++)
+            for (Py_ssize_t j = 0; j <= n; j++) F[j] += A[n] * r->root[n * d + j];
+    }
+    memset(r->gram, 0, (size_t)(d * d) * sizeof(double));
+    memset(r->best, 0, (size_t)d * sizeof(double));
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        const double *F = r->F + row * d;
+        for (Py_ssize_t i = 0; i < d; i++) {
+            for (Py_ssize_t j = 0; j <= i; j++) r->gram[i * d + j] += F[i] * F[j];
+            r->best[i] += F[i] * r->y[row];
+        }
+    }
+    for (Py_ssize_t i = 0; i < d; i++) r->gram[i * d + i] = 1.0 + r->gram[i * d + i];
+    if (!cholesky(r->gram, r->factor, d)) return 0;
+
+    const double *L = r->factor;
+    double *x = r->best;
+    for (Py_ssize_t i = 0; i < d; i++) {
+        for (Py_ssize_t k = 0; k < i; k++) x[i] -= L[i * d + k] * x[k];
+        x[i] /= L[i * d + i];
+    }
+    for (Py_ssize_t i = d - 1; i >= 0; i--) {
+        for (Py_ssize_t k = i + 1; k < d; k++) x[i] -= L[k * d + i] * x[k];
+        x[i] /= L[i * d + i];
+    }
+    return 1;
+}
+
+/* --- a change on top of it, from each stretch on --- */
+
+/* ln of the Bayes factor of a change with unit normal prior. */
+static double bayes(const double I[STATES][STATES], const double score[STATES]) {
+    const double a = 1.0 + I[0][0], b = I[1][0], c = I[2][0];
+    double m = b / a, n = c / a;
+    const double d = 1.0 + I[1][1] - m * b, e = I[2][1] - n * b;
+    double f = 1.0 + I[2][2] - n * c;
+    const double one = score[0], two = score[1] - m * one;
+    double three = score[2] - n * one;
+    m = e / d;
+    f = f - m * e;
+    three = three - m * two;
+    return 0.5 * (one * one / a + two * two / d + three * three / f - log(a * d * f));
+}
+
+static void since(record *r, double *evidence) {
+    const Py_ssize_t d = r->d;
+    double information[STATES][STATES] = {{0.0}}, score[STATES] = {0.0}, left[STATES][STATES];
+    for (Py_ssize_t at = r->s - 1; at >= 0; at--) {
+        const double *A = r->A + COMPONENTS * at * d, *B = A + d, *F = r->F + COMPONENTS * at * d, *E = F + d;
+        const double *y = r->y + COMPONENTS * at;
+        const double y_a = y[0] - dot(F, r->best, d), y_b = y[1] - dot(E, r->best, d);
+        for (int i = 0; i < STATES; i++) {
+            const double a = A[i] * r->spread[i], b = B[i] * r->spread[i];
+            for (int j = 0; j < STATES; j++)
+                information[i][j] += a * (A[j] * r->spread[j]) + b * (B[j] * r->spread[j]);
+            for (Py_ssize_t n = 0; n < d; n++) r->shared[n * STATES + i] += F[n] * a + E[n] * b;
+            score[i] += a * y_a + b * y_b;
+        }
+        memcpy(left, information, sizeof left);
+        double explained[STATES][STATES] = {{0.0}};
+        for (Py_ssize_t n = 0; n < d; n++) {
+            double *V = r->V + n * STATES;
+            const double *L = r->factor + n * d;
+            memcpy(V, r->shared + n * STATES, STATES * sizeof(double));
+            for (Py_ssize_t k = 0; k < n; k++)
+                for (int i = 0; i < STATES; i++) V[i] -= L[k] * r->V[k * STATES + i];
+            for (int i = 0; i < STATES; i++) V[i] /= L[n];
+            for (int i = 0; i < STATES; i++)
+                for (int j = 0; j < STATES; j++) explained[i][j] += V[i] * V[j];
+        }
+        for (int i = 0; i < STATES; i++)
+            for (int j = 0; j < STATES; j++) left[i][j] = information[i][j] - explained[i][j];
+        evidence[at] = bayes(left, score);
+    }
+}
+
+PyDoc_STRVAR(evidence_doc,
+"evidence(x, P, cross, variances, spread, lines, windows)\n--\n\nSee filter/evidence.py.");
+
+static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t count) {
+    (void)module;
+    record r = {0};
+    PyObject *factors = NULL, *x = NULL, *all = NULL;
+    if (count != 7 || !PyTuple_Check(given[3]) || !PyList_Check(given[5]) || !PyList_Check(given[6]) ||
+        PyList_GET_SIZE(given[5]) != PyList_GET_SIZE(given[6])) {
+        PyErr_SetString(PyExc_TypeError, "expected five tuples and two lists of one length");
+        return NULL;
+    }
+    r.s = PyList_GET_SIZE(given[5]);
+    r.q = PyTuple_GET_SIZE(given[3]);
+    r.d = STATES + r.q;
+    if (!room(&r)) return NULL;
+    double *factor = PyMem_Calloc((size_t)r.s + 1, sizeof(double));
+    if (factor != NULL && read_vector(given[0], STATES, r.x) && read_vector(given[4], STATES, r.spread) &&
+        read_lines(&r, given[5], given[6]) && root_of(&r, given[1], given[2], given[3]) && fitted(&r)) {
+        double known[STATES];
+        since(&r, factor);
+        for (int n = 0; n < STATES; n++) known[n] = r.x[n] + dot(r.root + n * r.d, r.best, r.d);
+        factors = made_vector(factor, r.s);
+        x = made_vector(known, STATES);
+        all = factors && x ? PyTuple_Pack(2, factors, x) : NULL;
+    } else if (factor == NULL) {
+        PyErr_NoMemory();
+    }
+    PyMem_Free(factor);
+    PyMem_Free(r.block);
+    Py_XDECREF(factors);
+    Py_XDECREF(x);
+    return all;
+}
+
+static PyMethodDef methods[] = {
+    {"evidence", (PyCFunction)(void (*)(void))evidence, METH_FASTCALL, evidence_doc},
+    {NULL, NULL, 0, NULL}};
+
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "record", "Whether the soil changed, compiled.", -1,
+                                    methods, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit_record(void) { return PyModule_Create(&module); }

@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from math import log
+from math import cos, log, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from gritd.estimator.effects import in_order
 from gritd.estimator.effects.base import Effect
@@ -36,6 +35,7 @@ SLIP = (-0.1, 1.0)
 NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
 STEP = 0.02  # of ln k and n for the derivatives
+QUANTUM = 2.0**-30  # of a coefficient; the largest is about 0.2, and the table is good to 1e-4
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
 ORDER = 24  # quadrature nodes in each zone
@@ -189,21 +189,35 @@ def _steady(wheel: Wheel, soil: Soil, theta_1: Array, slip: Array) -> Situation:
 
 
 def _fitted(values: Array) -> Array:
-    """Chebyshev coefficients (quantities, DEGREE[0] + 1, DEGREE[1] + 1) of values at the nodes, by
-    least squares.
+    """Chebyshev coefficients (quantities, DEGREE[0] + 1, DEGREE[1] + 1) of values (quantities,
+    nodes, nodes) at the nodes, by least squares.
+
+    The polynomials are orthogonal on the nodes, so a coefficient is a weighted sum of the values.
+    It is rounded to QUANTUM: sine and exponential differ in the last digit between processors, and
+    what is rounded does not.
     """
-    rows = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[0]), DEGREE[0])
-    columns = chebyshev.chebvander(_nodes((-1.0, 1.0), NODES[1]), DEGREE[1])
-    fitted: Array = np.einsum(
-        "ai,qij,bj->qab", np.linalg.pinv(rows), values, np.linalg.pinv(columns)
-    )
-    return fitted
+    rows, columns = _weights(NODES[0], DEGREE[0]), _weights(NODES[1], DEGREE[1])
+    # sums over an axis that is not the last are made term by term
+    along = np.add.reduce(rows[:, :, None] * values[:, None], axis=2)
+    turned = np.ascontiguousarray(along.transpose(0, 2, 1))
+    fitted = np.add.reduce(columns.T[:, :, None] * turned[:, :, None], axis=1)
+    # − 0 becomes 0
+    rounded: Array = np.round(fitted.transpose(0, 2, 1) / QUANTUM) * QUANTUM + 0.0
+    return rounded
+
+
+def _weights(nodes: int, degree: int) -> Array:
+    """(degree + 1, nodes): weight of the value at each node in each coefficient."""
+    at = _nodes((-1.0, 1.0), nodes).tolist()
+    polynomials = np.array([_polynomials(x, 1.0, degree)[0] for x in at]).T
+    polynomials[0] /= 2.0
+    return polynomials * (2.0 / nodes)
 
 
 def _nodes(span: tuple[float, float], count: int) -> Array:
     """Chebyshev nodes of an interval."""
     low, high = span
-    unit: Array = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    unit = np.array([cos(pi * (number + 0.5) / count) for number in range(count)])
     return 0.5 * (low + high) + 0.5 * (high - low) * unit
 
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import platform
+import subprocess
+import sys
 
 import pytest
 
@@ -26,3 +30,36 @@ def test_the_same_readings_give_the_same_ticks_until_the_revision_is_raised():
 def test_they_hold_a_change_of_the_soil():
     flags = [int(tick["flags"]) for tick in golden.computed()["more torque from 12 s on"]]
     assert any(flag & Flag.CHANGED for flag in flags)
+
+
+HASHED = """
+import hashlib, numpy
+from tests.estimator.filter.test_review import SETTINGS
+from gritd.estimator.online.pipeline import Pipeline
+from tests.linear_plant import readings
+pipeline, ticks = Pipeline(SETTINGS), hashlib.sha256()
+state = pipeline.start()
+loads = [(1.0, 50.0, 0.2), (1.0, 90.0, 0.4), (1.0, 60.0, 0.1)]
+for _, batch in readings(SETTINGS, (720.0, 0.62, 0.025), loads, seed=4, rate=250):
+    for reading in batch:
+        state, row = pipeline.step(state, [reading], reading.stamp)
+        ticks.update(numpy.array(row).tobytes())
+print(ticks.hexdigest(), state.track.updates)
+"""
+OTHER = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX2 FMA3"}
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the kernels are those of x86-64")
+def test_the_ticks_are_the_same_to_the_bit_on_another_processor():
+    """Without the instructions that OpenBLAS and numpy choose by the processor."""
+
+    def ticks(**more):
+        command = [sys.executable, "-W", "ignore", "-c", HASHED]
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=True, env={**os.environ, **more}
+        )
+        return done.stdout.split()
+
+    here = ticks()
+    assert int(here[1]) > 20
+    assert ticks(**OTHER) == here

@@ -22,7 +22,7 @@ from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
 from gritd.tools import main as cli
 from gritd.tools.cli.command import CommandError
 from gritd.tools.cli.yaml_edit import EditedYaml
-from gritd.tools.commands import replay
+from gritd.tools.commands import replay, replay_verify
 from gritd.tools.diagnose.explain.apply_form import set_discrepancy
 from tests import forms
 from tests.linear_plant import readings
@@ -104,6 +104,11 @@ def test_a_replay_does_not_depend_on_hash_order(recorded, seed):
     assert "identical bit for bit" in done.stdout
 
 
+def test_what_depends_on_the_processor_is_said(configuration):
+    assert replay_verify.by_processor(configuration) == ""
+    assert "filterpy" in replay_verify.by_processor(with_engine(configuration, "filterpy"))
+
+
 def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
     """One reading changed by a hair is found, with tick and field."""
     changed = tmp_path / "changed.mcap"
@@ -123,6 +128,7 @@ def test_a_difference_is_named(recorded, tmp_path, capsys, configuration):
     writer.close()
     assert replay.main([str(changed), "--verify"]) == 1
     assert "ticks differ" in (said := capsys.readouterr().out) and "current: logged" in said
+    assert "processor" not in said
 
 
 def test_a_recording_of_another_revision_is_not_compared(recorded, tmp_path, monkeypatch, capsys):

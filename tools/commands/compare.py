@@ -18,6 +18,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
+from gritd.tools.diagnose.explain.provenance import check_rig
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
@@ -46,6 +47,7 @@ def main(argv: Sequence[str]) -> int:
             arguments.files,
             configuration,
             fitted=arguments.fit,
+            other_rig=arguments.other_rig,
             command=["gritd", "compare", *argv],
         )
 
@@ -73,6 +75,11 @@ def _parser() -> argparse.ArgumentParser:
         "--config", required=True, metavar="F", help="the testbed, its soil and its effects"
     )
     parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="F may be of another testbed than the recordings",
+    )
+    parser.add_argument(
         "--fit",
         action="store_true",
         help="fit the soil and the calibration within their uncertainty too",
@@ -90,13 +97,16 @@ def compare(
     configuration: Configuration,
     *,
     fitted: bool,
+    other_rig: bool = False,
     command: Sequence[str] = (),
 ) -> Comparison:
     """Recordings beside their simulation. Raises CommandError where one cannot be read or nothing
-    can be compared.
+    can be compared, or where the configuration is of another testbed and that is not meant.
     """
     settings = configuration.settings
     recordings = read_all(paths)
+    if not other_rig:
+        check_rig(recordings, settings, configuration.source)
     series = [signals(recording, settings, RATE) for recording in recordings]
     rig = WheelRig(series, settings, read_off=False)
     stack = Stack(rig)

@@ -27,6 +27,7 @@ from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
+from gritd.tools.diagnose.explain.provenance import check_rig
 
 REPEATABILITY = {"c": ("cohesion", "Pa"), "tan_phi": ("tan_phi", ""), "k": ("shear_modulus", "")}
 UNUSUAL = 16.27  # chi-square, 3 degrees of freedom: 0.1 % of runs of the same soil are beyond
@@ -36,7 +37,7 @@ def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 where no run could be used; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
     recordings = [files.recording(path) for path in arguments.files]
-    configurations = [configuration_of(each, arguments.config) for each in recordings]
+    configurations = configurations_of(recordings, arguments)
     repeatability = _repeatability(configurations[0].settings.bed.repeatability, arguments)
 
     given = [settings_of(c, r) for c, r in zip(configurations, recordings, strict=True)]
@@ -64,6 +65,16 @@ def _estimated(
             runs.append(run)
             progress.advance()
     return runs
+
+
+def configurations_of(recordings: Sequence[Recording], arguments: Namespace) -> list[Configuration]:
+    """The given configuration for all, or each recording's own. Raises CommandError where the given
+    one is of another testbed, unless that is meant; ConfigError.
+    """
+    configurations = [configuration_of(each, arguments.config) for each in recordings]
+    if arguments.config is not None and not arguments.other_rig:
+        check_rig(recordings, configurations[0].settings, arguments.config)
+    return configurations
 
 
 def configuration_of(recording: Recording, path: str | None) -> Configuration:
@@ -262,6 +273,11 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--config", metavar="F", help="for all runs, instead of the recorded configurations"
+    )
+    parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="F may be of another testbed than the recordings",
     )
     parser.add_argument(
         "--repeatability",

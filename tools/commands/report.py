@@ -13,7 +13,7 @@ from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
 from gritd.tools.cli.progress import Progress
-from gritd.tools.commands.estimate import check_same_rig, configuration_of, settings_of
+from gritd.tools.commands.estimate import check_same_rig, configurations_of, settings_of
 from gritd.tools.report import campaign, lab
 
 
@@ -35,7 +35,7 @@ def main(argv: Sequence[str]) -> int:
 def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign:
     """The runs on one bed, with what their filter says. Raises CommandError."""
     recordings = [files.recording(path) for path in arguments.files]
-    configurations = [configuration_of(each, arguments.config) for each in recordings]
+    configurations = configurations_of(recordings, arguments)
     given = [settings_of(c, r) for c, r in zip(configurations, recordings, strict=True)]
     check_same_rig(given, recordings)
 
@@ -75,6 +75,11 @@ def _parser() -> Parser:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
     parser.add_argument(
         "--config", metavar="F", help="for all runs, instead of the recorded configurations"
+    )
+    parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="F may be of another testbed than the recordings",
     )
     parser.add_argument(
         "-o",

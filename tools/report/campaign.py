@@ -28,7 +28,7 @@ SOIL = {  # field -> label, factor
 HEIGHT, TOP, BOTTOM = 220.0, 22.0, 182.0  # [px] of a picture and its axes
 CURVE = 40  # points of a curve over slip
 ELLIPSES = 5  # of one run, over its time
-KEY = {"prior": "recorded", "before": "original, Eqs. 1–10", "after": "closed form, Eqs. 20–22"}
+KEY = {"recorded": "recorded", "before": "original, Eqs. 1–10", "after": "closed form, Eqs. 20–22"}
 LATE = 5.0  # usual distances of two messages: what is farther is a gap
 
 
@@ -124,29 +124,36 @@ def _forces(campaign: Campaign) -> Markup | None:
         return None
     note = (
         "Both forms at the measured entry angle, slip and load, with the soil that all runs "
-        "together know. A percentage is the mean difference, of the mean measured size."
+        "together know. The percentages are mean differences of the original equations and of the "
+        "closed form from what was measured, in shares of the mean measured size."
     )
     return section("Drawbar pull and torque against slip", tag("p", note), _drawn_forces(of))
 
 
 def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
+    """A panel for each load of each run."""
+    parts = [
+        (f"{run.name}, {np.mean(part.load):.0f} N", part)
+        for run in of
+        if run.beside is not None
+        for part in run.beside.by_load()
+    ]
     for channel, label in FORCES.items():
         drawn = [
-            figures.panel(run.name, _over_slip(run.beside, channel, label), _share(run, channel))
-            for run in of
-            if run.beside is not None and isfinite(run.beside.off(channel, "original"))
+            figures.panel(name, _over_slip(part, channel, label), _share(part, channel))
+            for name, part in parts
+            if isfinite(part.off(channel, "original"))
         ]
         if drawn:
             name = label.split(" ")[0]
             caption = f"{name} against slip, original and closed form beside what was recorded."
-            yield figures.figure(caption, figures.panels(drawn), legend=figures.legend(KEY))
+            legend = figures.legend(KEY)
+            yield figures.figure(caption, figures.panels(drawn), legend=legend, whole=True)
 
 
-def _share(run: LabRun, channel: str) -> str:
-    """Load, and how far both forms are off."""
-    assert run.beside is not None
-    off = [f"{run.beside.off(channel, which):.1%}" for which in ("original", "closed")]
-    return f"{run.run.settings.load.nominal.value:g} N, {off[0]} | {off[1]}"
+def _share(part: Beside, channel: str) -> str:
+    """How far both forms are off."""
+    return ", ".join(f"{which} {part.off(channel, which):.1%}" for which in ("original", "closed"))
 
 
 def _over_slip(of: Beside, channel: str, label: str) -> Markup:
@@ -159,8 +166,8 @@ def _over_slip(of: Beside, channel: str, label: str) -> Markup:
         for kind, values in computed.items()
     ]
     frame = plot.frame(at, label, below="slip [%]")
-    dots = plot.dots(at, slip, measured, "dots prior")
-    return plot.picture(HEIGHT, f"{label} against slip", frame, dots, *curves)
+    dots = plot.dots(at, slip, measured, "dots recorded")
+    return plot.picture(HEIGHT, f"{label} against slip", frame, *curves, dots)
 
 
 def _mean_over(x: Array, y: Array) -> tuple[Array, Array]:
@@ -272,18 +279,6 @@ def _outline(row: np.void) -> tuple[Array, Array]:
 
 def _sensors(campaign: Campaign) -> Markup:
     """Rate, gaps and longest silence of every channel, over all runs; what the filter said."""
-    rows = [
-        [
-            run.name,
-            topic.topic.removeprefix("/raw/"),
-            f"{topic.rate:.4g}",
-            str(topic.gaps),
-            f"{topic.longest * 1e3:.0f}",
-        ]
-        for run in campaign.runs
-        for topic in run.summary.topics
-        if topic.topic.startswith("/raw/")
-    ]
     said = [
         tag(
             "li",
@@ -292,14 +287,30 @@ def _sensors(campaign: Campaign) -> Markup:
         )
         for run in campaign.runs
     ]
-    head = ("run", "channel", "rate [Hz]", "gaps", "longest [ms]")
+    head = ("channel", "runs", "rate [Hz]", "gaps", "longest [ms]")
     note = f"A gap is more than {LATE:g} times the usual distance of two readings."
     return section(
         "The sensors and the filter",
         tag("ul", said),
-        table(head, rows, numbers=2),
+        table(head, _channels(campaign.runs), numbers=2),
         tag("p", note, class_="note"),
     )
+
+
+def _channels(runs: Sequence[LabRun]) -> list[list[str]]:
+    """A row for each channel, and for each state of it that runs have in common."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for run in runs:
+        for topic in run.summary.topics:
+            name = topic.topic.removeprefix("/raw/")
+            if name != topic.topic:
+                longest = f"{topic.longest * 1e3:.0f}"
+                state = (name, f"{topic.rate:.4g}", str(topic.gaps), longest)
+                alike.setdefault(state, []).append(run.name)
+    return [
+        [state[0], "all" if len(names) == len(runs) else ", ".join(names), *state[1:]]
+        for state, names in sorted(alike.items())
+    ]
 
 
 def _tracked(run: LabRun) -> float:

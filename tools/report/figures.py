@@ -36,14 +36,20 @@ class Rows(NamedTuple):
 ROWS = Rows()
 
 
-def figure(caption: str, *content: Child, legend: Child = None, small: bool = False) -> Markup:
-    """`small` figures are never parted by a page break."""
+def figure(
+    caption: str,
+    *content: Child,
+    legend: Child = None,
+    small: bool = False,
+    whole: bool = False,
+) -> Markup:
+    """`small` and `whole` figures are never parted by a page break."""
     return tag(
         "figure",
         legend,
         *content,
         tag("figcaption", held(caption)),
-        class_="small" if small else None,
+        class_="small" if small else "whole" if whole else None,
     )
 
 

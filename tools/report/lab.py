@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings, settings_of_run
@@ -29,6 +30,8 @@ from gritd.tools.report import front, masthead
 NS = 1e-9
 UNDATED = 978_307_200_000_000_000  # [ns] 2001: files that do not say when begin before
 PIECE = 1 << 20  # [bytes] that are hashed at once
+ANOTHER_LOAD = 0.05  # relative gap between the windows of two loads
+FEWEST = 5  # windows of a load
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,22 @@ class Beside:
             return float("nan")
         size = np.mean(np.abs(measured[good]))
         return float(np.mean(np.abs(computed[good] - measured[good])) / size)
+
+    def at(self, index: NDArray[np.intp]) -> Beside:
+        """Some of the windows."""
+        forces = (self.measured, self.original, self.closed)
+        chosen = ({name: values[index] for name, values in each.items()} for each in forces)
+        return Beside(self.slip[index], self.load[index], *chosen)
+
+    def by_load(self) -> list[Beside]:
+        """The windows of each load that was driven, the lightest first; what lies between two
+        loads for a few windows alone is a change of load, and left out.
+        """
+        order = np.argsort(self.load)
+        apart = np.diff(self.load[order]) > ANOTHER_LOAD * self.load[order][:-1]
+        groups = np.split(order, np.flatnonzero(apart) + 1)
+        kept = [g for g in groups if len(g) >= FEWEST] or [order]
+        return [self.at(np.sort(group)) for group in kept]
 
 
 @dataclass(frozen=True)
@@ -158,13 +177,20 @@ def table_of(runs: Iterable[LabRun]) -> list[list[str]]:
         [
             run.name,
             _date(run.summary.start),
-            f"{run.run.settings.load.nominal.value:g}",
+            loads_of(run),
             _slips(run.beside),
             fixed(run.summary.duration, 1),
             run.sha256[:12],
         ]
         for run in runs
     ]
+
+
+def loads_of(run: LabRun) -> str:
+    """The load [N] that is stated of a run; else those that were measured."""
+    if run.run.recording.run.nominal_load is not None or run.beside is None:
+        return f"{run.run.settings.load.nominal.value:g}"
+    return ", ".join(fixed(float(np.mean(part.load)), 0) for part in run.beside.by_load())
 
 
 def _date(stamp: int) -> str:

@@ -77,3 +77,22 @@ def test_an_output_that_cannot_be_written_is_one_line(
 ) -> None:
     assert cli.main(["report", str(runs[0]), "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_loads_of_one_run_are_told_apart(of: list[lab.LabRun]) -> None:
+    """Each load is a curve of its own over slip; a few windows between two loads are none."""
+    first, second = (run.beside for run in of)
+    assert first is not None and second is not None
+    changing = first.at(np.arange(2))
+    changing.load[:] = (60.0, 75.0)
+    every = (second, first, changing)
+
+    def forces(which: str) -> dict[str, np.ndarray]:
+        return {c: np.concatenate([getattr(b, which)[c] for b in every]) for c in of_forces}
+
+    of_forces = ("torque", "drawbar_pull")
+    slip, load_ = (np.concatenate([getattr(b, name) for b in every]) for name in ("slip", "load"))
+    joined = lab.Beside(slip, load_, forces("measured"), forces("original"), forces("closed"))
+    light, heavy = joined.by_load()
+    assert (light.slip.tolist(), heavy.slip.tolist()) == (first.slip.tolist(), second.slip.tolist())
+    assert light.off("torque", "closed") == pytest.approx(first.off("torque", "closed"))

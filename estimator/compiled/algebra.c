@@ -38,6 +38,25 @@ static int enough(Py_ssize_t given, Py_ssize_t wanted, PyObject *variances) {
 
 /* --- the algebra --- */
 
+PyDoc_STRVAR(dot_doc, "dot(a, b)\n--\n\nSum of products over the shorter of two tuples. See filter/estimate.py.");
+
+static PyObject *dot_of(PyObject *module, PyObject *const *given, Py_ssize_t count) {
+    (void)module;
+    if (count != 2 || !PyTuple_Check(given[0]) || !PyTuple_Check(given[1])) {
+        PyErr_SetString(PyExc_TypeError, "expected two tuples");
+        return NULL;
+    }
+    const Py_ssize_t one = PyTuple_GET_SIZE(given[0]), other = PyTuple_GET_SIZE(given[1]);
+    double total = 0.0;
+    for (Py_ssize_t n = 0; n < (one < other ? one : other); n++) {
+        const double a = PyFloat_AsDouble(PyTuple_GET_ITEM(given[0], n));
+        const double b = PyFloat_AsDouble(PyTuple_GET_ITEM(given[1], n));
+        if ((a == -1.0 || b == -1.0) && PyErr_Occurred()) return NULL;
+        total += a * b;
+    }
+    return PyFloat_FromDouble(total);
+}
+
 PyDoc_STRVAR(variance_doc, "variance(P, cross, variances, h, g)\n--\n\nSee filter/estimate.py.");
 
 static PyObject *variance(PyObject *module, PyObject *const *given, Py_ssize_t count) {
@@ -164,6 +183,7 @@ static PyObject *update(PyObject *module, PyObject *const *given, Py_ssize_t cou
 }
 
 static PyMethodDef methods[] = {
+    {"dot", (PyCFunction)(void (*)(void))dot_of, METH_FASTCALL, dot_doc},
     {"variance", (PyCFunction)(void (*)(void))variance, METH_FASTCALL, variance_doc},
     {"update", (PyCFunction)(void (*)(void))update, METH_FASTCALL, update_doc},
     {NULL, NULL, 0, NULL}};

@@ -1,5 +1,6 @@
 from gritd.estimator.filter.estimate import Matrix, Vector
 
+def dot(a: Vector, b: Vector, /) -> float: ...
 def variance(P: Matrix, cross: Matrix, variances: Vector, h: Vector, g: Vector, /) -> float: ...
 def update(
     x: Vector,

@@ -94,8 +94,13 @@ def plain_variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) 
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Σ aᵢbᵢ over the shorter of both, term by term: newer versions of Python compensate what `sum`
-    rounds.
+    """Σ aᵢbᵢ over the shorter of both."""
+    return arithmetic.dot(a, b) if arithmetic.BUILT else plain_dot(a, b)
+
+
+def plain_dot(a: Vector, b: Vector) -> float:
+    """`dot` in plain floats, to the same bits as compiled: term by term, since newer versions of
+    Python compensate what `sum` rounds.
     """
     total = 0.0
     for u, v in zip(a, b, strict=False):

@@ -114,7 +114,7 @@ class Tracker:
             state = self._closed(state, snapshot, now, elapsed)
             if status == Status.TRACKING:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
-                state, aids = self._update(state._replace(columns=now.columns), now, elapsed)
+                state, aids = self._update(state, now, elapsed)
 
         return state, self._account(state, snapshot, now, status, aids)
 
@@ -165,21 +165,26 @@ class Tracker:
         """Walk over the elapsed time, gate, update, remember; where a stretch ends, begin a review
         of the record.
         """
-        state = self._set_back(state._replace(trust=state.trust.passed(elapsed)))
+        state = self._set_back(
+            state._replace(columns=now.columns, trust=state.trust.passed(elapsed))
+        )
         walked = self.smoother.walked(state.estimate, elapsed, state.trust.unrest)
-        state = state._replace(estimate=walked)
 
         update = self.measurement.linearise(now, self.measurement.predict(walked, now))
         aids = self._gate(walked, now, update)
-        taken = tuple(index for index, aid in enumerate(aids) if aid.accepted)
+        taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
         if taken:
             update = selected(update, taken)
             estimate = self.engine.update(walked, update, not self.reviewer.estimates_k(state))
             state = self._bounds.moved(state, estimate, elapsed)
-            state = state._replace(updates=state.updates + 1)
 
-        state = self._remember(state, now, taken, elapsed)
-        return state._replace(trust=state.trust.surprised(aids, elapsed)), aids
+        estimate = state.estimate if taken else walked
+        state = state._replace(
+            estimate=estimate,
+            updates=state.updates + bool(taken),
+            trust=state.trust.surprised(aids, elapsed),
+        )
+        return self._remember(state, now, taken, elapsed), aids
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate, variances = self.settings.filter.gate, self.measurement.variances

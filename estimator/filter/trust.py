@@ -33,7 +33,8 @@ class Trust(NamedTuple):
         """Mean normalised innovation squared per component; 1 when the stated noise is the real
         one.
         """
-        return sum(self.surprise) / self.components if self.components > 0.0 else nan
+        torque, drawbar_pull = self.surprise
+        return (torque + drawbar_pull) / self.components if self.components > 0.0 else nan
 
     def passed(self, elapsed: float) -> Trust:
         """An update later."""

@@ -32,7 +32,8 @@ from gritd.estimator.messages.tick import (
     names_of,
     row,
 )
-from gritd.estimator.offline.snapshots import RecordedStreams, recorded_streams, snapshots
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.streams import RecordedStreams, recorded_streams
 from gritd.estimator.offline.windows import Ints
 from gritd.estimator.online.bed import begun
 from gritd.estimator.online.pipeline import Pipeline

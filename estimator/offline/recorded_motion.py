@@ -12,7 +12,8 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.messages.readings import ENCODERS, NS
-from gritd.estimator.offline.snapshots import RecordedStreams, Series, View, streams_at
+from gritd.estimator.offline.snapshots import Series, View
+from gritd.estimator.offline.streams import RecordedStreams, streams_at
 from gritd.estimator.offline.windows import Bools
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording

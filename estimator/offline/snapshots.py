@@ -9,7 +9,7 @@ a slice between two searches, a jump a difference of neighbours.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -17,108 +17,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Calibration, Settings
-from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS, WRENCH_FIELDS
+from gritd.estimator.messages.readings import ENCODERS, NS, WRENCH_FIELDS
 from gritd.estimator.messages.status import CHANNEL_BITS
-from gritd.estimator.offline.gaps import built_ticks
+from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
-from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.salvage import Recording
-from gritd.estimator.recording.tables import Fields
-from gritd.estimator.recording.topics import TICK
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
 from gritd.estimator.wheel.windows import DITHER, ENOUGH
 
 ANALOGUE = ("sinkage_pot", "motor_shunt")
 NEVER = -(1 << 62)  # [ns]
-RAW: dict[str, Fields] = {f"/raw/{channel}": None for channel in CHANNELS}
-# What `recorded_streams` takes of a recording with ticks: told to `read`, it unpacks the file once.
-STREAMS: dict[str, Fields] = {**RAW, TICK: ("stamp",)}
+AT_ONCE = 500  # windows that are numbers of Python at a time
 
 
-class Stream(NamedTuple):
-    """Readings of one channel in the order in which they were consumed."""
+def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> Iterator[Snapshot]:
+    """What Sync says at the ticks numbered `chosen`, shape (m,), ascending; equal to rounding.
 
-    stamp: Ints  # (n,) [ns]
-    received: Ints  # (n,) [ns]
-    tick: Ints  # (n,) number of the tick that consumed it
-    values: NDArray[Any]  # (n,) raw, or (n, 6) of the wrench
-
-
-class RecordedStreams(NamedTuple):
-    """The ticks of a recording and the readings each of them consumed, in
-    arrays.
+    They are handed out one by one: as numbers of Python a window takes ten times its place in an
+    array, and a heap of them is walked over and over by the garbage collector.
     """
-
-    ticks: Ints  # (k,) [ns]
-    streams: dict[str, Stream]
-
-
-def recorded_streams(recording: Recording, rate: float) -> RecordedStreams:
-    """Ticks as logged, else built at `rate` [Hz] from the first to the last receive time.
-
-    Raises RecordingError where a raw topic is not what the contract says.
-    """
-    if not recording.counts[TICK]:
-        return streams_at(recording, rate)
-
-    tables = recording.tables(STREAMS)
-    raw, logged = _raw(tables), tables[TICK]
-    consumed = {name: np.searchsorted(logged["order"], rows["order"]) for name, rows in raw.items()}
-    return _streams(logged["stamp"].copy(), raw, consumed)
-
-
-def streams_at(recording: Recording, rate: float) -> RecordedStreams:
-    """Ticks at `rate` [Hz] from the first to the last receive time, but for gaps, whatever was
-    logged.
-    """
-    try:
-        return streams_of(_raw(recording.tables(RAW)), rate)
-    except RecordingError as error:
-        raise RecordingError(f"{recording.path}: {error}") from None
-
-
-def streams_of(raw: Mapping[str, NDArray[np.void]], rate: float) -> RecordedStreams:
-    """Ticks at `rate` [Hz] over the readings of some channels: structured arrays (n,) with the
-    fields stamp and log_time [ns] and those of the channel. Raises RecordingError for a gap that is
-    too long.
-    """
-    raw = {name: rows[np.argsort(rows["log_time"], kind="stable")] for name, rows in raw.items()}
-    received = [np.empty(0, np.int64), *(rows["log_time"] for rows in raw.values())]
-    ticks = built_ticks(np.sort(np.concatenate(received)), round(NS / rate))
-
-    consumed = {name: np.searchsorted(ticks, rows["log_time"]) for name, rows in raw.items()}
-    return _streams(ticks, raw, consumed)
-
-
-def _raw(tables: Mapping[str, NDArray[np.void]]) -> dict[str, NDArray[np.void]]:
-    """The raw readings of every channel that has any."""
-    raw = {channel: tables[f"/raw/{channel}"] for channel in CHANNELS}
-    return {channel: rows for channel, rows in raw.items() if rows.size}
-
-
-def _streams(
-    ticks: Ints, raw: Mapping[str, NDArray[np.void]], consumed: Mapping[str, Ints]
-) -> RecordedStreams:
-    streams = {name: _stream(name, rows, consumed[name], len(ticks)) for name, rows in raw.items()}
-    return RecordedStreams(ticks, streams)
-
-
-def _stream(channel: str, rows: NDArray[np.void], tick: Ints, ticks: int) -> Stream:
-    """What some tick consumed, ascending; readings after the last tick are left out."""
-    end = int(np.searchsorted(tick, ticks))
-    rows, tick = rows[:end], tick[:end]
-    columns = [rows[name].copy() for name in CHANNELS[channel]]  # side by side, and rows can go
-    return Stream(
-        rows["stamp"].copy(),
-        rows["log_time"].copy(),
-        tick,
-        columns[0] if len(columns) == 1 else np.stack(columns, axis=1),
-    )
-
-
-def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> list[Snapshot]:
-    """What Sync says at the ticks numbered `chosen`, shape (m,), ascending; equal to rounding."""
     view = View(settings, recorded, chosen)
     wheel = view.slope("wheel_encoder", 1.0)
     carriage = view.slope("carriage_encoder", settings.pulley_radius)
@@ -126,25 +43,24 @@ def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> li
     axes = view.wrench()
     required = [wheel.known, carriage.known, *(means[name].known for name in ANALOGUE)]
 
-    columns = (
+    columns: tuple[NDArray[Any] | Series, ...] = (
         view.ends - view.length // 2,
         np.logical_and.reduce(required),
         wheel.position,
-        measured(wheel),
+        wheel,
         carriage.position,
-        measured(carriage),
-        *(measured(means[name]) for name in ANALOGUE),
-        *map(measured, axes),
+        carriage,
+        *(means[name] for name in ANALOGUE),
+        *axes,
         means.get("motor_temperature", view.nothing).value,
         view.stale(),
         view.stuck(wheel, carriage, means, axes),
     )
 
-    rows = zip(
-        *(column if isinstance(column, list) else column.tolist() for column in columns),
-        strict=True,
-    )
-    return [Snapshot._make(row) for row in rows]
+    for begin in range(0, len(chosen), AT_ONCE):
+        part = slice(begin, begin + AT_ONCE)
+        rows = zip(*(_listed(column, part) for column in columns), strict=True)
+        yield from map(Snapshot._make, rows)
 
 
 @dataclass(frozen=True)
@@ -169,8 +85,12 @@ class Motion(Series):
         return np.abs(self.value) > 4.0 * self.sigma
 
 
-def measured(series: Series) -> list[Measured]:
-    return list(map(Measured, series.value.tolist(), series.sigma.tolist()))
+def _listed(column: NDArray[Any] | Series, part: slice) -> Iterable[Any]:
+    """Some windows of a column as Python's numbers, of a series as measurements."""
+    if isinstance(column, Series):
+        return map(Measured, column.value[part].tolist(), column.sigma[part].tolist())
+    listed: list[Any] = column[part].tolist()
+    return listed
 
 
 class Accepted(NamedTuple):
@@ -185,25 +105,35 @@ class Accepted(NamedTuple):
         changed = np.append(True, self.values[1:] != self.values[:-1])
         return self._since(changed, self.members.size > 0, ends)
 
-    def nearly_still(self, ends: Ints, near: Array) -> Ints:
-        """The same but for a dither between two values no further apart than near (n,); 0 in a
-        window that holds a third. See wheel.windows.MeanWindow.
+    def nearly_still(self, ends: Ints, near: Callable[[Ints], Array]) -> Ints:
+        """The same but for a dither between two values no further apart than `near` of the stamps;
+        0 in a window that holds a third. See wheel.windows.MeanWindow.
         """
-        lasts, changed, last = [], [], np.inf
-        for value, distance in zip(self.values.tolist(), near.tolist(), strict=True):
-            changed.append(abs(value - last) > distance)
-            last = value if changed[-1] else last
-            lasts.append(last)
+        windows, two = self.members, self.members.hold_two(self.values)
+        # a window of three values is not still, whatever came before: look as far as the others go
+        end = int(windows.last[two].max()) + 1 if two.any() else 0
+        lasts, changed = np.full(len(self.values), np.inf), np.full(len(self.values), True)
+        lasts[:end], changed[:end] = _followed(self.values[:end], near(self.stamp[:end]))
 
-        windows, last_of = self.members, np.array(lasts)[self.members.last]
-        others = self.values[windows.reading] != last_of[windows.window]
+        others = self.values[windows.reading] != lasts[windows.last][windows.window]
         same = (windows.size > 0) & (windows.sum(others.astype(float)) == 0.0)
-        two = (windows.size >= ENOUGH) & windows.hold_two(self.values)
-        return self._since(np.array(changed), same | two, ends)
+        return self._since(changed, same | (two & (windows.size >= ENOUGH)), ends)
 
     def _since(self, changed: Bools, known: Bools, ends: Ints) -> Ints:
         since = np.maximum.accumulate(np.where(changed, self.stamp, 0))
         return np.where(known, ends - since[self.members.last], 0)
+
+
+def _followed(values: Array, near: Array) -> tuple[list[float], list[bool]]:
+    """The value (n,) that each reading (n,) is held to be, and whether it is another than before: a
+    reading no further than near (n,) from the last one is that one.
+    """
+    lasts, changed, last = [], [], np.inf
+    for value, distance in zip(values.tolist(), near.tolist(), strict=True):
+        changed.append(abs(value - last) > distance)
+        last = value if changed[-1] else last
+        lasts.append(last)
+    return lasts, changed
 
 
 class View:
@@ -276,11 +206,13 @@ class View:
             np.where(size > 0, mean * scale + calibration.offset.value, np.nan),
             np.where(size > 0, noise / np.sqrt(np.maximum(size, 1)) * abs(scale), 0.0),
             size > 0,
-            accepted.nearly_still(self.ends, self._near(accepted.stamp, noise)),
+            accepted.nearly_still(self.ends, lambda stamp: self._near(stamp, noise)),
         )
 
     def _near(self, stamp: Ints, noise: float) -> Array:
-        """How far each reading (n,) may be from another one of a sensor that stands still."""
+        """How far each of the first readings (n,) may be from another one of a sensor that stands
+        still.
+        """
         inside = np.arange(len(stamp)) - np.searchsorted(stamp, self._opened(stamp), "right")
         return np.where(inside >= ENOUGH, DITHER * noise, 0.0)
 
@@ -321,8 +253,10 @@ class View:
         """The readings in time, sorted, each stamp once; None without any."""
         stamp = stream.stamp - round(latency * NS)
         taken = np.flatnonzero(valid & (stamp > np.append(-1, self._closed)[stream.tick]))
-        taken = taken[np.argsort(stamp[taken], kind="stable")]
         stamp = stamp[taken]
+        if np.any(stamp[1:] < stamp[:-1]):
+            order = np.argsort(stamp, kind="stable")
+            taken, stamp = taken[order], stamp[order]
 
         fresh = np.diff(stamp, prepend=-1) > 0
         stamp, values = stamp[fresh], values[taken[fresh]]

@@ -16,7 +16,7 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.status import Status
 from gritd.estimator.offline.batch import Replayed, followed, replayed
 from gritd.estimator.offline.playback import without_absent
-from gritd.estimator.offline.snapshots import streams_of
+from gritd.estimator.offline.streams import streams_of
 from gritd.interface.runs import Place, Run, Table, configured
 
 Series = tuple[ArrayLike, ArrayLike]  # times [s] (n,) and raw values (n,), of the wrench (n, 6)

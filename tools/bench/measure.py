@@ -26,7 +26,8 @@ from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import recorded_ticks
-from gritd.estimator.offline.snapshots import recorded_streams, snapshots
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.streams import recorded_streams
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read

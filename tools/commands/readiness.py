@@ -11,7 +11,8 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import CHANNELS, ENCODERS, NS
 from gritd.estimator.offline.batch import window_ends
-from gritd.estimator.offline.snapshots import recorded_streams, snapshots
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.streams import recorded_streams
 from gritd.estimator.recording.salvage import Recording
 
 # required channel -> what a snapshot has of it
@@ -27,7 +28,7 @@ def never_ready(settings: Settings, recording: Recording) -> str:
     """One line. Raises RecordingError."""
     replayed = recorded_streams(recording, settings.rates.tick)
     ends = window_ends(replayed.ticks, round(NS / settings.rates.update))
-    seen = snapshots(settings, replayed, ends)
+    seen = list(snapshots(settings, replayed, ends))
     missing = [
         name for name, value in VALUES.items() if all(isnan(getattr(s, value).value) for s in seen)
     ]

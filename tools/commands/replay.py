@@ -17,7 +17,7 @@ from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.offline.batch import replayed
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.offline.playback import Checkpoint
-from gritd.estimator.offline.snapshots import STREAMS
+from gritd.estimator.offline.streams import STREAMS
 from gritd.estimator.recording.cdr import TIME
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts

@@ -28,7 +28,8 @@ from gritd.estimator.filter.tuning import CHANGE, TRUST
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import UPDATED, Flag
 from gritd.estimator.offline.batch import window_ends
-from gritd.estimator.offline.snapshots import RecordedStreams, Stream, snapshots
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.estimator.wheel.sync import Snapshot
@@ -201,7 +202,7 @@ def _windows(settings: Settings, channels: Mapping[str, Sent]) -> list[Snapshot]
         for name, each in channels.items()
     }
     ends = window_ends(ticks, round(NS / settings.rates.update))
-    return snapshots(settings, RecordedStreams(ticks, streams), ends)
+    return list(snapshots(settings, RecordedStreams(ticks, streams), ends))
 
 
 # --- what the filter makes of them ----------------------------------------------------------------

@@ -16,7 +16,8 @@ from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.offline.batch import ESTIMATES, estimates, window_ends
 from gritd.estimator.offline.playback import recorded_ticks
-from gritd.estimator.offline.snapshots import RecordedStreams, Stream, snapshots
+from gritd.estimator.offline.snapshots import snapshots
+from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
@@ -165,7 +166,8 @@ def test_snapshots_from_arrays_are_those_of_sync(seed):
 
 
 def test_a_recording_without_readings_has_no_windows():
-    assert snapshots(RIG, RecordedStreams(np.empty(0, np.int64), {}), np.empty(0, np.int64)) == []
+    nothing = RecordedStreams(np.empty(0, np.int64), {})
+    assert list(snapshots(RIG, nothing, np.empty(0, np.int64))) == []
 
 
 def recorded(path, rig, with_ticks, rate=250):

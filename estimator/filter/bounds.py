@@ -6,7 +6,7 @@ from math import log
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.estimate import KPA, Estimate, Vector, project
-from gritd.estimator.filter.track import TrackState
+from gritd.estimator.filter.trust import Trust
 from gritd.estimator.filter.tuning import TRUST
 
 
@@ -27,11 +27,10 @@ class Bounds:
         """The estimate moved to the bound where it left it."""
         return project(estimate, self._bounds)
 
-    def moved(self, state: TrackState, estimate: Estimate, elapsed: float = 0.0) -> TrackState:
-        """The state with another estimate inside its bounds, `elapsed` [s] of driving later."""
-        estimate = self.inside(estimate)
-        at_bound = state.trust.at_bound + elapsed if self.improbable(estimate) else 0.0
-        return state._replace(estimate=estimate, trust=state.trust._replace(at_bound=at_bound))
+    def stood(self, trust: Trust, estimate: Estimate, elapsed: float = 0.0) -> Trust:
+        """For how long an estimate has stood at a bound, `elapsed` [s] of driving later."""
+        at_bound = trust.at_bound + elapsed if self.improbable(estimate) else 0.0
+        return trust if at_bound == trust.at_bound else trust._replace(at_bound=at_bound)
 
     def improbable(self, estimate: Estimate) -> bool:
         """Whether a state stands at a bound that the prior calls improbable."""

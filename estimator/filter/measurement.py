@@ -51,7 +51,8 @@ class Measurement:
         update.
         """
         now = _sensed(self.settings, self.model, self.chain, snapshot, context, estimate)
-        return now._replace(columns=columns or self._unmoved)
+        columns = columns or self._unmoved
+        return now if columns == now.columns else now._replace(columns=columns)
 
     def with_columns(
         self, now: WheelState, snapshot: Snapshot, context: Context, estimate: Estimate

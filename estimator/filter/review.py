@@ -24,6 +24,7 @@ from gritd.estimator.filter.track import (
     Passing,
     Point,
     Relining,
+    Task,
     TrackState,
     slip_varies,
 )
@@ -48,9 +49,11 @@ class Reviewer:
         """Whether ln k is a state; otherwise it is considered."""
         return self._choice == "always" or (self._choice == "auto" and state.slip_varied)
 
-    def begun(self, state: TrackState, like: bool) -> TrackState:
-        """A stretch has ended; like: the next is of the same condition."""
-        return state._replace(task=Ended(like and state.unlinearised < LONGEST))
+    def begun(self, like: bool, unlinearised: int) -> Task:
+        """A stretch has ended; like: the next is of the same condition; unlinearised: windows since
+        the memory was linearised.
+        """
+        return Ended(like and unlinearised < LONGEST)
 
     def finished(self, state: TrackState) -> TrackState:
         """The whole rest of a review at once."""
@@ -148,5 +151,12 @@ class Reviewer:
             return state._replace(task=Passing(task.point, estimate, stretches))
 
         memory = state.memory._replace(stretches=stretches)
-        state = state._replace(memory=memory, linearised=task.point, unlinearised=0, task=None)
-        return self._bounds.moved(state, estimate)
+        estimate = self._bounds.inside(estimate)
+        return state._replace(
+            estimate=estimate,
+            memory=memory,
+            linearised=task.point,
+            unlinearised=0,
+            trust=self._bounds.stood(state.trust, estimate),
+            task=None,
+        )

@@ -27,7 +27,7 @@ from gritd.estimator.filter.measurement import Measurement, selected, soil
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother
-from gritd.estimator.filter.track import TrackState, slip_varies
+from gritd.estimator.filter.track import Task, TrackState, slip_varies
 from gritd.estimator.filter.tuning import CHANGE, TRUST
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
@@ -173,18 +173,24 @@ class Tracker:
         update = self.measurement.linearise(now, self.measurement.predict(walked, now))
         aids = self._gate(walked, now, update)
         taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
+        estimate, trust = walked, state.trust
         if taken:
             update = selected(update, taken)
             estimate = self.engine.update(walked, update, not self.reviewer.estimates_k(state))
-            state = self._bounds.moved(state, estimate, elapsed)
+            estimate = self._bounds.inside(estimate)
+            trust = self._bounds.stood(trust, estimate, elapsed)
 
-        estimate = state.estimate if taken else walked
+        memory, task = self._remembered(state, now, taken, elapsed)
         state = state._replace(
             estimate=estimate,
+            memory=memory,
+            slip_varied=state.slip_varied or slip_varies(memory, now.slip.sigma),
+            unlinearised=state.unlinearised + 1,
+            trust=trust.surprised(aids, elapsed),
             updates=state.updates + bool(taken),
-            trust=state.trust.surprised(aids, elapsed),
+            task=task,
         )
-        return self._remember(state, now, taken, elapsed), aids
+        return state, aids
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate, variances = self.settings.filter.gate, self.measurement.variances
@@ -197,19 +203,15 @@ class Tracker:
             aids.append(Aid(measured[index], r, innovation, s, ratio, ratio <= 1.0))
         return tuple(aids)
 
-    def _remember(
+    def _remembered(
         self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
-    ) -> TrackState:
-        """Add the window to the memory; where a stretch ends, begin a review of the record."""
+    ) -> tuple[Memory, Task | None]:
+        """The memory with one more window; where a stretch ends, a review of the record begins."""
         radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
         memory, begun = state.memory.extended(now, taken, radius, elapsed, state.trust.unrest)
-        varied = state.slip_varied or slip_varies(memory, now.slip.sigma)
-        state = state._replace(
-            memory=memory, slip_varied=varied, unlinearised=state.unlinearised + 1
-        )
         if not begun or not before:
-            return state
-        return self.reviewer.begun(state, before[0].like(now, taken))
+            return memory, None
+        return memory, self.reviewer.begun(before[0].like(now, taken), state.unlinearised + 1)
 
     def _set_back(self, state: TrackState) -> TrackState:
         """Back to the prior's covariance, or a wider one, when the innovations were out of all

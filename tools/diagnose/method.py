@@ -1,6 +1,7 @@
 """The method of the diagnosis, in the order in which it runs.
 
     signals      readings of every recording on a common grid           rig/signals.py
+    ripples      of the wheel, at the recordings' own rate               orders/lines.py
     rig          channels, constants with their priors, a prediction     rig/interface.py
     noise        size and colour of each channel, from the recordings    noise/estimate.py
     fit          soil and calibration within what is known of them       fit/base.py

@@ -24,6 +24,7 @@ from gritd.tools.diagnose.explain.result import (
     Quantity,
     Test,
 )
+from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import label
@@ -59,7 +60,11 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
-        caveats=(*_caveats(rig, redo), *doubts(rig, whole)),
+        caveats=(
+            *_caveats(rig, redo),
+            *doubts(rig, whole),
+            *left_over(rig, (*rig.baseline, *accepted.fitted.acting)),
+        ),
         share=decision.share,
         remaining=remainders(problem, accepted),
         remaining_words=_remaining(decision),
@@ -70,6 +75,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         explanations=tuple(
             Explanation(w.names, w.nameless, w.evidence, w.probability) for w in decision.weighed
         ),
+        lines=ripples_of(rig),
         candidates=len(rig.effects),
         learnt=learnt_form(problem, accepted, soil.after) if soil is not None else None,
         baseline=tuple(e.name for e in rig.baseline),

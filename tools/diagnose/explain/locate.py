@@ -21,8 +21,8 @@ from gritd.tools.diagnose.fit.evidence import Signature, log_bayes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.projection import Projected, Projection
+from gritd.tools.diagnose.fit.ripples import orders_shown
 from gritd.tools.diagnose.fit.shape import Shape
-from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.noise.colour import whiten_rows
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.screen.scans import candidates
@@ -207,7 +207,7 @@ def _waves(screening: Screening, model: Model, projection: Projection) -> list[S
 def _turning(screening: Screening, projection: Projection, channel: str) -> float:
     """Evidence of the likeliest ripple of the wheel in a channel."""
     stack = screening.problem.stack
-    orders = np.arange(1.0, highest_order(stack))
+    orders = orders_shown(stack, 1.0)
     if not orders.size:
         return -np.inf
     own = stack.of(channel)
@@ -314,7 +314,7 @@ def _ripples(
     every surrogate's. A ripple in any channel by noise alone is as rare as order_chance.
     """
     stack = screening.problem.stack
-    orders = np.arange(TUNING.explain.lowest_order, highest_order(stack))
+    orders = orders_shown(stack, TUNING.explain.lowest_order)
     places = []
     channels = stack.rig.channels if orders.size else ()
     for channel in channels:

@@ -202,6 +202,31 @@ class Reference:
 
 
 @dataclass(frozen=True)
+class Ripple:
+    """A line in the spectra of a channel at the recordings' own rate.
+
+    at:        ripples a turn of the wheel (along 1/turn), or a frequency (along Hz); with its
+        standard deviation.
+    amplitude: root mean square over the runs, in the channel's unit.
+    p:         of as much by noise alone, all that were tried counted.
+    frequency: [Hz] in the slowest and in the fastest stretch.
+    harmonic_of: of which louder line of the channel; reference: whether the reference has it too.
+    """
+
+    channel: str
+    at: float
+    sigma: float
+    along: str
+    amplitude: float
+    amplitude_sigma: float
+    unit: str
+    p: float
+    frequency: tuple[float, float]
+    harmonic_of: float | None = None
+    reference: bool = False
+
+
+@dataclass(frozen=True)
 class Explanation:
     """One of those that compete: listed effects, the discrepancy of form alone where there are
     none, functions without a name beside them where `nameless`. evidence: [nats] above the
@@ -283,6 +308,7 @@ class Diagnosis:
     discrepancy: Mapping[str, Discrepancy] = field(default_factory=dict)
     reference: Reference | None = None  # the campaign in which nothing is new
     explanations: tuple[Explanation, ...] = ()  # all that were weighed
+    lines: tuple[Ripple, ...] = ()  # at the recordings' own rate
     candidates: int = 0  # listed effects that were considered
     # the discrepancy of form as a configuration holds it; not in the JSON
     learnt: LearntForm | None = None

@@ -15,6 +15,7 @@ from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import first_guess
@@ -59,7 +60,8 @@ def explainable(rough: BaseFit) -> Explainable:
 
     signatures = raw_signatures(stack, fitted.u, fitted.predicted, others)
     leading = [s.columns for s in (*signatures, *smooth_signatures(stack))]
-    ripples = ripple_columns(stack, stack.measured - fitted.predicted)
+    found = ripple_columns(stack, stack.measured - fitted.predicted)
+    ripples = np.column_stack((found, line_columns(stack)))
     return Explainable(np.column_stack([*leading, fitted.raw]), ripples)
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
+from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
@@ -103,7 +104,8 @@ def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
     moving = stack.covariate("speed") > 0.0
     for channel in stack.rig.channels if orders.size else ():
         own = stack.of(channel) & moving
-        waves = {n: _waves(stack, own, n, orders) for n in np.unique(stack.run[own])}
+        whole = _undamped(stack, channel, orders)
+        waves = {n: _waves(stack, own, n, orders, whole) for n in np.unique(stack.run[own])}
         of_reference = [w for n, w in waves.items() if not stack.rig.new[n]]
         usual = _level(stack, [w.index for w in of_reference])
         for order, amplitude in _standing(of_reference, residual):
@@ -131,9 +133,19 @@ def _orders(stack: Stack) -> Array:
     return np.arange(lowest, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
 
 
-def _waves(stack: Stack, own: Bools, number: int, orders: Array) -> _Waves:
+def _undamped(stack: Stack, channel: str, orders: Array) -> Bools:
+    """Orders (o,) that stand on the grid as they are at its times: the recordings show them at
+    their own rate.
+    """
+    whole = np.zeros(orders.size, bool)
+    for line in restored(stack.rig, channel):
+        whole |= np.abs(orders - line.at) < max(line.cell, TUNING.fit.ripple_spacing)
+    return whole
+
+
+def _waves(stack: Stack, own: Bools, number: int, orders: Array, whole: Bools) -> _Waves:
     """On the marked values of one run: sin(x)/x of what an interval turns damps a ripple and, where
-    it is an alias of what lies above the grid's rate, turns its sign.
+    it is an alias of what lies above the grid's rate, turns its sign; but not the marked orders.
     """
     run = stack.rig.runs[number]
     angle = run.covariates["wheel_angle"]
@@ -141,6 +153,7 @@ def _waves(stack: Stack, own: Bools, number: int, orders: Array) -> _Waves:
     index = np.flatnonzero(own & (stack.run == number))
     time = stack.time[index]
     damping = np.sinc(np.outer(np.interp(time, run.time, turned), orders))
+    damping[:, whole] = 1.0
     wave = np.exp(1j * np.outer(np.interp(time, run.time, angle), orders)) * damping
     seen = np.mean(damping**2, axis=0) > TUNING.fit.ripple_shown**2
     return _Waves(index, wave, np.where(seen, 0.5 * np.sum(damping**2, axis=0), 0.0))

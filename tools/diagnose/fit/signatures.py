@@ -134,9 +134,11 @@ def _places(rig: Rig, parameter: Parameter) -> list[float]:
 
 
 def orders(rig: Rig, parameter: Parameter) -> list[float]:
-    """Ripples a turn that the grid can show: whole numbers, or as dense as the number of turns asks
-    for.
+    """Ripples a turn that the recordings show at their own rate. Without any, those that the grid
+    can show: whole numbers, or as dense as the number of turns asks for.
     """
+    if shown := rig.lines.orders(parameter.low, parameter.high):
+        return shown
     speed = np.concatenate(
         [np.abs(np.gradient(run.covariates["wheel_angle"], run.time)) for run in rig.runs]
     )

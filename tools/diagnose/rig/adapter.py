@@ -8,6 +8,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.diagnose.rig.drive import DriveRig
+from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
 from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
@@ -44,5 +45,7 @@ def rig_of(
         sorted(zip(each, rough, strict=True), key=lambda pair: pair[1].start)
         for each, rough in zip((reference, recordings), coarse, strict=True)
     ]
-    ordered = [signals(r, settings, rate) for each in in_time for r, _ in each]
-    return WheelRig(ordered, settings, len(reference), bed), rate
+    ordered = [r for each in in_time for r, _ in each]
+    means = [signals(r, settings, rate) for r in ordered]
+    beside, lines = with_lines(ordered, means, settings, len(reference))
+    return WheelRig(beside, settings, len(reference), bed, lines=lines), rate

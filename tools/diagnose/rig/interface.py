@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.orders.campaigns import Lines
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
@@ -173,6 +174,10 @@ class Rig(Protocol):
     @property
     def held(self) -> Held | None:
         """What of it the configuration holds already, where it does."""
+
+    @property
+    def lines(self) -> Lines:
+        """Ripples that the recordings show at their own rate."""
 
     @property
     def smooth(self) -> tuple[tuple[str, ...], ...]:

@@ -157,6 +157,15 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
     )
 
 
+def series_of(recording: Recording, settings: Settings) -> dict[str, Series]:
+    """The wheel's encoder [rad] and the analogue channels as they were read, by name; times since
+    the epoch [s].
+    """
+    series = {name: _series(recording, channel) for name, channel in settings.channels.items()}
+    wheel = {"wheel_encoder": series["wheel_encoder"]}
+    return wheel | _analogue(recording, settings, series)
+
+
 def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tuple[Array, str]:
     """Edges [s] of the grid where both encoders speak, and what of the recording it leaves out."""
     beats = np.sort(np.concatenate([time for time, _ in encoders]))

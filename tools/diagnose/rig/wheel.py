@@ -18,6 +18,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.terramechanics.soil import Array, Soil
+from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates, tables
@@ -70,12 +71,14 @@ class WheelRig:
         reference: int = 0,
         bed: Bed = "prepared",
         read_off: bool = True,
+        lines: Lines = NO_LINES,
     ) -> None:
         """reference: how many of the runs, the first ones, are of a reference campaign, in which no
         candidate acts; bed: whether the others drive on the same bed or on one prepared anew;
-        read_off: where both torques are measured, channel torque is the loss between them.
+        read_off: where both torques are measured, channel torque is the loss between them;
+        lines: ripples that the recordings show at their own rate.
         """
-        self.settings = settings
+        self.settings, self.lines = settings, lines
         self.new = [number >= reference for number in range(len(signals))]
         self.caveats = [s.left_out for s in signals if s.left_out]
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]

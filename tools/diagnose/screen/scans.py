@@ -23,6 +23,7 @@ from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
+from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise import lines
@@ -316,7 +317,8 @@ def shape_columns(stack: Stack, shape: Shape) -> Array:
 def without_harmonics(
     problem: Problem, fitted: Fitted, surrogates: Surrogates | None = None
 ) -> Projection:
-    """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too.
+    """The neighbourhood of a fit; where it holds a ripple of the wheel, its harmonics too, and
+    ripples of the recordings that are too fast for the grid.
 
     At a steady speed they are waves in time and along the bed, and another published form of the
     ripple has them.
@@ -328,6 +330,10 @@ def without_harmonics(
 
 
 def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
+    """Also ripples that are too fast for the grid: there they would pass for slow waves."""
+    for column in line_columns(stack, unheld=True).T:
+        sizes = [size_of(stack, channel) for channel in stack.rig.channels]
+        yield TUNING.screen.large_ripple * np.array(sizes)[stack.channel] * column
     for effect in fitted.acting:
         if effect.fingerprint.covariate == "wheel_angle":
             name = order_of(type(effect))

@@ -118,11 +118,13 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     for s in both:  # in their place: together they are large
         s.signature.columns[elsewhere] = 0.0
         s.columns[elsewhere] = 0.0
-    searched = {family.shape: family.average(projection) for family in screening.families}
+    beside = without_harmonics(problem, model.fitted, screening.surrogates)
+    searched = {family.shape: family.average(beside) for family in screening.families}
     screen = screen_signatures(projection, both, searched)
 
     of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
-    shapes: dict[Candidate, float] = {f.shape: float(f.average(alone)[0]) for f in of_reference}
+    rest = beside.of_rows(~stack.new)
+    shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
     return screen.beside_reference({**shapes, **usual})
 
 

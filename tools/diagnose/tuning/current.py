@@ -10,6 +10,7 @@ from typing import Any
 from gritd.tools.diagnose.tuning.explain import Explain
 from gritd.tools.diagnose.tuning.fit import Fit
 from gritd.tools.diagnose.tuning.noise import Noise
+from gritd.tools.diagnose.tuning.orders import Orders
 from gritd.tools.diagnose.tuning.rig import Rig
 from gritd.tools.diagnose.tuning.screen import Screen
 from gritd.tools.diagnose.tuning.search import Search
@@ -20,6 +21,7 @@ from gritd.tools.diagnose.tuning.verdict import Verdict
 class Tuning:
     """The numbers of every room. Only `replaced` puts another room's numbers in."""
 
+    orders: Orders = field(default_factory=Orders)
     rig: Rig = field(default_factory=Rig)
     noise: Noise = field(default_factory=Noise)
     fit: Fit = field(default_factory=Fit)

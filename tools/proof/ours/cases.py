@@ -23,7 +23,9 @@ from gritd.estimator.stages.history import delayed
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.noise.colour import Colour, coloured
+from gritd.tools.diagnose.rig.full_rate import FullRate, beside_lines
 from gritd.tools.diagnose.rig.signals import Signals, doubt
+from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
 from gritd.tools.testbed.simulation import soil_of
 
@@ -191,13 +193,35 @@ def _motion(
 
 def record(plan: Plan, acting: Sequence[Effect], noisy: bool = True) -> list[Signals]:
     """What the sensors send, on the grid."""
+    return [signals for signals, _ in record_fully(plan, acting, noisy)]
+
+
+def record_fully(
+    plan: Plan, acting: Sequence[Effect], noisy: bool = True
+) -> list[tuple[Signals, FullRate]]:
+    """What the sensors send, on the grid and at their own rate."""
     rng = np.random.default_rng(plan.seed)
     return [_recorded(plan, number, acting, rng, noisy) for number in range(len(plan.motions))]
 
 
+def rig_of(
+    plan: Plan,
+    acting: Sequence[Effect],
+    reference: Sequence[tuple[Signals, FullRate]] = (),
+    bed: Bed = "prepared",
+) -> WheelRig:
+    """The rig of a case, its ripples told at full rate. reference: runs in which nothing is new."""
+    every = [*reference, *record_fully(plan, acting)]
+    signals, full = zip(*every, strict=True)
+    reads = [lambda read=read: read for read in full]
+    constant, count = plan.settings.drive.torque_constant.value, len(reference)
+    beside, lines = beside_lines(signals, reads, constant, count)
+    return WheelRig(beside, plan.settings, count, bed, lines=lines)
+
+
 def _recorded(
     plan: Plan, number: int, acting: Sequence[Effect], rng: np.random.Generator, noisy: bool
-) -> Signals:
+) -> tuple[Signals, FullRate]:
     motion, settings = plan.motions[number], plan.settings
     servo = replace(
         _servo(motion, rng), load=np.asarray(motion.load) * (1.0 + plan.weight_errors[number])
@@ -212,7 +236,8 @@ def _recorded(
 
     time = np.asarray(motion.time)
     edges = time[0] + np.arange(int((time[-1] - time[0]) * GRID) + 1) / GRID
-    wheel = block_slope(time, _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng), edges)
+    angle = _counted(np.asarray(servo.wheel_angle), 9.58738e-5, rng)
+    wheel = block_slope(time, angle, edges)
     travel = np.asarray(servo.carriage_position) / settings.pulley_radius
     carriage = block_slope(time, _counted(travel, 7.669904e-4, rng), edges)
 
@@ -224,10 +249,11 @@ def _recorded(
             "load": sensed.load,
             "axle_torque": sensed.torque,
         }
-    analogue = {
-        name: block_mean(time, _read(plan, name, np.asarray(value), rng, noisy), edges)
+    read = {
+        name: (time, _read(plan, name, np.asarray(value), rng, noisy))
         for name, value in channels.items()
     }
+    analogue = {name: block_mean(*values, edges) for name, values in read.items()}
 
     info = RunInfo(
         name=f"run{number + 1}",
@@ -237,7 +263,7 @@ def _recorded(
     )
 
     middle = 0.5 * (edges[1:] + edges[:-1]) - edges[0]
-    return Signals(
+    signals = Signals(
         info.name,
         Path(f"{info.name}.mcap"),
         info,
@@ -249,6 +275,7 @@ def _recorded(
         analogue,
         (),
     )
+    return signals, {"wheel_encoder": (time, angle), **read}
 
 
 def _servo(motion: Motion, rng: np.random.Generator) -> Motion:

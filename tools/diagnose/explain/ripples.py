@@ -1,0 +1,80 @@
+"""Ripples and vibrations that the recordings show at their own rate, and those left without a
+name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.explain.result import Ripple
+from gritd.tools.diagnose.fit.signatures import order_of
+from gritd.tools.diagnose.orders.campaigns import same
+from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.tuning import TUNING
+
+ALONG = {"angle": "1/turn", "time": "Hz"}
+
+
+def ripples_of(rig: Rig) -> tuple[Ripple, ...]:
+    """All lines of the new campaign, the likeliest first."""
+    return tuple(_told(rig, line) for line in sorted(rig.lines.new, key=lambda x: x.p))
+
+
+def _told(rig: Rig, line: Line) -> Ripple:
+    return Ripple(
+        line.channel,
+        line.at,
+        line.sigma,
+        ALONG[line.axis],
+        line.size,
+        line.size_sigma,
+        rig.units[line.channel],
+        line.p,
+        line.frequency,
+        line.harmonic or None,
+        any(same(line, other) for other in rig.lines.reference),
+    )
+
+
+def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
+    """A sentence for each new ripple and vibration that no accepted effect has."""
+    named = [order for effect in accepted if (order := _order(effect)) is not None]
+    for axis in ALONG:
+        lines = [x for x in rig.lines.fresh(axis) if not (axis == "angle" and _taken(x, named))]
+        for group in _grouped(lines):
+            sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
+            first = group[0]
+            yield f"{_sentence(first)}: {sizes}. No accepted effect has it."
+
+
+def _sentence(line: Line) -> str:
+    if line.axis == "time":
+        return f"The recordings vibrate at {line.at:.2f} Hz, whatever the speed"
+    return f"The recordings ripple {line.at:.2f} times a turn of the wheel"
+
+
+def _order(effect: Effect) -> float | None:
+    """Ripples a turn of an effect."""
+    if effect.fingerprint.covariate != "wheel_angle":
+        return None
+    name = order_of(type(effect))
+    return float(getattr(effect, name)) if name else 1.0
+
+
+def _taken(line: Line, orders: Sequence[float]) -> bool:
+    return any(abs(line.at - order) < TUNING.orders.same * line.cell for order in orders)
+
+
+def _grouped(lines: Sequence[Line]) -> list[list[Line]]:
+    """Lines of several channels at one place together."""
+    groups: list[list[Line]] = []
+    for line in lines:
+        for group in groups:
+            if abs(line.at - group[0].at) < TUNING.orders.same * line.cell:
+                group.append(line)
+                break
+        else:
+            groups.append([line])
+    return groups

@@ -1,0 +1,87 @@
+"""The lines of a campaign, and what of them a reference campaign has already."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.tools.diagnose.orders.lines import Line, find_lines
+from gritd.tools.diagnose.orders.stretches import Samples
+from gritd.tools.diagnose.tuning import TUNING
+
+Runs = Sequence[Mapping[str, Samples]]
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of the new campaign and of the reference, which may be none."""
+
+    new: tuple[Line, ...] = ()
+    reference: tuple[Line, ...] = ()
+
+    @property
+    def every(self) -> tuple[Line, ...]:
+        """Of both campaigns."""
+        return (*self.new, *self.reference)
+
+    def renamed(self, name: str, channel: str, scale: float) -> Lines:
+        """With the lines of one channel as those of another, in whose unit it is `scale`."""
+
+        def told(lines: Sequence[Line]) -> tuple[Line, ...]:
+            return tuple(x.scaled(channel, scale) if x.channel == name else x for x in lines)
+
+        return Lines(told(self.new), told(self.reference))
+
+    def of(self, channel: str) -> list[Line]:
+        """All lines of a channel, those of both campaigns once."""
+        own = [line for line in self.new if line.channel == channel]
+        more = [line for line in self.reference if line.channel == channel]
+        return own + [line for line in more if not any(same(line, other) for other in own)]
+
+    def fresh(self, axis: str = "angle") -> list[Line]:
+        """Lines of the new campaign that are no harmonics, and that the reference does not have at
+        half their size at least.
+        """
+        return [
+            line
+            for line in self.new
+            if line.axis == axis
+            and not line.harmonic
+            and not any(
+                same(line, other) and other.size > TUNING.orders.known * line.size
+                for other in self.reference
+            )
+        ]
+
+    def orders(self, low: float, high: float) -> list[float]:
+        """Ripples a turn of the fresh lines between two bounds, each once, the best supported
+        first; those far behind it are left out.
+        """
+        found: list[Line] = []
+        inside = (line for line in self.fresh() if low <= line.at <= high)
+        for line in sorted(inside, key=lambda x: (-x.support, x.sigma)):
+            least = found[0].support - TUNING.orders.behind if found else -np.inf
+            if line.support > least and not any(_near(line, other) for other in found):
+                found.append(line)
+        return [line.at for line in found]
+
+
+NO_LINES = Lines()
+
+
+def lines_of(new: Runs, reference: Runs = ()) -> Lines:
+    """Of the readings of each run at their own rate."""
+    return Lines(find_lines(new), find_lines(reference) if reference else ())
+
+
+def same(one: Line, other: Line) -> bool:
+    """Whether two lines of a channel are one, in two campaigns."""
+    return one.channel == other.channel and one.axis == other.axis and _near(one, other)
+
+
+def _near(one: Line, other: Line) -> bool:
+    apart = TUNING.orders.same * max(one.cell, other.cell)
+    doubt = TUNING.orders.apart_sigma * float(np.hypot(one.sigma, other.sigma))
+    return abs(one.at - other.at) < max(apart, doubt)

@@ -1,0 +1,270 @@
+"""Lines that stand out of the spectra of all runs: ripples of the wheel, and vibrations in time.
+
+The strongest is taken first, then the next beside it. A ripple of the wheel has one order at all
+speeds, a vibration has one frequency: of the two the likelier is meant. The chance of a line counts
+every place and channel that was tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.orders.spectrum import log_chance, places_of, spectrum
+from gritd.tools.diagnose.orders.stretches import Samples
+from gritd.tools.diagnose.orders.wave import Amplitude, amplitude_of, wave_of
+from gritd.tools.diagnose.tuning import TUNING
+
+AXES = ("angle", "time")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of one channel.
+
+    axis:       "angle": `at` ripples a turn of the wheel; "time": `at` in Hz.
+    sigma:      standard deviation of `at`.
+    amplitudes: of each run, None where the run does not tell; phase by the wheel encoder's angle,
+        or by the time since the run began.
+    p:          of as much by noise alone, all that were tried counted.
+    frequency:  [Hz] of the ripple, the slowest and the fastest stretch.
+    cell:       what the longest run resolves, in the unit of `at`.
+    support:    evidence [nats] of this place and its harmonics in all channels: lugs and teeth
+        strike, so a count of them has harmonics; what is merely not round has none.
+    harmonic:   of which louder line of the channel it is a harmonic, by its `at`; else 0.
+    """
+
+    channel: str
+    axis: str
+    at: float
+    sigma: float
+    amplitudes: tuple[Amplitude | None, ...]
+    p: float
+    frequency: tuple[float, float]
+    cell: float
+    support: float
+    harmonic: float = 0.0
+
+    def scaled(self, channel: str, scale: float) -> Line:
+        """As a line of another channel."""
+        amplitudes = tuple(a and a.scaled(scale) for a in self.amplitudes)
+        return replace(self, channel=channel, amplitudes=amplitudes)
+
+    @property
+    def size(self) -> float:
+        """Root mean square over the runs of the amplitude, in the channel's unit."""
+        known = [a for a in self.amplitudes if a is not None]
+        square = np.mean([a.size**2 - 2.0 * a.sigma**2 for a in known]) if known else 0.0
+        return float(np.sqrt(max(square, 0.0)))
+
+    @property
+    def size_sigma(self) -> float:
+        """Standard deviation of the size."""
+        known = [a.sigma for a in self.amplitudes if a is not None]
+        return float(np.sqrt(np.mean(np.square(known)) / len(known))) if known else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of a run."""
+
+    run: int
+    samples: Samples  # without trend
+
+
+class _Channel:
+    """The spectra of one channel, less the lines found so far."""
+
+    def __init__(self, name: str, parts: Sequence[_Part]) -> None:
+        self.name, self.parts = name, list(parts)
+        self.places = {axis: places_of([p.samples for p in parts], axis) for axis in AXES}
+        self._renew()
+        self._first = dict(self.chances)
+
+    def _renew(self) -> None:
+        self.spectra = {
+            axis: [spectrum(p.samples, axis, places) for p in self.parts]
+            for axis, places in self.places.items()
+        }
+        self.chances = {axis: log_chance(spectra) for axis, spectra in self.spectra.items()}
+
+    def strongest(self, axis: str) -> tuple[float, int]:
+        """Log chance of the likeliest line, and its place."""
+        place = int(np.argmin(self.chances[axis]))
+        return float(self.chances[axis][place]), place
+
+    def support(self, axis: str, at: float) -> float:
+        """Evidence [nats] of a line and its next harmonics in the readings as they were."""
+        times = np.arange(1, TUNING.orders.supporting + 1)
+        near = [self._nearest(self._first[axis], axis, float(k * at)) for k in times]
+        return float(np.sum(np.maximum(-np.array(near) - TUNING.orders.supports, 0.0)))
+
+    def near(self, axis: str, at: float) -> float:
+        """Log chance of a line at this place or its neighbours in the grid."""
+        return self._nearest(self.chances[axis], axis, at)
+
+    def _nearest(self, chances: Array, axis: str, at: float) -> float:
+        place = round(at / self.places[axis].spacing)
+        return float(chances[max(place - 1, 0) : place + 2].min(initial=0.0))
+
+    def refined(self, axis: str, place: int) -> float:
+        """The likeliest place between its neighbours in the grid."""
+        at, step = place * self.places[axis].spacing, self.places[axis].spacing
+        for _ in range(TUNING.orders.refinements):
+            tried = at + step * np.linspace(-1.0, 1.0, TUNING.orders.refined_places)
+            at = float(tried[int(np.argmax(self._gain(axis, place, tried)))])
+            step *= 2.0 / (TUNING.orders.refined_places - 1)
+        return at
+
+    def _gain(self, axis: str, place: int, tried: Array) -> Array:
+        """-Log chance (t,) summed over the parts that tell."""
+        gain = np.zeros(tried.size)
+        for part, s in zip(self.parts, self.spectra[axis], strict=True):
+            if np.isfinite(s.level[place]):
+                samples = part.samples
+                waves = np.exp(2j * np.pi * np.outer(tried, samples.of(axis)))
+                power = np.abs(waves @ samples.values) ** 2 / samples.values.size
+                freedom = s.freedom[place]
+                gain += 0.5 * freedom * np.log1p(2.0 * power / s.level[place] / freedom)
+        return gain
+
+    def amplitudes(
+        self, before: Sequence[_Part], axis: str, at: float, runs: int
+    ) -> tuple[Amplitude | None, ...]:
+        """Of each run, its parts together, as they were before the line was taken."""
+        place = min(round(at / self.places[axis].spacing), self.places[axis].count - 1)
+        found: list[list[Amplitude]] = [[] for _ in range(runs)]
+        for part, s in zip(before, self.spectra[axis], strict=True):
+            if np.isfinite(s.level[place]):
+                found[part.run].append(amplitude_of(part.samples, axis, at, float(s.level[place])))
+        return tuple(_together(each) for each in found)
+
+    def take(self, axis: str, at: float) -> None:
+        """Leave a line out."""
+        self.parts = [
+            replace(p, samples=p.samples.with_values(
+                p.samples.values - wave_of(p.samples, axis, at)
+            ))
+            for p in self.parts
+        ]  # fmt: skip
+        self._renew()
+
+    def cell(self, axis: str) -> float:
+        """What the longest part resolves."""
+        return 1.0 / max(part.samples.span(axis) for part in self.parts)
+
+    def spread(self, axis: str, at: float, amplitudes: Sequence[Amplitude | None]) -> float:
+        """Standard deviation of the line's place: Rife and Boorstyn (1974), IEEE Trans. Inf. Theory
+        20, 591-598, var f = 3 var a/(π² A² T²) of each part.
+        """
+        precision = 0.0
+        for part in self.parts:
+            a = amplitudes[part.run]
+            if a is not None:
+                length = part.samples.span(axis)
+                precision += (np.pi * length * a.size / a.sigma) ** 2 / 3.0
+        return float(1.0 / np.sqrt(max(precision, 1e-300)))
+
+    def frequency(self, axis: str, at: float) -> tuple[float, float]:
+        """[Hz] of a line in the slowest and in the fastest stretch."""
+        if axis == "time":
+            return at, at
+        rates = [
+            abs(float(s.angle[own][-1] - s.angle[own][0])) / max(float(np.ptp(s.time[own])), 1e-9)
+            for s in (p.samples for p in self.parts)
+            for own in s.slices
+        ]
+        return at * min(rates), at * max(rates)
+
+
+def _together(parts: Sequence[Amplitude]) -> Amplitude | None:
+    """Of parts with phases of their own: their size, by the phase of the first."""
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    size = float(np.sqrt(np.mean([a.size**2 for a in parts])))
+    sigma = float(np.sqrt(np.mean([a.sigma**2 for a in parts]) / len(parts)))
+    scale = size / max(parts[0].size, 1e-300)
+    return Amplitude(scale * parts[0].cos, scale * parts[0].sin, sigma)
+
+
+def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
+    """Lines of all channels of these runs, by channel, the loudest first."""
+    names = list(dict.fromkeys(name for run in runs for name in run))
+    channels = [_Channel(name, parts) for name in names if (parts := list(_parts(runs, name)))]
+    tried = sum(places.count for c in channels for places in c.places.values())
+
+    found: list[Line] = []
+    for _ in range(TUNING.orders.most_lines):
+        best = _likeliest(channels)
+        if best is None or best[0] + np.log(tried) > np.log(TUNING.orders.level):
+            break
+        chance, first, axis, place = best
+        at = first.refined(axis, place)
+        support = sum(channel.support(axis, at) for channel in channels)
+        for channel in (first, *(c for c in channels if c is not first)):
+            tries = tried if channel is first else len(channels)
+            log_p = (chance if channel is first else channel.near(axis, at)) + np.log(tries)
+            if log_p <= np.log(TUNING.orders.level):
+                found.append(_taken(channel, axis, at, float(np.exp(log_p)), support, len(runs)))
+    return tuple(_with_harmonics(found, channels))
+
+
+def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
+    for number, run in enumerate(runs):
+        if name in run:
+            for part in run[name].parts():
+                yield _Part(number, part.with_values(part.detrended(part.values)))
+
+
+def _likeliest(channels: Sequence[_Channel]) -> tuple[float, _Channel, str, int] | None:
+    """Log chance, channel, axis and place of the likeliest line of all."""
+    found = []
+    for channel in channels:
+        for axis in AXES:
+            chance, place = channel.strongest(axis)
+            found.append((chance, channel, axis, place))
+    if not found:
+        return None
+    prefer = {"angle": TUNING.orders.prefer_angle, "time": 0.0}
+    return min(found, key=lambda each: each[0] - prefer[each[2]])
+
+
+def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, runs: int) -> Line:
+    """The line, which the channel loses. The noise about it is what is left."""
+    before = channel.parts
+    channel.take(axis, at)
+    amplitudes = channel.amplitudes(before, axis, at, runs)
+    return Line(
+        channel.name,
+        axis,
+        at,
+        channel.spread(axis, at, amplitudes),
+        amplitudes,
+        p,
+        channel.frequency(axis, at),
+        channel.cell(axis),
+        support,
+    )
+
+
+def _with_harmonics(found: Sequence[Line], channels: Sequence[_Channel]) -> Iterator[Line]:
+    """The lines by channel, the loudest first, each told whether it is a harmonic."""
+    for channel in channels:
+        own = sorted((x for x in found if x.channel == channel.name), key=lambda x: -x.size)
+        for number, line in enumerate(own):
+            louder = [x for x in own[:number] if x.axis == line.axis and not x.harmonic]
+            yield replace(line, harmonic=_base(line, louder))
+
+
+def _base(line: Line, louder: Sequence[Line]) -> float:
+    for other in louder:
+        times = round(line.at / other.at)
+        if (
+            2 <= times <= TUNING.orders.harmonics
+            and abs(line.at - times * other.at) < TUNING.orders.same * line.cell
+        ):
+            return other.at
+    return 0.0

@@ -1,0 +1,121 @@
+"""Spectra of steady stretches against the wheel angle or time, and the chance of a line in them.
+
+The noise about a place is the geometric mean of its neighbours' power, both sides alike: for a
+spectrum that falls by a power law this is the power at the place itself. Beside it the power of
+noise is Fisher's F of two degrees of freedom and as many as the neighbours have. Chances of several
+parts of the recordings, each with a phase of its own, are multiplied (Fisher 1925, section 21.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaln, logsumexp
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.orders.stretches import Ints, Samples
+from gritd.tools.diagnose.orders.transform import fourier_sums
+from gritd.tools.diagnose.tuning import TUNING
+
+TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Of one part of a run at the places of a grid (o,).
+
+    power: |Σ y e^(−2πi o x)|²/n in the square of the channel's unit; level: the noise's; infinite
+    where nothing is known of it. freedom: degrees of freedom of the level.
+    """
+
+    power: Array
+    level: Array
+    freedom: Array
+
+    @property
+    def log_chance(self) -> Array:
+        """Of as much power by noise alone (o,)."""
+        ratio = self.power / self.level
+        return np.asarray(-0.5 * self.freedom * np.log1p(2.0 * ratio / self.freedom))
+
+    @property
+    def known(self) -> Array:
+        """1 where the noise is known (o,)."""
+        return np.isfinite(self.level).astype(float)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where lines are looked for: k · spacing, k = 0 … count − 1."""
+
+    spacing: float
+    count: int
+
+    @property
+    def at(self) -> Array:
+        """(o,)."""
+        return np.asarray(self.spacing * np.arange(self.count), dtype=float)
+
+
+def places_of(parts: Sequence[Samples], axis: str) -> Places:
+    """As dense as the longest part resolves, up to the fastest ripple that some part shows."""
+    spacing = 1.0 / (TUNING.orders.density * max(part.span(axis) for part in parts))
+    limit = TUNING.orders.highest_order if axis == "angle" else TUNING.orders.highest_frequency
+    highest = min(limit, max(fastest(part, axis) for part in parts))
+    return Places(spacing, max(int(highest / spacing), 1))
+
+
+def fastest(part: Samples, axis: str) -> float:
+    """The fastest ripple that is no alias, in cycles a turn or a second."""
+    steps = np.abs(np.diff(part.of(axis)))
+    inside = steps[(np.diff(part.stretch) == 0) & (steps > 0.0)]
+    return float(TUNING.orders.nyquist / np.quantile(inside, 0.9)) if inside.size else 0.0
+
+
+def spectrum(part: Samples, axis: str, places: Places) -> Spectrum:
+    """Of a part whose values have no trend."""
+    sums = fourier_sums(part.of(axis), part.values, places.spacing, places.count)
+    power = np.abs(sums) ** 2 / part.values.size
+    longest = part.longest(axis)
+    low = int(np.ceil(1.0 / longest / places.spacing))
+    high = min(int(fastest(part, axis) / places.spacing), places.count)
+    level, freedom = _level(power, low, high, places.spacing * part.span(axis))
+    level[: int(np.ceil(TUNING.orders.cycles / longest / places.spacing))] = np.inf
+    return Spectrum(power, level, freedom)
+
+
+def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Array]:
+    """Noise (o,) about each place and its freedom (o,), by places low … high − 1; cells: that the
+    part resolves between two places.
+    """
+    total = np.concatenate(([0.0], np.cumsum(np.log(np.maximum(power, TINY)))))
+    near, far = (max(round(c / cells), 1) for c in (TUNING.orders.near, TUNING.orders.far))
+    at = np.arange(power.size, dtype=np.int64)
+
+    def side(begin: Ints, end: Ints) -> tuple[Array, Array]:
+        first, last = (np.clip(i, low, max(high, low)) for i in (begin, end))
+        count = last - first
+        mean = np.asarray((total[last] - total[first]) / np.maximum(count, 1), dtype=float)
+        return mean, np.asarray(count * cells, dtype=float)
+
+    below, few = side(at - far, at - near + 1)
+    above, many = side(at + near, at + far + 1)
+    known = (np.minimum(few, many) >= TUNING.orders.least_neighbours) & (at < high)
+
+    together = 4.0 / (1.0 / np.maximum(few, TINY) + 1.0 / np.maximum(many, TINY))
+    level = np.exp(0.5 * (below + above) + np.euler_gamma)
+    freedom = np.maximum(2.0 * TUNING.orders.geometric * together, 1.0)
+    return np.where(known, level, np.inf), freedom
+
+
+def log_chance(spectra: Sequence[Spectrum]) -> Array:
+    """Chance (o,) of all parts together; 0 where none tells."""
+    beside = -np.sum([s.log_chance for s in spectra], axis=0)
+    count = np.sum([s.known for s in spectra], axis=0)
+    terms = np.arange(len(spectra))[:, None]
+    with np.errstate(divide="ignore"):
+        logs = terms * np.log(np.maximum(beside, TINY)) - gammaln(terms + 1.0)
+    summed = logsumexp(np.where(terms < count, logs, -np.inf), axis=0)
+    return np.where(count > 0, np.minimum(summed - beside, 0.0), 0.0)

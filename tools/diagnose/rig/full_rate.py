@@ -1,0 +1,91 @@
+"""Recordings at their own rate: what is faster than the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import accumulate
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.offline.windows import block_mean
+from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
+from gritd.tools.diagnose.orders.on_grid import on_grid
+from gritd.tools.diagnose.orders.stretches import Motion, Samples, Series, steady_samples
+from gritd.tools.diagnose.rig.candidates import steady_states
+from gritd.tools.diagnose.rig.signals import Signals, series_of
+from gritd.tools.diagnose.tuning import TUNING
+
+FullRate = Mapping[str, Series]  # wheel_encoder [rad], and analogue channels; times since the epoch
+
+
+def with_lines(
+    recordings: Sequence[Recording], signals: Sequence[Signals], settings: Settings, reference: int
+) -> tuple[list[Signals], Lines]:
+    """Signals with ripples as they stand at the grid's times, and the lines that the recordings
+    hold. reference: so many of the runs, the first ones, are of a reference campaign.
+    """
+    reads = [partial(series_of, recording, settings) for recording in recordings]
+    return beside_lines(signals, reads, settings.drive.torque_constant.value, reference)
+
+
+def beside_lines(
+    signals: Sequence[Signals],
+    reads: Sequence[Callable[[], FullRate]],
+    torque_constant: float,
+    reference: int = 0,
+) -> tuple[list[Signals], Lines]:
+    """The same of signals and what reads their runs at full rate, one run at a time."""
+    most = TUNING.orders.most_samples // max(len(signals), 1)
+    pairs = list(zip(signals, reads, strict=True))
+    runs = [steady_readings(known, read(), most) for known, read in pairs]
+
+    found = lines_of(runs[reference:], runs[:reference])
+    if not found.every:
+        return list(signals), found
+    beside = [restored(known, read(), found) for known, read in pairs]
+    return beside, found.renamed("current", "torque", torque_constant)
+
+
+def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Samples]:
+    """Readings of each channel while the wheel drives steadily, at most so many; of a table of
+    steady states none.
+    """
+    if steady_states(signals):
+        return {}
+    since = {name: _since(signals, read) for name, read in full.items()}
+    angle = since.pop("wheel_encoder")
+    return steady_samples(_motion(signals), angle, since, most)
+
+
+def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
+    """Signals with the lines as they stand at the grid's times."""
+    if steady_states(signals):
+        return signals
+    angle, motion = _since(signals, full["wheel_encoder"]), _motion(signals)
+    edges = _edges(signals.time)
+    analogue = dict(signals.analogue)
+    for name in set(analogue) & {line.channel for line in lines.every}:
+        read = _since(signals, full[name])
+        less, ripple = on_grid(lines.of(name), motion, angle, read, signals.time)
+        analogue[name] = block_mean(*less, edges) + ripple
+    return replace(signals, analogue=analogue)
+
+
+def _motion(signals: Signals) -> Motion:
+    return Motion(signals.time, signals.wheel_speed, signals.carriage_rate)
+
+
+def _since(signals: Signals, read: Series) -> Series:
+    """The same with times since the run began [s]."""
+    time, values = read
+    return time - signals.start, values
+
+
+def _edges(middle: Array) -> Array:
+    """Edges (n + 1,) [s] of intervals side by side, the first at 0, from their middles (n,)."""
+    return np.array(list(accumulate(middle.tolist(), lambda e, m: 2.0 * m - e, initial=0.0)))

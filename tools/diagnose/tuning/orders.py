@@ -1,0 +1,56 @@
+"""Tuned numbers of tools/diagnose/orders: ripples, vibrations and latencies at the recordings' own
+rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gritd.tools.diagnose.tuning.field import tuned
+
+NEIGHBOURS = "spectra of white and red noise"
+
+
+@dataclass(frozen=True)
+class Orders:
+    """What counts as a line in a spectrum against the wheel angle."""
+
+    # --- stretches.py ---
+    creep: float = tuned(0.05, "-", "of the usual speed: a slower wheel does not drive")
+    settled: float = tuned(0.5, "s", "after a start and before a stop nothing is steady")
+    changed: float = tuned(0.02, "-", "relative change of a speed within `apart`: a ramp")
+    apart: float = tuned(0.3, "s", "over which a change of speed is looked for")
+    change_noise: float = tuned(5.0, "σ", "of the speeds' own noise: less is no ramp")
+    shortest: float = tuned(1.0, "s", "a shorter stretch is not used")
+    most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
+    longest_part: float = tuned(20.0, "turns", "a longer run is cut, each part its own phase")
+
+    # --- spectrum.py ---
+    trend: int = tuned(2, "degree", "of the polynomial that each stretch loses")
+    cycles: float = tuned(2.0, "cycles", "at least in the longest stretch")
+    density: float = tuned(4.0, "-", "places tried in each that the longest run resolves")
+    nyquist: float = tuned(0.45, "-", "of the samples: a faster ripple is an alias")
+    highest_order: float = tuned(400.0, "1/turn", "tried: the library's 200 and a harmonic of it")
+    highest_frequency: float = tuned(
+        60.0, "Hz", "tried in time: the grid damps what is faster twentyfold", "run time"
+    )
+    near: float = tuned(1.5, "cells", "nearer in the spectrum is the line itself")
+    far: float = tuned(8.0, "cells", "as far the spectrum of the noise is smooth", NEIGHBOURS)
+    least_neighbours: float = tuned(3.0, "cells", "on either side, or nothing is known")
+    geometric: float = tuned(0.61, "-", "freedom of a geometric mean of exponential values", "6/π²")
+
+    # --- lines.py ---
+    level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
+    most_lines: int = tuned(16, "lines", "at most", "run time")
+    refinements: int = tuned(2, "times", "a line's place is looked for more finely")
+    refined_places: int = tuned(9, "places", "of each such look")
+    prefer_angle: float = tuned(
+        3.0, "nats", "at one speed a ripple of the wheel is also one in time: the wheel's is meant"
+    )
+    same: float = tuned(1.0, "cells", "closer lines of two channels are one")
+    supporting: int = tuned(3, "times", "an order, whose evidence supports it as a count")
+    supports: float = tuned(2.0, "nats", "of each: less is chance, three places are tried in each")
+    behind: float = tuned(10.0, "nats", "of support: orders so far behind the best are no count")
+    apart_sigma: float = tuned(4.0, "σ", "of their places: closer lines are one")
+    known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")
+    harmonics: int = tuned(6, "times", "the order of a louder line: its harmonic")

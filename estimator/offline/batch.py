@@ -29,6 +29,7 @@ from gritd.estimator.messages.tick import (
     FilterHealth,
     Measurements,
     SoilEstimate,
+    TickRow,
     names_of,
     row,
 )
@@ -41,7 +42,8 @@ from gritd.estimator.recording.salvage import Recording
 
 Table = NDArray[np.void]  # structured
 
-AT_ONCE = 20_000  # windows; a row of values takes ten times its place in an array
+AT_ONCE = 100_000  # windows that are looked at together
+ROWS = 5_000  # that are numbers of Python at a time: they take ten times their place in an array
 _KINDS = {"float64": "<f8", "bool": "?"}
 _DTYPES = {name: _KINDS.get(kind, "<i8") for name, kind, _ in TICK_FIELDS}
 
@@ -130,14 +132,16 @@ def followed(
     state = state if start is None else begun(state, start)
     tables = [np.empty(0, _WINDOW_DTYPE)]
 
+    rows: list[TickRow] = []
     for begin in range(0, len(chosen), AT_ONCE):
-        rows = []
-        for snapshot in snapshots(pipeline.settings, streams, chosen[begin : begin + AT_ONCE]):
+        seen = snapshots(pipeline.settings, streams, chosen[begin : begin + AT_ONCE])
+        for done, snapshot in enumerate(seen, begin + 1):
             state, account = tracker.step(state, snapshot)
             rows.append(row(_window(tracker, state, account)))
-            flags = account.flags
-            advance(begin + len(rows), len(chosen))
-        tables.append(np.array(rows, dtype=_WINDOW_DTYPE))
+            if done % ROWS == 0 or done == len(chosen):
+                tables.append(np.array(rows, dtype=_WINDOW_DTYPE))
+                rows, flags = [], account.flags
+            advance(done, len(chosen))
 
     state = tracker.reviewer.finished(state)
     return Replayed(

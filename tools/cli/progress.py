@@ -18,6 +18,8 @@ EVERY = {True: 0.2, False: 5.0}  # [s] between lines on a terminal, and elsewher
 class Progress:
     """Counts steps towards a total, or names the step that is being done."""
 
+    shown = True  # a worker process, which nobody watches, sets it to False
+
     def __init__(self, what: str, total: int = 0) -> None:
         """total: 0 where it is unknown."""
         self._what, self._total, self._done = what, total, 0
@@ -55,7 +57,7 @@ class Progress:
         now = time.monotonic()
         due = now - self._start > QUIET and now - self._last > EVERY[self._line.terminal]
 
-        if due or at_once:
+        if self.shown and (due or at_once):
             self._last = now
             self._line.show(f"{self._what}: {words(now - self._start)}")
 

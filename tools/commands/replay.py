@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +29,9 @@ from gritd.estimator.recording.tables import NOTHING
 from gritd.estimator.recording.topics import CHECKPOINT, TOPICS, messages_of
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.progress import Progress
+from gritd.tools.commands import replay_jobs
 from gritd.tools.commands.estimate import check_same_rig, lines
 from gritd.tools.commands.readiness import never_ready
 from gritd.tools.commands.replay_report import Rows, report
@@ -63,6 +66,8 @@ def main(argv: Sequence[str]) -> int:
 
     if arguments.carry:
         return _carried(paths, arguments)
+    if arguments.jobs > 1 and len(paths) > 1:
+        return replay_jobs.each(paths, partial(_replay, arguments=arguments), arguments.jobs)
     return max([_replay(path, arguments) for path in paths])
 
 
@@ -238,6 +243,13 @@ def _parser() -> Parser:
     parser.add_argument("--engine", choices=ENGINES, help="instead of the configured filter engine")
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write readings and recomputed ticks to a recording"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=whole(1, 1024),
+        default=os.cpu_count() or 1,
+        metavar="J",
+        help="recordings at once, each in a process; default: one a core; --carry takes one",
     )
 
     return parser

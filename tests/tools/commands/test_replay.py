@@ -104,6 +104,48 @@ def test_a_replay_does_not_depend_on_hash_order(recorded, seed):
     assert "identical bit for bit" in done.stdout
 
 
+@pytest.fixture
+def several(recorded, tmp_path):
+    """Copies of a recording, the second without its end."""
+    paths = [tmp_path / f"{name}.mcap" for name in ("first", "second", "third")]
+    for path in paths:
+        path.write_bytes(recorded.read_bytes())
+    paths[1].write_bytes(recorded.read_bytes()[:-5000])
+    return list(map(str, paths))
+
+
+def test_any_number_of_jobs_says_the_same(several, capsys):
+    said = []
+    for jobs in ("1", "3"):
+        code = replay.main([*several, "--jobs", jobs])
+        said.append((code, *capsys.readouterr()))
+    assert said[0] == said[1]
+    assert "second.mcap: was not closed" in said[0][2]
+    assert all(name in said[0][1] for name in several)
+
+
+def test_an_error_ends_several_jobs_where_it_ends_one(several, tmp_path, capsys):
+    """The recordings before it have been told, those after it are not."""
+    Path(several[1]).write_bytes(b"no recording")
+    arguments = ["replay", *several, "--verify", "--jobs"]
+    codes, said = [], []
+    for jobs in ("1", "3"):
+        codes.append(cli.main([*arguments, jobs]))
+        said.append(capsys.readouterr())
+    assert codes[0] == codes[1] != 0
+    assert said[0] == said[1]
+    assert "first.mcap" in said[0].out and "third.mcap" not in said[0].out
+
+
+def test_several_jobs_write_what_one_writes(several, tmp_path):
+    for jobs in ("1", "3"):
+        (tmp_path / jobs).mkdir()
+        replay.main([*several, "--output", str(tmp_path / jobs), "--jobs", jobs])
+    for name in map(Path, several):
+        one, many = ((tmp_path / jobs / name.name).read_bytes() for jobs in ("1", "3"))
+        assert one == many
+
+
 def test_what_depends_on_the_processor_is_said(configuration):
     assert replay_verify.by_processor(configuration) == ""
     assert "filterpy" in replay_verify.by_processor(with_engine(configuration, "filterpy"))

@@ -20,6 +20,7 @@ from gritd.estimator.config.settings import Repeatability, Settings, settings_of
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
 from gritd.estimator.offline.bed_runs import BedRun, bed_runs
 from gritd.estimator.offline.playback import without_absent
+from gritd.estimator.offline.streams import STREAMS
 from gritd.estimator.online.bed import Known, fingerprint
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.recording import Recording
@@ -36,7 +37,7 @@ UNUSUAL = 16.27  # chi-square, 3 degrees of freedom: 0.1 % of runs of the same s
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 where no run could be used; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
-    recordings = [files.recording(path) for path in arguments.files]
+    recordings = [files.recording(path, STREAMS) for path in arguments.files]
     configurations = configurations_of(recordings, arguments)
     repeatability = _repeatability(configurations[0].settings.bed.repeatability, arguments)
 

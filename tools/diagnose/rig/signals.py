@@ -18,6 +18,7 @@ import numpy as np
 from gritd.estimator.config.settings import Calibration, Channel, Settings
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.gaps import edges_of
+from gritd.estimator.offline.streams import RAW
 from gritd.estimator.offline.windows import Slopes, block_mean, block_slope
 from gritd.estimator.recording.mcapfile import RecordingError, opened
 from gritd.estimator.recording.salvage import Recording, read
@@ -112,7 +113,7 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
 
 def _read(path: Path) -> Recording:
     try:
-        return read(path)
+        return read(path, tables=RAW)  # one pass over the file for all channels
     except Exception as error:
         raise CommandError(
             f"{path}: {error}" if str(path) not in str(error) else error, _code(path)

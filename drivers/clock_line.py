@@ -41,7 +41,7 @@ STRAY = 10e6  # [ns] what comes earlier than this was not held up by the way: it
 class Line:
     """Offset of our clock over the device's, as a function of the device time.
 
-    Until it is `settled`, it follows the lowest point at once: the first frames may have waited
+    Until it is `settled`, it follows the lowest points at once: the first frames may have waited
     in a buffer for seconds.
     """
 
@@ -51,6 +51,7 @@ class Line:
         self._known = slope != 0.0  # the drift
         self._level = 0.0
         self._steady = (0.0, 0, 0)  # since when [ns], points since then, those close to the line
+        self._stray = False  # whether the last point lay far below
         self._blocks: deque[list[Point]] = deque(maxlen=BLOCKS)  # of each the two lowest points
         self._open: list[Point] = []  # those of the present block
         self._count, self._began = 0, 0.0  # points in it, and when it began [ns]
@@ -81,19 +82,22 @@ class Line:
         return point[1] - self.slope * point[0]
 
     def _settle(self, point: Point, received: float) -> None:
-        """Follow a new lowest point at once, until half of the points for a while lie close to
-        it.
+        """Follow the lowest points, until half of the points for a while lie close to them. A
+        single one far below the others is a wrong time; with the second in a row a backlog ends.
         """
         height = self._height(point)
         since, seen, near = self._steady
         is_alone = received - since >= STEADY and seen > ENOUGH and 2 * near < seen
-        if not seen or height < self._level - STRAY or is_alone:
+        stray, before = height < self._level - STRAY, self._stray
+        self._stray = stray
+        if not seen or (stray and before) or is_alone:
             self._blocks.clear()
             self._begin(received)
             self._level = height
-            since, seen, near = received, 0, 0
-        self._level = min(self._level, height)
-        seen, near = seen + 1, near + (height - self._level <= HELD)
+            since, seen, near, stray = received, 0, 0, False
+        if not stray:
+            self._level = min(self._level, height)
+        seen, near = seen + 1, near + (not stray and height - self._level <= HELD)
         self._steady = (since, seen, near)
         self.settled = received - since >= STEADY and near >= ENOUGH and 2 * near >= seen
 

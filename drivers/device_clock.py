@@ -108,7 +108,8 @@ class DeviceClock:
         """The same of a chunk that is not on the line: others may agree with it on another one."""
         impossible = [delay for delay, ok in zip(delays, possible, strict=True) if not ok]
         rival = Rival(max(times), received, min(delays))
-        self._doubt.add(rival, impossible, self._went_back(times))
+        went_back = self._went_back(times) or min(times) < self._newest - STRAY
+        self._doubt.add(rival, impossible, went_back)
         if agreed := self._doubt.agreed():
             self._step(agreed, received)
             return self._judged(times, received)
@@ -174,6 +175,10 @@ class DeviceClock:
         if self._line.settled and self._delay(time, received) > LATE:
             return
         self._line.add((float(time - self._first), self._offset(time, received)))
+        if self._delay(self._newest, self._newest_received) < -STRAY:
+            # a wrong time, taken before the line was known: nothing is measured from it
+            self._newest = self._second = time
+            self._newest_received = received
         self._second = max(self._second, min(self._newest, time))
         if time > self._newest:
             self._newest, self._newest_received = time, received

@@ -62,6 +62,8 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
     if arguments.campaigns is not None:
         return _many(arguments)
+    if arguments.scheduler is not None:
+        raise CommandError("diagnose --scheduler: expected --campaigns DIR with it", USAGE)
     if not arguments.files or arguments.config is None:
         raise CommandError(
             "diagnose: expected recordings and --config F, or --redo FILE, or --campaigns DIR",

@@ -61,6 +61,13 @@ def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
     assert run.read_bytes() == before
 
 
+def test_a_scheduler_without_campaigns_is_refused(run: Path) -> None:
+    """It would not be used, and whether it proves who it is not be asked."""
+    for address in ("tcp://127.0.0.1:9999", "tls://127.0.0.1:9999"):
+        line, code = said(run, "--config", packaged(), "--scheduler", address)
+        assert line == "diagnose --scheduler: expected --campaigns DIR with it" and code == USAGE
+
+
 def test_the_configuration_that_is_read_is_replaced_only_when_asked(
     run: Path, tmp_path: Path
 ) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import gc
 import statistics
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -27,15 +27,16 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
 from gritd.estimator.offline.playback import recorded_ticks
 from gritd.estimator.offline.snapshots import snapshots
-from gritd.estimator.offline.streams import recorded_streams
+from gritd.estimator.offline.streams import STREAMS, recorded_streams
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.tables import Fields
 from gritd.estimator.recording.topics import RAW_TOPICS, TOPICS, messages_of
 from gritd.estimator.terramechanics import linear, original, scalar
-from gritd.tools.bench import against, peers
+from gritd.tools.bench import against, diagnosis, peers
 from gritd.tools.bench import forward as forward_bench
+from gritd.tools.bench.live import live
 from gritd.tools.bench.start import start
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
@@ -50,7 +51,7 @@ Figures = dict[str, float]
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much of everything; the defaults take about half a minute."""
+    """How much of everything; the defaults take about a minute."""
 
     seconds: float = 60.0  # of recording
     ticks: int = 5000
@@ -58,6 +59,14 @@ class Sizes:
     samples: int = 2000  # forces in a batch
     starts: int = 3  # of a process, for each engine
     simulated: float = 60.0  # [s] for the forward model
+    live: float = 15.0  # [s] of the daemon on simulated wires
+    long: float = 0.0  # [s] of a recording with ticks that is replayed whole; 0 for none
+    runs: tuple[int, ...] = ()  # that are diagnosed together
+    lengths: tuple[float, ...] = ()  # [s] of runs that are diagnosed alone
+
+
+# what takes minutes
+LONG = Sizes(long=3600.0, runs=diagnosis.RUNS, lengths=diagnosis.LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -86,8 +95,15 @@ def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
         "reading": lambda subject: against.reading(subject.logged, subject.sizes.repeats),
         "writing": lambda subject: against.writing(subject.logged, subject.sizes.repeats),
         "start": lambda subject: start(subject.sizes.starts),
+        "live": lambda subject: live(subject.sizes.live, folder / "live"),
         "forward_model": forward_model,
     }
+    if sizes.long:
+        sections["long_replay"] = lambda subject: long_replay(sizes, folder)
+    if sizes.runs and sizes.lengths:
+        sections["diagnosis"] = lambda subject: diagnosis.diagnosis(
+            folder, sizes.runs, sizes.lengths
+        )
 
     with Progress("measuring", len(sections) + 1) as progress:
         subject = _subject(sizes, folder)
@@ -156,21 +172,44 @@ def tick(subject: Subject) -> Figures:
 
 
 def replay(subject: Subject) -> Figures:
-    """From the file to the estimates of every window, as multiples of real time; engines take
-    turns.
+    """From the file to the estimates of every window, as multiples of real time, of raw topics by
+    each engine and of a recording with ticks; by turns.
     """
 
-    def run(engine: str) -> None:
-        estimates(subject.configuration.settings, read(subject.path), engine)
+    def run(path: Path, engine: str) -> None:
+        estimates(subject.configuration.settings, read(path, tables=STREAMS), engine)
 
-    spent: dict[str, list[float]] = {engine: [] for engine in ENGINES}
-    for _ in range(subject.sizes.repeats):
-        for engine, times in spent.items():
-            times.append(_timed(partial(run, engine)))
+    kinds = {engine: (subject.path, engine) for engine in ENGINES}
+    kinds["with_ticks"] = (subject.logged, "plain")
+    spent = against.by_turns(
+        {kind: partial(run, *given) for kind, given in kinds.items()}, subject.sizes.repeats
+    )
     seconds = subject.sizes.seconds
     return {
-        f"{engine}_speed": seconds / statistics.median(times) for engine, times in spent.items()
-    } | {f"{engine}_best": seconds / min(times) for engine, times in spent.items()}
+        f"{kind}_speed": seconds / statistics.median(times) for kind, times in spent.items()
+    } | {f"{kind}_best": seconds / min(times) for kind, times in spent.items()}
+
+
+def long_replay(sizes: Sizes, folder: Path) -> Figures:
+    """A long recording with ticks: what of its replay is reading and what is the filter's [s], and
+    the whole as a multiple of real time.
+    """
+    place = folder / "long"
+    place.mkdir()
+    subject = _subject(replace(sizes, seconds=sizes.long), place)
+    begun = process_time()
+    recording = read(subject.logged, tables=STREAMS)
+    read_by = process_time()
+    rows = estimates(subject.configuration.settings, recording)
+    spent, done = process_time() - begun, sizes.long
+    return {
+        "seconds": done,
+        "windows": len(rows),
+        "reading": read_by - begun,
+        "filter": spent - (read_by - begun),
+        "speed": done / spent,
+        "bytes": subject.logged.stat().st_size,
+    }
 
 
 def forces(subject: Subject) -> Figures:

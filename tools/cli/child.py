@@ -75,6 +75,11 @@ class Child:
         ):  # what went wrong first is what is told
             self.stop()
 
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
     def tell(self, line: str) -> None:
         """Write a line to its standard input. Raises CommandError if it has ended."""
         assert self._process.stdin is not None

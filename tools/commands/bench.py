@@ -14,9 +14,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from gritd.estimator.compiled import arithmetic
 from gritd.estimator.config.settings import ENGINES
 from gritd.tools.bench.compare import comparison, loaded, ratios
-from gritd.tools.bench.measure import Figures, Sizes, measure
+from gritd.tools.bench.measure import LONG, Figures, Sizes, measure
 from gritd.tools.cli.command import DONE, FAILED, Parser
 
 
@@ -36,10 +37,17 @@ def main(argv: Sequence[str]) -> int:
         help="fail where a ratio is worse by a fifth than in this output of --json",
     )
 
+    parser.add_argument(
+        "--long",
+        action="store_true",
+        help="also an hour's replay, and diagnoses of several runs and of long ones: a quarter of "
+        "an hour",
+    )
+
     arguments = parser.parse_args(argv)
     before = loaded(arguments.compare) if arguments.compare else {}
     with TemporaryDirectory(prefix="gritd-bench-") as folder:
-        figures = measure(Sizes(), Path(folder))
+        figures = measure(LONG if arguments.long else Sizes(), Path(folder))
 
     if arguments.json:
         print(json.dumps({"machine": machine(), **figures}, indent=2))
@@ -61,6 +69,7 @@ def machine() -> dict[str, str | int | float]:
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
         "numpy": np.__version__,
+        "arithmetic": "compiled" if arithmetic.BUILT else "in Python",
     }
 
 
@@ -85,7 +94,8 @@ def report(figures: dict[str, Figures]) -> str:
     return "\n".join(
         [
             f"machine    {on['processor']}, {on['cores']} cores, load {on['load_average']}, "
-            f"{on['system']}, Python {on['python']}, numpy {on['numpy']}",
+            f"{on['system']}, Python {on['python']}, numpy {on['numpy']}, "
+            f"arithmetic {on['arithmetic']}",
             f"tick       {_µs(t['median'])} at 50 %, {_µs(t['at_99_percent'])} at 99 %: "
             f"{t['share_of_budget']:.1%} of its period; {_µs(t['at_99.9_percent'])} at 99.9 %, "
             f"worst {_µs(t['worst'])}",
@@ -94,8 +104,9 @@ def report(figures: dict[str, Figures]) -> str:
             *(
                 f"replay     {name}: {r[f'{name}_speed']:.0f} times real time from file to "
                 f"estimates, best {r[f'{name}_best']:.0f}"
-                for name in ENGINES
+                for name in (*ENGINES, "with_ticks")
             ),
+            *_long_replay(figures.get("long_replay", {})),
             f"forces     closed forms with gradients {_µs(f['closed_form'])}, "
             f"quadrature {_µs(f['quadrature'])}: ratio {f['ratio']:.1f}",
             f"           one sample of a batch, forces only: {_µs(f['closed_form_in_batch'])}, "
@@ -114,15 +125,58 @@ def report(figures: dict[str, Figures]) -> str:
                 f"tick, {s[f'{name}_memory'] / 1e6:.0f} MB"
                 for name in ENGINES
             ),
+            *_live(figures["live"]),
             f"simulator  {w['speed']:.0f} times real time, "
             f"with six effects {w['speed_with_six_effects']:.0f}",
             f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature "
             f"{_µs(w['balance_by_brentq'])}: ratio {w['balance_ratio']:.0f}; on 8 nodes a zone "
             f"{_µs(w['balance_by_brentq_on_8_nodes'])}: "
             f"ratio {w['balance_ratio_to_8_nodes']:.0f}",
-            "processor time, medians where not said otherwise",
+            *_diagnosis(figures.get("diagnosis", {})),
+            "processor time, medians where not said otherwise; live is by the wall clock",
         ]
     )
+
+
+def _long_replay(figures: Figures) -> list[str]:
+    if not figures:
+        return []
+    return [
+        f"           {figures['seconds']:.0f} s with ticks: {figures['speed']:.0f} times real "
+        f"time; reading {figures['reading']:.2f} s, filter {figures['filter']:.2f} s"
+    ]
+
+
+def _live(figures: Figures) -> list[str]:
+    """When it is there, what it takes, how punctual it is."""
+    spans = [
+        f"{name} {_µs(figures[f'{name}_median'])} at 50 %, {_µs(figures[f'{name}_at_99_percent'])} "
+        f"at 99 %, worst {_µs(figures[f'{name}_worst'])}"
+        for name in ("lateness", "duration")
+    ]
+    return [
+        f"live       first tick {figures['first_tick']:.2f} s, first estimate "
+        f"{figures['first_estimate']:.2f} s after the command; "
+        f"{figures['share_of_a_core']:.0%} of a core, {figures['memory'] / 1e6:.0f} MB",
+        f"           a tick's {'; '.join(spans)}; "
+        f"{figures['missed']:.0f} missed of {figures['ticks'] + figures['missed']:.0f}",
+    ]
+
+
+def _diagnosis(figures: Figures) -> list[str]:
+    """A line for each size, and the exponents."""
+    if not figures:
+        return []
+    sizes = [name.removesuffix("_seconds") for name in figures if name.endswith("_seconds")]
+    return [
+        *(
+            f"diagnosis  {size.replace('_', ' ')}: {figures[f'{size}_seconds']:.1f} s, "
+            f"{figures[f'{size}_memory'] / 1e6:.0f} MB"
+            for size in sizes
+        ),
+        f"           time goes with runs^{figures['exponent_of_runs']:.2f}, "
+        f"length^{figures['exponent_of_length']:.2f}",
+    ]
 
 
 def _side_by_side(title: str, figures: Figures) -> list[str]:

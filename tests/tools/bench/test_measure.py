@@ -7,13 +7,15 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.filter.filterpy_engine import FilterpyEngine
-from gritd.tools.bench import against, forward, measure, peers
+from gritd.tools.bench import against, diagnosis, forward, measure, peers
 from gritd.tools.testbed.simulation import soil_of
 
-SMALL = measure.Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0)
+SMALL = measure.Sizes(
+    seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0
+)
 SECTIONS = (
     *("tick", "replay", "forces", "update", "recording"),
-    *("reading", "writing", "start", "forward_model"),
+    *("reading", "writing", "start", "live", "forward_model"),
 )
 
 
@@ -24,6 +26,7 @@ def figures(tmp_path_factory):
 
 def test_every_figure_is_a_positive_number(figures):
     assert tuple(figures) == SECTIONS
+    assert figures["live"].pop("missed") >= 0.0
     assert all(value > 0.0 for section in figures.values() for value in section.values())
 
 
@@ -74,7 +77,7 @@ def test_each_replay_runs_the_engine_it_names(tmp_path, monkeypatch):
     )
     subject = measure._subject(SMALL, tmp_path)
     monkeypatch.setattr(measure, "ENGINES", ("plain",))
-    assert set(measure.replay(subject)) == {"plain_speed", "plain_best"} and not applied
+    assert {"plain_speed", "with_ticks_speed"} <= measure.replay(subject).keys() and not applied
     monkeypatch.setattr(measure, "ENGINES", ("filterpy",))
     measure.replay(subject)
     assert applied
@@ -86,3 +89,30 @@ def test_a_start_is_that_of_a_process_of_its_own(figures):
     """
     started = figures["start"]
     assert started["plain_memory"] < 100e6 < started["filterpy_memory"] < 200e6
+
+
+def test_the_daemon_at_work_is_measured_from_the_command_on(figures):
+    live = figures["live"]
+    assert live["first_tick"] < live["first_estimate"] < 6.0
+    assert live["ticks"] > 500 and 20e6 < live["memory"] < 200e6
+    for name in ("lateness", "duration"):
+        assert live[f"{name}_median"] <= live[f"{name}_at_99_percent"] <= live[f"{name}_worst"]
+
+
+def test_a_long_recording_is_replayed_whole(tmp_path):
+    found = measure.long_replay(measure.Sizes(long=30.0), tmp_path)
+    assert found["windows"] == pytest.approx(300, abs=2)
+    assert found["speed"] == pytest.approx(30.0 / (found["reading"] + found["filter"]))
+
+
+def test_an_exponent_is_that_of_the_power_law():
+    assert diagnosis.exponent((2.0, 4.0, 8.0), (3.0, 3.0 * 2**1.5, 3.0 * 4**1.5)) == pytest.approx(
+        1.5
+    )
+
+
+@pytest.mark.slow
+def test_a_diagnosis_is_measured_against_runs_and_length(tmp_path):
+    found = diagnosis.diagnosis(tmp_path, (1, 2), (40.0, 80.0))
+    assert found["1_runs_seconds"] > 0.0 and found["80_s_memory"] > 50e6
+    assert {"exponent_of_runs", "exponent_of_length"} <= found.keys()

@@ -11,10 +11,10 @@ from gritd.tools.bench.measure import Sizes, measure
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import bench
 
-SMALL = Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0)
+SMALL = Sizes(seconds=3.0, ticks=300, repeats=1, samples=100, starts=1, simulated=3.0, live=6.0)
 SECTIONS = (
     *("tick", "replay", "forces", "update", "recording"),
-    *("reading", "writing", "start", "forward_model"),
+    *("reading", "writing", "start", "live", "forward_model"),
 )
 
 
@@ -27,9 +27,22 @@ def test_the_report_names_machine_and_every_section(figures):
     lines = bench.report(figures).splitlines()
     assert lines[0].startswith("machine") and "Python" in lines[0]
     words = ("tick", "replay", "forces", "update", "recording", "simulator", "balance")
-    for word in (*words, "reading", "writing", "start"):
+    for word in (*words, "reading", "writing", "start", "live"):
         assert any(line.startswith(word) for line in lines)
     assert max(map(len, lines)) < 180
+
+
+def test_what_takes_minutes_is_told_where_it_was_asked_for(figures):
+    more = {
+        "long_replay": {"seconds": 3600.0, "speed": 600.0, "reading": 1.5, "filter": 4.5},
+        "diagnosis": {
+            **{"2_runs_seconds": 5.0, "2_runs_memory": 4e8, "300_s_seconds": 9.0},
+            **{"300_s_memory": 8e8, "exponent_of_runs": 0.8, "exponent_of_length": 0.2},
+        },
+    }
+    said = bench.report({**figures, **more})
+    assert "3600 s with ticks: 600 times real time" in said
+    assert "2 runs: 5.0 s, 400 MB" in said and "runs^0.80, length^0.20" in said
 
 
 def test_json_is_one_object_with_the_machine(figures, monkeypatch, capsys):

@@ -1,0 +1,91 @@
+"""What a diagnosis takes: processor time and memory of `gritd diagnose`, against the number of runs
+and against their length, with the exponents of the power laws that fit.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
+from gritd.tools.testbed.simulation import simulate_run, soil_of
+
+RIM_SPEED = 0.02  # [m/s]
+LOADS = (40.0, 70.0, 100.0)  # [N] of the runs in turn
+SLIPS = (0.1, 0.2, 0.3, 0.45, 0.6)
+SHORT = 60.0  # [s] of each run where there are several
+RUNS = (2, 4, 8)
+LENGTHS = (300.0, 600.0, 1200.0)  # [s] of one run
+
+Figures = dict[str, float]
+
+
+def diagnosis(
+    folder: Path, runs: Sequence[int] = RUNS, lengths: Sequence[float] = LENGTHS
+) -> Figures:
+    """Processor time [s] and largest memory [bytes] on one core, of simulated runs with nothing
+    left out.
+    """
+    written = [_written(folder, number, SHORT) for number in range(max(runs))]
+    by_runs = [_diagnosed(written[:count]) for count in runs]
+    by_length = [_diagnosed([_written(folder, 100 + n, s)]) for n, s in enumerate(lengths)]
+
+    figures: Figures = {}
+    for count, (seconds, memory) in zip(runs, by_runs, strict=True):
+        figures |= {f"{count}_runs_seconds": seconds, f"{count}_runs_memory": memory}
+    for length, (seconds, memory) in zip(lengths, by_length, strict=True):
+        figures |= {f"{length:g}_s_seconds": seconds, f"{length:g}_s_memory": memory}
+    return figures | {
+        "exponent_of_runs": exponent(runs, [seconds for seconds, _ in by_runs]),
+        "exponent_of_length": exponent(lengths, [seconds for seconds, _ in by_length]),
+    }
+
+
+def exponent(sizes: Sequence[float], times: Sequence[float]) -> float:
+    """p of time = a sizeᵖ, by least squares of the logarithms."""
+    slope, _ = np.polyfit(np.log(sizes), np.log(times), 1)
+    return float(slope)
+
+
+def _written(folder: Path, number: int, seconds: float) -> Path:
+    """The recording of a run at one load."""
+    configuration = config.load(packaged())
+    settings, load = configuration.settings, LOADS[number % len(LOADS)]
+    each = seconds / len(SLIPS)
+    schedule = Schedule(
+        tuple(Segment(each, load, slip, RIM_SPEED) for slip in SLIPS), min(0.5, each / 4.0)
+    )
+    motion = motion_of(schedule, settings.wheel.radius, settings.rates.tick)
+    run = simulate_run(settings, soil_of(settings), motion, (), number)
+
+    path = folder / f"diagnosed-{number}.mcap"
+    info = RunInfo(name=path.stem, nominal_load=load)
+    writer = RunWriter(path, (), configuration.text, info)
+    for reading in run.readings:
+        writer.reading(reading)
+    writer.close()
+    return path
+
+
+def _diagnosed(paths: Sequence[Path]) -> tuple[float, float]:
+    """Processor time [s] and largest memory [bytes] of a process. Raises RuntimeError."""
+    command = [sys.executable, "-m", "gritd", "diagnose", *map(str, paths)]
+    process = subprocess.Popen(
+        [*command, "--config", str(packaged()), "--seed", "0", "--jobs", "1"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"gritd diagnose ended with {process.returncode}")
+    return used.ru_utime + used.ru_stime, 1024.0 * used.ru_maxrss

@@ -13,6 +13,7 @@ from functools import lru_cache
 from gritd.estimator.config.units import UnitError, parse
 
 VARIABLE = "GRITD_LIMITS"
+BYTES = ("chunk", "start", "text")
 
 
 class LimitsError(Exception):
@@ -40,8 +41,12 @@ def limits() -> Limits:
 
 
 def raised(name: str) -> str:
-    """How to raise a limit, in words."""
-    return f"{VARIABLE}={name}=… raises the limit"
+    """How to raise a limit, in words: an example of four times what it is."""
+    value = 4.0 * float(getattr(limits(), name))
+    text = f"{value:.3g}"
+    if name in BYTES:
+        text = f"{value / 1e6:.0f} MB" if value > 1e6 else f"{value:.0f} B"
+    return f"{VARIABLE}='{name}={text}' raises the limit"
 
 
 @lru_cache(maxsize=4)
@@ -58,7 +63,7 @@ def _number(name: str, text: str) -> float:
     if name not in names:
         known = ", ".join(names)
         raise LimitsError(f"{VARIABLE}: found {name[:40]!r}; expected NAME=VALUE of {known}")
-    unit = "B" if name in ("chunk", "start", "text") else ""
+    unit = "B" if name in BYTES else ""
     try:
         value = parse(text, unit)
     except UnitError as error:

@@ -140,11 +140,11 @@ def _positive(text: str, unit: str) -> float:
 def lines(runs: Sequence[BedRun], repeatability: Repeatability) -> Iterator[str]:
     """A line a run, then what they know together, and whether they are of one bed."""
     width = max(len(_name(run)) for run in runs)
-    yield f"{'':{width}}   {'load':>7}   {'alone: c':>14}  {'tan φ':>15}   {'so far: c':>14}  tan φ"
+    yield f"{'':{width}}   {'load':>8}   {'alone: c':>14}  {'tan φ':>15}   {'so far: c':>14}  tan φ"
     for run in runs:
         so_far = _pair(run.known.estimate) if run.counts else ("not used: not believed", "")
         yield (
-            f"{_name(run):{width}}   {_load(run):>7}   {_pair(run.alone.estimate)[0]:>14}  "
+            f"{_name(run):{width}}   {_load(run):>8}   {_pair(run.alone.estimate)[0]:>14}  "
             f"{_pair(run.alone.estimate)[1]:>15}   {so_far[0]:>14}  {so_far[1]}"
         ).rstrip()
 
@@ -161,6 +161,9 @@ def _name(run: BedRun) -> str:
 
 
 def _load(run: BedRun) -> str:
+    """As stated of the run; of one that states none, where a sensor measured it, that it did."""
+    if run.recording.run.nominal_load is None and run.settings.wrench is not None:
+        return "measured"
     return f"{run.settings.load.nominal.value:g} N"
 
 

@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 Array = NDArray[np.float64]
 LARGEST = 1e15  # no number of a rig's log is beyond: counts of it must fit into 64 bits
 MAX_LINE = 1 << 20  # [bytes]
+CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")  # characters that no text has
 Table = dict[str, list[str]]
 Row = TypeVar("Row")
 
@@ -68,16 +69,26 @@ def _pieces(path: Path) -> Iterator[str]:
     try:
         with opened(path) as file:
             for piece in _bounded(path, gzip.GzipFile(fileobj=file) if _packed(path) else file):
-                yield piece.decode("utf-8")
+                yield _decoded(piece)
     except (OSError, EOFError, zlib.error) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise RigFileError(
             f"{path}: cannot be read: {reason}; expected a text file, plain or gzipped"
         ) from None
     except UnicodeDecodeError:
-        raise RigFileError(
-            f"{path}: found bytes that are not UTF-8; expected a text file"
-        ) from None
+        raise RigFileError(f"{path}: found bytes that are no text; expected a text file") from None
+
+
+def _decoded(piece: bytes) -> str:
+    """UTF-8; else what Windows programs write in Western Europe. Raises UnicodeDecodeError where it
+    is neither.
+    """
+    try:
+        return piece.decode("utf-8")
+    except UnicodeDecodeError:
+        if CONTROL.search(piece):
+            raise
+        return piece.decode("cp1252")
 
 
 def _packed(path: Path) -> bool:
@@ -89,6 +100,7 @@ def _bounded(path: Path, file: BinaryIO | gzip.GzipFile) -> Iterator[bytes]:
     RigFileError where a line or the whole is longer than a log's.
     """
     most, size = limits().text, 0
+    file = _in_bytes(file)
     while piece := file.readline(MAX_LINE + 1):
         size += len(piece)
         if len(piece) > MAX_LINE:
@@ -98,6 +110,17 @@ def _bounded(path: Path, file: BinaryIO | gzip.GzipFile) -> Iterator[bytes]:
                 f"{path}: found more than {most:.0f} bytes of text; {raised('text')}"
             )
         yield piece.removeprefix(codecs.BOM_UTF8) if size == len(piece) else piece
+
+
+def _in_bytes(file: BinaryIO | gzip.GzipFile) -> BinaryIO | gzip.GzipFile:
+    """The file from its beginning, one character a byte where that is ASCII: a text in UTF-16, as
+    spreadsheets write "Unicode", becomes UTF-8.
+    """
+    begins = file.read(2)
+    file.seek(0)
+    if begins not in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return file
+    return cast(BinaryIO, codecs.EncodedFile(file, "utf-8", "utf-16"))
 
 
 def read_table(path: Path, columns: Sequence[str]) -> Table:

@@ -20,9 +20,11 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.mcapfile import reported
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.cli.command import USAGE
+from gritd.tools.cli.progress import Progress
 from gritd.tools.importers.files import Array, RigFileError
 
 NS = 1_000_000_000
+STEP = 10_000  # readings between two signs of life
 UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measure: no information
 
 
@@ -76,10 +78,14 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
 
 
 def write(
-    path: Path, streams: Sequence[Stream], configured: config.Configuration, run: RunInfo
+    path: Path,
+    streams: Sequence[Stream],
+    configured: config.Configuration,
+    run: RunInfo,
+    progress: Progress | None = None,
 ) -> Path:
     """One recording of raw topics, readings by stamp and then by the order of the channels.
-    Replaces an earlier import.
+    Replaces an earlier import. Progress counts the readings.
 
     Raises RecordingError.
     """
@@ -93,7 +99,9 @@ def write(
         *(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel])
     )
 
-    for reading in merged:
+    for number, reading in enumerate(merged, start=1):
         writer.reading(reading)
+        if progress is not None and number % STEP == 0:
+            progress.advance(STEP)
     writer.close()
     return path

@@ -232,8 +232,12 @@ def test_a_table_that_cannot_be_used_is_refused(
 @pytest.mark.parametrize(
     ("limit", "table", "expected"),
     [
-        ("text=200 B", TABLE, "found more than 200 bytes of text; GRITD_LIMITS=text=… raises"),
-        ("values=15", TABLE, "found more than 15 values; GRITD_LIMITS=values=… raises"),
+        (
+            "text=200 B",
+            TABLE,
+            "found more than 200 bytes of text; GRITD_LIMITS='text=800 B' raises",
+        ),
+        ("values=15", TABLE, "found more than 15 values; GRITD_LIMITS='values=60' raises"),
         ("conditions=1", TABLE, "found 2 steady states; at most 1 are taken"),
         ("", TABLE + "x" * 2_000_000, "found a line of more than 1048576 bytes"),
         ("", TABLE + '"' + "x" * 200_000, "found no CSV: field larger than field limit (131072)"),

@@ -11,6 +11,7 @@ import numpy as np
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import USAGE
+from gritd.tools.cli.progress import Progress
 from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.recording import write
 from gritd.tools.importers.registry import Tell
@@ -45,7 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a run, one configuration. Raises RigFileError, ConfigError, RecordingError."""
-    tables = [read(path) for path in args.paths]
+    with Progress("reading", len(args.paths)) as progress:
+        tables: list[SeriesTable] = []
+        for path in args.paths:
+            progress.at(path.name, len(tables) / len(args.paths))
+            tables.append(read(path))
     if args.guess:
         tell(guessed(tables).rstrip("\n"))
         return []
@@ -85,11 +90,15 @@ def _import(
     configured = _configuration(text, given, output / "csv.yaml")
 
     paths = [output / "csv.yaml"]
+    count = sum(stream.stamps.size for streams in imported.streams for stream in streams)
+    with Progress("writing readings", count) as progress:
+        for run, streams in zip(runs, imported.streams, strict=True):
+            path = output / f"{run.info.name}.mcap"
+            paths.append(write(path, streams, configured, run.info, progress))
+
     tell(_heading(runs))
-    for run, streams in zip(runs, imported.streams, strict=True):
+    for run in runs:
         tell(_row(run))
-        path = output / f"{run.info.name}.mcap"
-        paths.append(write(path, streams, configured, run.info))
     for note in _notes(mapped, runs, settings.load.nominal.value):
         tell(note)
     return paths
@@ -129,7 +138,11 @@ def _row(run: SeriesRun) -> str:
 
 def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[str]:
     """What the user should know of what was not given."""
-    notes = []
+    notes = [
+        f"note: {run.info.name}: {run.repeated} rows that repeat the row before are left out"
+        for run in runs
+        if run.repeated
+    ]
     unstated = [run.info.name for run in runs if run.info.nominal_load is None]
     if unstated and mapped.named("load") is None:
         notes.append(

@@ -7,7 +7,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,17 +31,17 @@ def read(path: Path) -> SeriesTable:
     decimal = "," if separator == ";" and _has_decimal_commas(text[start + 1 :]) else "."
 
     rows = _split(path, text[start:], separator)
-    header = _names(path, next(rows))
-    body = list(rows)
+    header, body = next(rows), list(rows)
+    named = _names(path, header, body)
 
     units = _units(header, body, decimal)
     body = body[1:] if units else body
     first = start + 2 + bool(units)
-    _check(path, header, body, first)
+    _check(path, named, body, first)
 
     columns = {
         name: _column(path, name, [row[at].strip() for row in body], decimal, first)
-        for at, name in enumerate(header)
+        for at, name in named.items()
     }
     return SeriesTable(path, columns, first, units)
 
@@ -52,12 +52,19 @@ def _layout(path: Path, text: Sequence[str]) -> tuple[str, int]:
     """
     for at in range(min(len(text) - 1, PREAMBLE)):
         for separator in SEPARATORS:
-            fields = text[at].count(separator)
-            if fields and fields == text[at + 1].count(separator) and _is_header(text[at]):
+            fields, below = text[at].count(separator), _fields_below(text[at + 1], separator)
+            if fields in below and fields and _is_header(text[at]):
                 return separator, at
+    if text and len(text) <= PREAMBLE and _is_header(text[-1]) and re.search(r"[,;\t]", text[-1]):
+        raise RigFileError(f"{path}: found no rows; expected data under {text[-1].strip()[:80]}")
     raise RigFileError(
         f"{path}: found no header; expected names of columns, separated by ',', ';' or tabs"
     )
+
+
+def _fields_below(line: str, separator: str) -> tuple[int, int]:
+    """How many separators a row has, with those that end it and without."""
+    return line.count(separator), line.rstrip(separator + " \r\n").count(separator)
 
 
 def _is_header(line: str) -> bool:
@@ -77,16 +84,25 @@ def _split(path: Path, text: Sequence[str], separator: str) -> Iterator[list[str
         raise RigFileError(f"{path}: found no CSV: {error}; expected a table") from None
 
 
-def _names(path: Path, header: Sequence[str]) -> list[str]:
+def _names(path: Path, header: Sequence[str], body: Rows) -> dict[int, str]:
+    """The names of the columns by place; those that have neither name nor content are left out.
+    Raises RigFileError.
+    """
     names = [name.strip() for name in header]
-    if names and not names[-1]:
-        names = names[:-1]  # a separator at the end of every line
-
     for name in names:
-        if not name or names.count(name) > 1:
-            what = f"the column {name!r} twice" if name else "a column without a name"
-            raise RigFileError(f"{path}: found {what}; expected each column with its own name")
-    return names
+        if name and names.count(name) > 1:
+            raise RigFileError(
+                f"{path}: found the column {name!r} twice; expected each column with its own name"
+            )
+
+    named = {at: name for at, name in enumerate(names) if name}
+    for number, row in enumerate(body, start=1):
+        if any(cell.strip() for at, cell in enumerate(row) if at not in named):
+            raise RigFileError(
+                f"{path}: found a column without a name, with content in line {number} below the "
+                "header; expected each column with its own name"
+            )
+    return named
 
 
 def _units(header: Sequence[str], body: Rows, decimal: str) -> dict[str, str] | None:
@@ -96,20 +112,24 @@ def _units(header: Sequence[str], body: Rows, decimal: str) -> dict[str, str] | 
     named, below = ([bool(_number(cell, decimal)) for cell in row] for row in body[:2])
     if any(named) or not any(below):
         return None
-    return {n: cell.strip(" []()") for n, cell in zip(header, body[0], strict=False)}
+    cells = zip(header, body[0], strict=False)
+    return {name.strip(): cell.strip(" []()") for name, cell in cells if name.strip()}
 
 
-def _check(path: Path, header: Sequence[str], body: Rows, first: int) -> None:
+def _check(path: Path, named: Mapping[int, str], body: Rows, first: int) -> None:
     """Every row has all fields, and the whole is no more than a log has. Raises RigFileError."""
     if not body:
-        raise RigFileError(f"{path}: found no rows; expected data under {', '.join(header)}")
-    if len(body) * len(header) > (most := limits().values):
+        raise RigFileError(
+            f"{path}: found no rows; expected data under {', '.join(named.values())}"
+        )
+    if len(body) * len(named) > (most := limits().values):
         raise RigFileError(f"{path}: found more than {most:g} values; {raised('values')}")
 
+    expected = max(named) + 1
     for number, row in enumerate(body, start=first):
-        if len(row) < len(header):
+        if len(row) < expected:
             raise RigFileError(
-                f"{path}: row {number}: found {len(row)} fields; expected {len(header)}"
+                f"{path}: row {number}: found {len(row)} fields; expected {expected}"
             )
 
 

@@ -29,12 +29,14 @@ class SeriesRun:
 
     seconds: (n,) of the rows, rising; since 1970 where the file says so.
     resampled: rows behind each row of the table.
+    repeated: rows of the file that were the row before once more, and are left out.
     """
 
     info: RunInfo
     table: SeriesTable
     seconds: Array
     resampled: float = 1.0
+    repeated: int = 0
 
     @property
     def interval(self) -> float:
@@ -94,13 +96,15 @@ def _run(table: SeriesTable, seconds: Array, name: str, mapped: SeriesMap) -> Se
         raise RigFileError(
             f"{table.path}: {name}: found {seconds.size} rows; expected {LEAST} or more"
         )
+    again = table.repeated()
+    table, seconds = table.at(~again), seconds[~again]
     if np.any(np.diff(seconds) <= 0.0):
         at = int(np.argmax(np.diff(seconds) <= 0.0))
         raise RigFileError(
-            f"{table.path}: {name}: found {seconds[at + 1]:g} s after {seconds[at]:g} s; "
-            "expected times that rise"
+            f"{table.path}: {name}: found {seconds[at + 1]:.9g} s after {seconds[at]:.9g} s, with "
+            "other values; expected times that rise"
         )
-    run = SeriesRun(_info(table, name, mapped), table, seconds)
+    run = SeriesRun(_info(table, name, mapped), table, seconds, repeated=int(again.sum()))
     return run if mapped.resample is None else _resampled(run, mapped.resample)
 
 
@@ -202,7 +206,7 @@ def _resampled(run: SeriesRun, rate: float) -> SeriesRun:
     seconds = np.bincount(block, run.seconds) / np.bincount(block)
     behind = run.seconds.size / seconds.size
     table = SeriesTable(run.table.path, columns, run.table.first, run.table.units)
-    return SeriesRun(run.info, table, seconds, behind)
+    return SeriesRun(run.info, table, seconds, behind, run.repeated)
 
 
 def _mean(column: Column, block: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Column:

@@ -50,6 +50,57 @@ def complaint(code: int, *arguments: object) -> str:
     return str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("encoding", "first"),
+    [("utf-8-sig", "rpm"), ("utf-16", "rpm"), ("cp1252", "Größe [°]"), ("utf-8", "Größe [°]")],
+)
+def test_a_text_of_any_usual_encoding(tmp_path: Path, encoding: str, first: str) -> None:
+    """Spreadsheets write "Unicode" in UTF-16 with a mark, older programs one byte a letter."""
+    text = table(tmp_path).read_text().replace("rpm", first, 1)
+    (tmp_path / "other.csv").write_bytes(text.encode(encoding))
+    found = csv_text.read(tmp_path / "other.csv")
+    assert list(found.columns) == ["t", first, "v", "M"]
+    assert found.rows == 250 and found.columns["v"].numbers[-1] == 60.0
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "photo.csv").write_bytes(b"t,v\n\xff\x00\x01,2\n")
+    assert "no text" in complaint(DAMAGED, tmp_path / "photo.csv", "--guess")
+
+
+def test_empty_columns_and_separators_at_the_end_hold_nothing(tmp_path: Path) -> None:
+    lines = table(tmp_path).read_text().splitlines()
+    (tmp_path / "named.csv").write_text("\n".join(f"{line},," for line in lines))
+    (tmp_path / "rows.csv").write_text("\n".join([lines[0], *(f"{line}," for line in lines[1:])]))
+    for name in ("named.csv", "rows.csv"):
+        assert list(csv_text.read(tmp_path / name).columns) == ["t", "rpm", "v", "M"]
+
+    (tmp_path / "hidden.csv").write_text(
+        "\n".join([lines[0] + ",", *(f"{x},7" for x in lines[1:])])
+    )
+    assert "without a name" in complaint(DAMAGED, tmp_path / "hidden.csv", "--guess")
+
+
+def test_rows_written_twice_count_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    header, *rows = table(tmp_path).read_text().splitlines()
+    twice = [line for row in rows for line in (row, row)]
+    (tmp_path / "run.csv").write_text("\n".join([header, *twice]))
+    output = imported(tmp_path, tmp_path / "run.csv")
+    assert len(read(output / "run.mcap").arrays("/raw/wheel_encoder")) == len(rows)
+    assert f"run: {len(rows)} rows that repeat the row before" in capsys.readouterr().out
+
+    other = [row + "1" for row in rows]  # at the same times
+    mixed = [line for pair in zip(rows, other, strict=True) for line in pair]
+    (tmp_path / "run.csv").write_text("\n".join([header, *mixed]))
+    said = complaint(DAMAGED, tmp_path / "run.csv", "--map", tmp_path / "map.yaml", "-o", tmp_path)
+    assert "with other values; expected times that rise" in said
+
+
+def test_a_header_without_rows_is_told(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t,rpm,v,M\n")
+    assert "found no rows" in complaint(DAMAGED, tmp_path / "run.csv", "--guess")
+
+
 def test_speeds_become_counts_that_give_them_back(tmp_path: Path) -> None:
     output = imported(tmp_path, table(tmp_path))
     settings = config.load(output / "csv.yaml").settings

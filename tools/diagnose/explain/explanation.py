@@ -24,7 +24,7 @@ from gritd.tools.diagnose.explain.result import (
     Quantity,
     Test,
 )
-from gritd.tools.diagnose.explain.ripples import left_over, ripples_of
+from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import label
@@ -64,6 +64,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
             *_caveats(rig, redo),
             *doubts(rig, whole),
             *left_over(rig, (*rig.baseline, *accepted.fitted.acting)),
+            *late(rig, (*rig.baseline, *accepted.fitted.acting)),
         ),
         share=decision.share,
         remaining=remainders(problem, accepted),
@@ -76,6 +77,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
             Explanation(w.names, w.nameless, w.evidence, w.probability) for w in decision.weighed
         ),
         lines=ripples_of(rig),
+        latencies=latencies_of(rig),
         candidates=len(rig.effects),
         learnt=learnt_form(problem, accepted, soil.after) if soil is not None else None,
         baseline=tuple(e.name for e in rig.baseline),

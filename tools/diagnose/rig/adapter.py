@@ -10,6 +10,7 @@ from gritd.tools.cli.command import USAGE, CommandError
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.latencies import latencies_in
 from gritd.tools.diagnose.rig.signals import drive_series, is_drive, signals
 from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
 from gritd.tools.diagnose.tuning import TUNING
@@ -48,4 +49,5 @@ def rig_of(
     ordered = [r for each in in_time for r, _ in each]
     means = [signals(r, settings, rate) for r in ordered]
     beside, lines = with_lines(ordered, means, settings, len(reference))
-    return WheelRig(beside, settings, len(reference), bed, lines=lines), rate
+    late = latencies_in(ordered[len(reference) :], means[len(reference) :], settings)
+    return WheelRig(beside, settings, len(reference), bed, lines=lines, latencies=late), rate

@@ -30,6 +30,7 @@ from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
+from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run, Stack
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.tuning import TUNING
@@ -53,6 +54,7 @@ class DriveRig:
     forms: tuple[FormSource, ...] = ()
     held: Held | None = None
     lines = NO_LINES
+    latencies: Sequence[Latency] = ()
     smooth = (
         ("speed",),
         ("velocity",),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines
+from gritd.tools.diagnose.orders.latency import Latency
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
@@ -178,6 +179,10 @@ class Rig(Protocol):
     @property
     def lines(self) -> Lines:
         """Ripples that the recordings show at their own rate."""
+
+    @property
+    def latencies(self) -> Sequence[Latency]:
+        """How late each channel is beside the motion, told at the recordings' own rate."""
 
     @property
     def smooth(self) -> tuple[tuple[str, ...], ...]:

@@ -19,6 +19,7 @@ from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
+from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
 from gritd.tools.diagnose.rig.candidates import candidates, tables
@@ -72,13 +73,14 @@ class WheelRig:
         bed: Bed = "prepared",
         read_off: bool = True,
         lines: Lines = NO_LINES,
+        latencies: Sequence[Latency] = (),
     ) -> None:
         """reference: how many of the runs, the first ones, are of a reference campaign, in which no
         candidate acts; bed: whether the others drive on the same bed or on one prepared anew;
         read_off: where both torques are measured, channel torque is the loss between them;
-        lines: ripples that the recordings show at their own rate.
+        lines, latencies: what the recordings show at their own rate.
         """
-        self.settings, self.lines = settings, lines
+        self.settings, self.lines, self.latencies = settings, lines, latencies
         self.new = [number >= reference for number in range(len(signals))]
         self.caveats = [s.left_out for s in signals if s.left_out]
         self._weights = [weights_of(s, settings, self.caveats) for s in signals]

@@ -54,3 +54,21 @@ class Orders:
     apart_sigma: float = tuned(4.0, "σ", "of their places: closer lines are one")
     known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")
     harmonics: int = tuned(6, "times", "the order of a louder line: its harmonic")
+
+    # --- latency.py ---
+    lag_rate: float = tuned(50.0, "Hz", "grid on which lags are told", "run time")
+    lag_longest: float = tuned(900.0, "s", "of a run that is looked at", "run time, memory")
+    event_reach: float = tuned(0.8, "s", "before and after a change")
+    event_change: float = tuned(0.06, "1/s", "of a channel's size: a change")
+    event_smooth: float = tuned(0.2, "s", "over which the rate of a change is told")
+    event_values: int = tuned(30, "values", "of an event at least")
+    farthest_lag: float = tuned(0.6, "s", "of an event: a later channel follows something else")
+    lag_rounds: int = tuned(6, "rounds", "of fit and shift in turn")
+    followed: float = tuned(0.9, "share", "of a channel's changes that the model must follow")
+    event_colour: float = tuned(
+        8.0, "-", "values that are wrong together: what a model misses about a change is slow"
+    )
+    least_events: int = tuned(6, "events", "of a channel, or nothing is told")
+    usual_length: float = tuned(0.05, "m", "of travel over which a contact follows: prior σ")
+    lag_doubt: float = tuned(0.015, "s", "that a model of starts and stops is off by", "a balance")
+    lag_sure: float = tuned(4.0, "σ", "from which a latency is told")

@@ -15,6 +15,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.spectrum import log_chance, places_of, spectrum
 from gritd.tools.diagnose.orders.stretches import Samples
+from gritd.tools.diagnose.orders.transform import sums_at
 from gritd.tools.diagnose.orders.wave import Amplitude, amplitude_of, wave_of
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -89,6 +90,7 @@ class _Channel:
             axis: [spectrum(p.samples, axis, places) for p in self.parts]
             for axis, places in self.places.items()
         }
+        self._cleaned: dict[str, float] = {}  # of the strongest place of each axis
         self.chances = {axis: log_chance(spectra) for axis, spectra in self.spectra.items()}
 
     def strongest(self, axis: str) -> tuple[float, int]:
@@ -101,6 +103,23 @@ class _Channel:
         times = np.arange(1, TUNING.orders.supporting + 1)
         near = [self._nearest(self._first[axis], axis, float(k * at)) for k in times]
         return float(np.sum(np.maximum(-np.array(near) - TUNING.orders.supports, 0.0)))
+
+    def cleaned(self, axis: str, place: int) -> float:
+        """Log chance of the strongest line beside the noise that its neighbours have without it: a
+        loud line spreads over them.
+        """
+        if axis in self._cleaned:
+            return self._cleaned[axis]
+        at, places = self.refined(axis, place), self.places[axis]
+        beside = []
+        for part, before in zip(self.parts, self.spectra[axis], strict=True):
+            without = part.samples.with_values(
+                part.samples.values - wave_of(part.samples, axis, at, whole=True)
+            )
+            after = spectrum(without, axis, places)
+            beside.append(replace(after, power=before.power))
+        self._cleaned[axis] = float(log_chance([s.only(place) for s in beside])[0])
+        return self._cleaned[axis]
 
     def near(self, axis: str, at: float) -> float:
         """Log chance of a line at this place or its neighbours in the grid."""
@@ -125,8 +144,8 @@ class _Channel:
         for part, s in zip(self.parts, self.spectra[axis], strict=True):
             if np.isfinite(s.level[place]):
                 samples = part.samples
-                waves = np.exp(2j * np.pi * np.outer(tried, samples.of(axis)))
-                power = np.abs(waves @ samples.values) ** 2 / samples.values.size
+                power = np.abs(sums_at(samples.of(axis), samples.values, tried)) ** 2
+                power /= samples.values.size
                 freedom = s.freedom[place]
                 gain += 0.5 * freedom * np.log1p(2.0 * power / s.level[place] / freedom)
         return gain
@@ -198,7 +217,7 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
 
     found: list[Line] = []
     for _ in range(TUNING.orders.most_lines):
-        best = _likeliest(channels)
+        best = _likeliest(channels, tried)
         if best is None or best[0] + np.log(tried) > np.log(TUNING.orders.level):
             break
         chance, first, axis, place = best
@@ -208,8 +227,19 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
             tries = tried if channel is first else len(channels)
             log_p = (chance if channel is first else channel.near(axis, at)) + np.log(tries)
             if log_p <= np.log(TUNING.orders.level):
-                found.append(_taken(channel, axis, at, float(np.exp(log_p)), support, len(runs)))
+                line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
+                found += [] if _rest(line, found) else [line]
     return tuple(_with_harmonics(found, channels))
+
+
+def _rest(line: Line, found: Sequence[Line]) -> bool:
+    """Whether it is what is left about a louder line, whose size changes within a stretch."""
+    return any(
+        (other.channel, other.axis) == (line.channel, line.axis)
+        and line.size < TUNING.orders.rest * other.size
+        and abs(line.at - other.at) < TUNING.orders.rest_cells * line.cell
+        for other in found
+    )
 
 
 def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
@@ -219,12 +249,14 @@ def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
                 yield _Part(number, part.with_values(part.detrended(part.values)))
 
 
-def _likeliest(channels: Sequence[_Channel]) -> tuple[float, _Channel, str, int] | None:
+def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channel, str, int] | None:
     """Log chance, channel, axis and place of the likeliest line of all."""
     found = []
     for channel in channels:
         for axis in AXES:
             chance, place = channel.strongest(axis)
+            if chance + np.log(tried) < np.log(TUNING.orders.promising):
+                chance = min(chance, channel.cleaned(axis, place))
             found.append((chance, channel, axis, place))
     if not found:
         return None

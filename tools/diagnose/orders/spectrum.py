@@ -40,6 +40,11 @@ class Spectrum:
         ratio = self.power / self.level
         return np.asarray(-0.5 * self.freedom * np.log1p(2.0 * ratio / self.freedom))
 
+    def only(self, place: int) -> Spectrum:
+        """At one place (1,)."""
+        at = slice(place, place + 1)
+        return Spectrum(self.power[at], self.level[at], self.freedom[at])
+
     @property
     def known(self) -> Array:
         """1 where the noise is known (o,)."""

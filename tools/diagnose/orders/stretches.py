@@ -36,8 +36,12 @@ class Samples:
         return self.angle if axis == "angle" else self.time
 
     def with_values(self, values: Array) -> Samples:
-        """With other values (n,)."""
-        return replace(self, values=values)
+        """With other values (n,) at the same places."""
+        other = replace(self, values=values)
+        for name in ("slices", "trends"):  # are those of the places
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
@@ -56,9 +60,10 @@ class Samples:
         return max(max(float(np.ptp(place[own])) for own in self.slices), 1e-9)
 
     def parts(self) -> list[Samples]:
-        """A run of many turns cut into equal parts, each with a phase of its own."""
-        count = int(np.ceil(self.span("angle") / TUNING.orders.longest_part))
-        share = np.abs(self.angle - self.angle[0]) / self.span("angle")
+        """A long run cut into equal parts, each with a phase of its own."""
+        turns = self.span("angle") / TUNING.orders.longest_part
+        count = int(np.ceil(max(turns, self.span("time") / TUNING.orders.longest_seconds)))
+        share = (self.time - self.time[0]) / self.span("time")
         number = np.minimum((count * share).astype(int), count - 1)
         return [self._some(number == k) for k in range(count) if np.sum(number == k) > 1]
 
@@ -66,7 +71,7 @@ class Samples:
         return Samples(self.time[kept], self.angle[kept], self.values[kept], self.stretch[kept])
 
     @cached_property
-    def _trends(self) -> tuple[Array, ...]:
+    def trends(self) -> tuple[Array, ...]:
         """Orthonormal polynomials (n, t) of time in each stretch."""
         out = []
         for own in self.slices:
@@ -79,7 +84,7 @@ class Samples:
     def detrended(self, values: Array) -> Array:
         """Values (n, …) less the trend of each stretch."""
         out = np.array(values)
-        for own, trend in zip(self.slices, self._trends, strict=True):
+        for own, trend in zip(self.slices, self.trends, strict=True):
             out[own] -= trend @ (trend.T @ out[own])
         return out
 

@@ -31,6 +31,17 @@ def fourier_sums(place: Array, values: Array, spacing: float, count: int) -> Com
     return np.asarray(np.fft.rfft(spread)[:count] / damped)
 
 
+def sums_at(place: Array, values: Array, at: Array) -> Complexes:
+    """Σ y e^(−2πi f x) at evenly spaced f (k,), of values y (n,) at places x (n,)."""
+    wave = values * np.exp(-2j * np.pi * at[0] * place)
+    step = np.exp(-2j * np.pi * (at[1] - at[0]) * place)
+    sums = np.empty(at.size, complex)
+    for number in range(at.size):
+        sums[number] = wave.sum()
+        wave *= step
+    return sums
+
+
 def _kernel(x: Array) -> Array:
     """Of the window (n,), x from −1 to 1."""
     inside = np.sqrt(np.maximum(1.0 - x**2, 0.0))

@@ -45,13 +45,13 @@ def amplitude_of(part: Samples, axis: str, at: float, level: float) -> Amplitude
     return Amplitude(cos, sin, float(sigma))
 
 
-def wave_of(part: Samples, axis: str, at: float) -> Array:
+def wave_of(part: Samples, axis: str, at: float, whole: bool = False) -> Array:
     """The line's part of values (n,) without a trend: each stretch its own amplitude where it holds
-    some cycles.
+    some cycles; whole: one amplitude for all.
     """
     columns = part.detrended(pair(part.of(axis), at))
     out = np.zeros(part.values.size)
-    for own in _groups(part, axis, at):
+    for own in [slice(None)] if whole else _groups(part, axis, at):
         taken = columns[own]
         out[own] = taken @ np.linalg.lstsq(taken, part.values[own], rcond=None)[0]
     return out

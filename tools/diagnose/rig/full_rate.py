@@ -57,7 +57,7 @@ def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Sa
     """
     if steady_states(signals):
         return {}
-    since = {name: _since(signals, read) for name, read in full.items()}
+    since = {name: _since(signals, read) for name, read in full.items() if name != "temperature"}
     angle = since.pop("wheel_encoder")
     return steady_samples(_motion(signals), angle, since, most)
 

@@ -23,6 +23,7 @@ class Orders:
     change_noise: float = tuned(5.0, "σ", "of the speeds' own noise: less is no ramp")
     shortest: float = tuned(1.0, "s", "a shorter stretch is not used")
     most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
+    longest_seconds: float = tuned(300.0, "s", "likewise", "memory")
     longest_part: float = tuned(20.0, "turns", "a longer run is cut, each part its own phase")
 
     # --- spectrum.py ---
@@ -41,8 +42,11 @@ class Orders:
 
     # --- lines.py ---
     level: float = tuned(0.002, "probability", "of a line in noise, all that are tried counted")
+    promising: float = tuned(0.2, "probability", "of chance: likelier lines are looked at closer")
+    rest: float = tuned(0.03, "-", "of a louder line near by: what is left about it")
+    rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
-    refinements: int = tuned(2, "times", "a line's place is looked for more finely")
+    refinements: int = tuned(4, "times", "a line's place is looked for more finely")
     refined_places: int = tuned(9, "places", "of each such look")
     prefer_angle: float = tuned(
         3.0, "nats", "at one speed a ripple of the wheel is also one in time: the wheel's is meant"

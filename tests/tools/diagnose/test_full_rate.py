@@ -1,0 +1,99 @@
+"""What is faster than the grid: named where it is there, and not seen where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects import make
+from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.rig.candidates import steady_states
+from gritd.tools.diagnose.rig.full_rate import beside_lines, restored
+from gritd.tools.proof.ours.cases import draw, record_fully, rig_of
+from tests.tools.diagnose.campaigns import plan, settings
+
+
+@pytest.fixture(autouse=True)
+def _quiet() -> Iterator[None]:
+    with np.errstate(all="ignore"):
+        yield
+
+
+def _ripple(order: float) -> tuple[object, ...]:
+    return (make("gear_ripple", {"ripple_cos": 0.1, "ripple_sin": 0.05, "order": order}),)
+
+
+def test_no_campaign_with_nothing_in_it_has_a_line() -> None:
+    """Noise of any size and colour, testbeds and schedules of any kind."""
+    for seed in range(12):
+        made = record_fully(draw(settings(), np.random.default_rng((seed, 99))), ())
+        signals, full = zip(*made, strict=True)
+        reads = [lambda read=read: read for read in full]
+        assert beside_lines(signals, reads, 1.0)[1].every == (), seed
+
+
+@pytest.mark.parametrize("order", [37.0, 73.0])
+def test_the_count_of_a_gears_teeth_comes_from_the_full_rate(order: float) -> None:
+    rig = rig_of(plan(), _ripple(order))  # type: ignore[arg-type]
+    assert rig.lines.orders(2.0, 200.0) == [pytest.approx(order, abs=0.05)]
+    (line,) = rig.lines.new
+    assert line.channel == "torque"
+    assert line.size == pytest.approx(np.hypot(0.1, 0.05), rel=0.02)
+
+
+def test_the_grid_holds_a_fast_ripple_with_its_size() -> None:
+    made = record_fully(plan(loads=(70.0,)), _ripple(73.0))  # type: ignore[arg-type]
+    ((means, full),) = made
+    (whole,), lines = beside_lines([means], [lambda: full], 1.0)
+
+    driven = np.abs(whole.wheel_speed) > 0.1
+    wave = 0.05 * np.cos(73.0 * whole.wheel_angle) + 0.025 * np.sin(73.0 * whole.wheel_angle)
+    added = whole.analogue["current"] - means.analogue["current"]
+    damping = np.sinc(73.0 * means.wheel_speed / (20.0 * np.pi))
+    missing = wave * (1.0 - damping)
+    steady = driven & (np.abs(np.gradient(means.wheel_speed)) < 1e-3)
+    assert np.corrcoef(added[steady], missing[steady])[0, 1] > 0.95
+    np.testing.assert_array_equal(restored(means, full, lines).time, means.time)
+
+
+def test_a_table_of_steady_states_has_no_lines() -> None:
+    made = record_fully(plan(loads=(70.0,)), _ripple(73.0))  # type: ignore[arg-type]
+    ((means, full),) = made
+    table = means.__class__(**{**vars(means), "wheel_speed": np.full(means.time.size, 0.3)})
+    table = table.__class__(
+        **{
+            **vars(table),
+            "carriage_rate": np.full(means.time.size, 0.3),
+            "wheel_angle": np.zeros(means.time.size),
+        }
+    )
+    assert steady_states(table)
+    assert beside_lines([table], [lambda: full], 1.0)[1].every == ()
+
+
+def _diagnosed(acting: tuple[object, ...], seconds: float = 16.0) -> Diagnosis:
+    return diagnose(rig_of(plan(seconds=seconds), acting), quick=True)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [50.0, 73.0])
+def test_a_gear_that_the_grid_does_not_hold_is_named(order: float) -> None:
+    """At 73 a turn the grid alone names an offset of the current."""
+    found = _diagnosed(_ripple(order))
+    assert [h.effect for h in found.accepted] == ["gear_ripple"]
+    known = found.accepted[0].parameters
+    assert known["order"].value == pytest.approx(order, abs=0.05)
+    assert known["ripple_cos"].value == pytest.approx(0.1, abs=0.01)
+    assert known["ripple_sin"].value == pytest.approx(0.05, abs=0.01)
+    assert not any("ripple" in note for note in found.caveats)
+    assert [line.at for line in found.lines] == [pytest.approx(order, abs=0.05)]
+
+
+@pytest.mark.slow
+def test_a_hub_that_lifts_the_potentiometer_is_named() -> None:
+    """Three turns a run: too few for a line, which the grid holds."""
+    found = _diagnosed((make("hub_runout", {"lift_cos": 5e-4, "lift_sin": 5e-4}),), 60.0)
+    assert [h.effect for h in found.accepted] == ["hub_runout"]

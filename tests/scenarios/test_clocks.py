@@ -17,7 +17,8 @@ WRONG = "one wrong stamp of a device clock"
 STEP = "step of a device clock"
 HISTORIES = "random histories of a device clock"
 DECODER = "drivers' decoder, bytes and clocks simulated"
-SECOND = 250  # frames of the wheel encoder
+SECOND = 250  # frames of the wheel encoder, and ticks
+HELD_BACK = 15e-3  # [s] a computer that is this late holds frames back as well
 
 
 class Meddled:
@@ -46,15 +47,36 @@ def tracking(folder):
         yield daemon, encoders
 
 
+def undisturbed(folder, play):
+    """A finished daemon, after `play(daemon, encoders)`, and what that gave. An overloaded computer
+    holds frames back like a step of the clock: then it is done again, up to three times.
+    """
+    for attempt in range(3):
+        own = folder / str(attempt)
+        own.mkdir()
+        with tracking(own) as (daemon, encoders):
+            found = play(daemon, encoders)
+            daemon.stop()
+        if (late := largest_lateness(daemon.path())) < HELD_BACK:
+            return daemon, found
+
+    return pytest.skip(f"this computer is overloaded: ticks come {late * 1e3:.0f} ms late")
+
+
+def largest_lateness(path):
+    """Of the ticks, but for the first second [s]."""
+    return float(np.max(rows(path, "/loop")["lateness"][SECOND:]))
+
+
 @pytest.mark.parametrize("off", [-490e-3, -65.536e-3, 65.536e-3, 200e-3, 3.0])
 def test_one_wrong_stamp(tmp_path, off, figure):
-    with tracking(tmp_path) as (daemon, encoders):
+    def play(daemon, encoders):
         for _ in range(3):
             encoders.once = round(off * 1e6)
             time.sleep(0.4)
-        device = daemon.status()["devices"]["encoders"]
-        daemon.stop()
+        return daemon.status()["devices"]["encoders"]
 
+    daemon, device = undisturbed(tmp_path, play)
     assert device["clock_steps"] == 0
     figure(WRONG, WIRES, "frames lost for each", device["mistimed"] / 3, "", 1)
     gap = largest_gap(daemon.path(), "/raw/wheel_encoder")
@@ -69,13 +91,13 @@ def largest_gap(path, topic):
 
 @pytest.mark.parametrize("step", [-490e-3, -60e-3, 65.536e-3, 200e-3, 7.0])
 def test_step(tmp_path, step, figure):
-    with tracking(tmp_path) as (daemon, encoders):
+    def play(daemon, encoders):
         encoders.off = round(step * 1e6)
         daemon.heard("device encoders: its clock stepped by ")
         time.sleep(1.5)
-        report = daemon.wait_status(lambda report: report["channels"]["wheel_encoder"] == "ok")
-        daemon.stop()
+        return daemon.wait_status(lambda report: report["channels"]["wheel_encoder"] == "ok")
 
+    daemon, report = undisturbed(tmp_path, play)
     lines = [line for _, line in daemon.lines("its clock stepped")]
     assert len(lines) == 1, lines
     (line,) = lines

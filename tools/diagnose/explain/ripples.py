@@ -66,20 +66,31 @@ def late(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
 
 
 def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
-    """A sentence for each new ripple and vibration that no accepted effect has."""
+    """A sentence for new ripples that no accepted effect has, and one for vibrations."""
     named = [order for effect in accepted if (order := _order(effect)) is not None]
-    for axis in ALONG:
-        lines = [x for x in rig.lines.fresh(axis) if not (axis == "angle" and _taken(x, named))]
-        for group in _grouped(lines):
-            sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
-            first = group[0]
-            yield f"{_sentence(first)}: {sizes}. No accepted effect has it."
+    ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
+    if ripples:
+        yield f"The wheel ripples, and no accepted effect does: {_listed(rig, ripples)}."
+    if vibrations := rig.lines.fresh("time"):
+        yield f"The recordings vibrate, whatever the speed: {_listed(rig, vibrations)}."
 
 
-def _sentence(line: Line) -> str:
-    if line.axis == "time":
-        return f"The recordings vibrate at {line.at:.2f} Hz, whatever the speed"
-    return f"The recordings ripple {line.at:.2f} times a turn of the wheel"
+def _listed(rig: Rig, lines: Sequence[Line]) -> str:
+    """The likeliest places with their channels, in words."""
+    groups = _grouped(sorted(lines, key=lambda x: x.p))
+    told = [_place(rig, group) for group in groups[: TUNING.explain.shown_lines]]
+    more = len(groups) - len(told)
+    return "; ".join(told) + (f"; and {more} more" if more else "")
+
+
+def _place(rig: Rig, group: Sequence[Line]) -> str:
+    first = group[0]
+    sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
+    low, high = first.frequency
+    if first.axis == "time":
+        return f"{first.at:.2f} Hz ({sizes})"
+    hertz = f"{low:.1f} to {high:.1f} Hz" if high > 1.05 * low else f"{low:.1f} Hz"
+    return f"{first.at:.2f} times a turn, {hertz} ({sizes})"
 
 
 def _order(effect: Effect) -> float | None:

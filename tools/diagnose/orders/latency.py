@@ -100,7 +100,8 @@ def lag_of(time: Array, read: Array, model: Array, speed: Array) -> Event | None
     products = np.linalg.inv(columns.T @ columns)
     colour = np.sqrt(TUNING.orders.event_colour * float(np.var(left)) * products[2, 2])
     usual = float(np.mean(speed[speed >= 0.5 * speed.max()]))
-    return Event(lag, float(colour / size), max(usual, 1e-4))
+    sigma = float(colour / size)
+    return Event(lag, sigma, max(usual, 1e-4)) if 0.0 < sigma < np.inf else None
 
 
 def latency_of(channel: str, found: Sequence[Event]) -> Latency | None:

@@ -47,6 +47,7 @@ class Screen:
     nulls:  (draws,) the largest surprise of all candidates.
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
+    ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     habit:  the largest surprise of each candidate in a run of the reference (habit.py).
     """
 
@@ -58,6 +59,7 @@ class Screen:
     chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
     habit: Mapping[Candidate, float] = field(default_factory=dict)
+    ripple: float = 1.0
 
     @property
     def listed(self) -> dict[str, float]:
@@ -107,10 +109,11 @@ class Screen:
     def p(self) -> float:
         """Of the largest surprise, among the nulls; where it was weighed with the noise's colour
         open, no less than the chance of such a likelihood ratio in any kind of misfit (Markov's
-        inequality).
+        inequality). A ripple at full rate has a chance of its own.
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
-        return max(counted, min(TUNING.screen.kinds * float(np.exp(-max(self.open, 0.0))), 1.0))
+        open_ = min(TUNING.screen.kinds * float(np.exp(-max(self.open, 0.0))), 1.0)
+        return min(max(counted, open_), self.ripple)
 
     @property
     def stands_out(self) -> list[Candidate]:
@@ -122,7 +125,8 @@ class Screen:
 
     @property
     def alarmed(self) -> bool:
-        return self.largest[1] > self.threshold and self.open > TUNING.screen.sure
+        slow = self.largest[1] > self.threshold and self.open > TUNING.screen.sure
+        return slow or self.ripple < TUNING.screen.line
 
 
 def tail_quantile(values: Array, level: float) -> float:

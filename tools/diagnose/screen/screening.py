@@ -87,7 +87,7 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     """
     problem, drawn = screening.problem, screening.surrogates
     if problem.stack.referred and first is None:
-        return _screen_beside_reference(screening, model)
+        return replace(_screen_beside_reference(screening, model), ripple=_ripple(problem))
     effects = _signatures(problem, model, first)
     signatures = [*effects, *screening.functions, *_strains(problem, model)]
     beside = without_harmonics(problem, model.fitted, drawn)
@@ -99,7 +99,12 @@ def screen_beside(screening: Screening, model: Model, first: Screen | None = Non
     # with a reference campaign the noise's colour is not open
     if model.names or problem.stack.referred:
         return screen
-    return replace(screen, open=_open(screening, model, screen))
+    return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
+
+
+def _ripple(problem: Problem) -> float:
+    """Chance of the likeliest new ripple of the wheel at full rate."""
+    return min((line.p for line in problem.stack.rig.lines.fresh()), default=1.0)
 
 
 def _screen_beside_reference(screening: Screening, model: Model) -> Screen:

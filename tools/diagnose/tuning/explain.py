@@ -61,6 +61,7 @@ class Explain:
     foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
 
     # --- explanation.py ---
+    shown_lines: int = tuned(4, "places", "of ripples and of vibrations that a note tells")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
     slight_explanation: float = tuned(
         1e-3, "probability", "below which an explanation does not count for the soil"

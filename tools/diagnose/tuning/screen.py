@@ -19,6 +19,11 @@ class Screen:
     # --- screen.py ---
     level: float = tuned(0.01, "probability", "of a false alarm: half of what is allowed")
     least_surprise: float = tuned(2.0, "nats", "less is no alarm, however quiet the nulls")
+    line: float = tuned(
+        1e-4,
+        "probability",
+        "of a ripple at full rate by chance, from which it is an alarm by itself",
+    )
     kinds: int = tuned(10, "kinds", "of misfit that count as independent, of all that are tried")
     tail: float = tuned(
         0.1,

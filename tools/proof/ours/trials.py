@@ -40,7 +40,7 @@ from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, search_models
 from gritd.tools.diagnose.verdict.decide import decide
 from gritd.tools.diagnose.verdict.decision import Decision
-from gritd.tools.proof.ours.cases import LACKS, Plan, draw, record, scaled
+from gritd.tools.proof.ours.cases import LACKS, Plan, draw, record, rig_of, scaled
 from gritd.tools.proof.ours.other_forms import COUSINS
 from gritd.tools.proof.ours.score_table import table
 from gritd.tools.proof.ours.unlisted import UNLISTED
@@ -126,7 +126,7 @@ def _trial(case: Case) -> dict[str, Any]:
         return {"skipped": True}
     plan, acting = drawn
 
-    rig = WheelRig(record(plan, acting), plan.settings)
+    rig = rig_of(plan, acting)
     noise = np.random.default_rng(0)
     search = search_models(prepare_screening(fit_base(rig, noise), noise))
 

@@ -89,6 +89,11 @@ def series(recorded: Recording, signal: Signal) -> tuple[Array, Array]:
     return (rows["stamp"] - rows["stamp"][0]) * 1e-9, rows[signal.field].astype(float)
 
 
+def start_of(recorded: Recording, signal: Signal) -> float:
+    """Of a channel's first reading [s since 1970]."""
+    return float(recorded.arrays(f"/raw/{signal.channel}")["stamp"].min()) * 1e-9
+
+
 def known_values(text: str, unit: str, sigma: float = 0.0) -> list[Uncertain]:
     """`0 mm, 10 mm, 20 mm`, or `0, 10, 20 mm`: the last unit is that of all. Raises
     CommandError.

@@ -12,12 +12,14 @@ from pathlib import Path
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config import units
+from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.config.yamltree import read_text
 from gritd.tools.calibrate import plot
+from gritd.tools.calibrate.capture import capture
 from gritd.tools.calibrate.live import Live
 from gritd.tools.calibrate.outcome import Outcome, written
-from gritd.tools.calibrate.procedures import datum, encoders, load, pot, shunt, soil, torque
+from gritd.tools.calibrate.procedures import datum, encoders, load, pot, press, shunt, soil, torque
 from gritd.tools.calibrate.sources import Recorded, Source, known_value, known_values, steps
 from gritd.tools.calibrate.straight import Straight
 from gritd.tools.cli import configuration_file
@@ -25,6 +27,13 @@ from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser, number, w
 from gritd.tools.cli.files import recording
 from gritd.tools.cli.yaml_edit import EditedYaml
 
+TO_DO = {  # while the sensors are recorded
+    "datum": "lift the wheel and lower it until it touches the surface, three times or more",
+    "torque": "let the wheel turn in the air at two steady speeds or more, both ways"
+    " (with --sensor: drive at several loads or slips)",
+}
+SET_VALUES = "set one value after the other, each for two seconds or more"
+READ = 3.0  # [s] at each value, unless --seconds says otherwise
 Procedure = Callable[[argparse.Namespace, Settings], Outcome]
 
 
@@ -35,7 +44,10 @@ def main(argv: Sequence[str]) -> int:
     place = None
     if arguments.apply is not None or arguments.in_place:
         place = configuration_file.target(source, arguments.apply, arguments.in_place, "--apply")
-    settings = config.load(source).settings
+    configuration = config.load(source)
+    settings = configuration.settings
+    if arguments.record is not None:
+        _capture(arguments, configuration)
     before = EditedYaml(read_text(source), str(source))
 
     outcome = PROCEDURES[arguments.what](arguments, settings)
@@ -50,6 +62,24 @@ def main(argv: Sequence[str]) -> int:
     backup = configuration_file.save(text, source, place)
     print(f"written: {place}" + (f"; as it was: {backup}" if backup else ""))
     return DONE
+
+
+def _capture(arguments: argparse.Namespace, configuration: Configuration) -> None:
+    """Record what the procedure asks for; from there on it is as if the file had been given. Raises
+    CommandError.
+    """
+    if arguments.what == "soil":
+        total = len(arguments.record)
+        for number, path in enumerate(arguments.record, start=1):
+            what = f"press {number} of {total}: press the plate into the soil"
+            capture(configuration, path, arguments.seconds, what)
+        arguments.files += arguments.record
+        return
+    if arguments.recorded is not None:
+        raise CommandError("--record: expected it without --from", USAGE)
+    arguments.recorded = capture(
+        configuration, arguments.record, arguments.seconds, TO_DO.get(arguments.what, SET_VALUES)
+    )
 
 
 def _text(outcome: Outcome, document: EditedYaml, arguments: argparse.Namespace) -> str:
@@ -103,7 +133,9 @@ def _torque(arguments: argparse.Namespace, settings: Settings) -> Outcome:
         known, source = _known(arguments, settings, "N*m")
         return torque.by_lever(source, known, settings)
     if arguments.recorded is None:
-        raise CommandError("torque: expected --known TORQUES, or --from FILE.mcap", USAGE)
+        raise CommandError(
+            "torque: expected --known TORQUES, --from FILE.mcap or --record NEW.mcap", USAGE
+        )
     recorded = recording(arguments.recorded)
     if arguments.sensor:
         _check_wrench("wrench", settings)
@@ -112,7 +144,23 @@ def _torque(arguments: argparse.Namespace, settings: Settings) -> Outcome:
 
 
 def _soil(arguments: argparse.Namespace, settings: Settings) -> Outcome:
-    return soil.outcome([soil.read(path) for path in arguments.files], settings)
+    tests = [_press(path, arguments, settings) for path in arguments.files]
+    if not tests:
+        raise CommandError("soil: expected FILES of plate tests, or --record", USAGE)
+    return soil.outcome(tests, settings)
+
+
+def _press(path: Path, arguments: argparse.Namespace, settings: Settings) -> soil.Press:
+    """A text file, or a recording of this testbed pressing a plate."""
+    if path.suffix.lower() != ".mcap":
+        return soil.read(path)
+    _check_wrench("wrench", settings)
+    if arguments.plate is None:
+        raise CommandError(f"{path}: expected --plate, the diameter of the plate, with it", USAGE)
+    radius = known_value(arguments.plate, "m") / 2.0
+    if radius <= 0.0:
+        raise CommandError(f"--plate {arguments.plate}: expected a diameter above 0", USAGE)
+    return press.read(recording(path), settings, radius, arguments.touch_force)
 
 
 PROCEDURES: dict[str, Procedure] = {
@@ -162,7 +210,7 @@ def _si(shown: str) -> str:
 
 def _live(arguments: argparse.Namespace, settings: Settings, shown: str) -> Live:
     factor = float(units.unit(shown).factor)
-    return Live(settings, arguments.seconds, _ask, shown, factor)
+    return Live(settings, arguments.seconds or READ, _ask, shown, factor)
 
 
 def _ask(what: str) -> None:
@@ -194,7 +242,7 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=summary, description=summary)
         _add_common(command)
         if name == "soil":
-            command.add_argument("files", nargs="+", type=Path, metavar="FILE", help="plate tests")
+            _add_presses(command)
         else:
             _add_readings(command)
         _add_own(name, command)
@@ -236,7 +284,39 @@ def _add_readings(command: argparse.ArgumentParser) -> None:
         help="with --from: seconds at which a value was set; else stretches at rest are found",
     )
     command.add_argument(
-        "--seconds", type=number(above=0.0), default=3.0, help="to read each value; default 3"
+        "--record",
+        type=Path,
+        metavar="NEW.mcap",
+        help="record the live sensors until Enter, then as --from NEW.mcap",
+    )
+    command.add_argument(
+        "--seconds", type=number(above=0.0), help="to read each value, default 3; or to record"
+    )
+
+
+def _add_presses(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "files", nargs="*", type=Path, metavar="FILE", help="plate tests, text or .mcap"
+    )
+    command.add_argument("--plate", metavar="DIAMETER", help="of the plate in recordings: '60 mm'")
+    command.add_argument(
+        "--record",
+        action="append",
+        type=Path,
+        metavar="NEW.mcap",
+        help="record this testbed pressing the plate, until Enter; once for each press",
+    )
+    command.add_argument("--seconds", type=number(above=0.0), help="to record each press")
+    _add_touch(command)
+
+
+def _add_touch(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--touch-force",
+        type=number(above=0.0),
+        default=2.0,
+        metavar="N",
+        help="load that is a touch; default 2 N",
     )
 
 
@@ -249,13 +329,7 @@ def _add_own(name: str, command: argparse.ArgumentParser) -> None:
         command.add_argument(
             "--touches", type=whole(1, 100), default=3, help="live: so many; default 3"
         )
-        command.add_argument(
-            "--touch-force",
-            type=number(above=0.0),
-            default=2.0,
-            metavar="N",
-            help="load that is a touch; default 2 N",
-        )
+        _add_touch(command)
     if name == "torque":
         command.add_argument(
             "--sensor",

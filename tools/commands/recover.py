@@ -14,6 +14,7 @@ from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, DONE, Parser
 from gritd.tools.cli.files import unread, unwritten, vacant
+from gritd.tools.cli.progress import Progress
 
 LIBRARY = "gritd recover"
 LONGEST = 18  # digits of a number of messages
@@ -64,8 +65,10 @@ def recover(recording: Recording, target: Path) -> None:
                     name, sealed(name, entries) if name.startswith("gritd.") else entries
                 )
         file.add_metadata(RECOVERED, sealed(RECOVERED, _note(recording)))
-        for chunk in recording.chunks():
-            file.add_chunk(*chunk.records())
+        with Progress("recovering messages", recording.counts.total()) as progress:
+            for chunk in recording.chunks():
+                file.add_chunk(*chunk.records())
+                progress.advance(len(chunk.starts))
         file.close()
 
 

@@ -11,7 +11,7 @@ from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate.outcome import Found, Outcome
-from gritd.tools.calibrate.sources import Signal, series
+from gritd.tools.calibrate.sources import Signal, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
 SUMMARY = "touches of the surface: the potentiometer's zero"
@@ -28,7 +28,7 @@ def touches(recorded: Recording, settings: Settings, contact: float) -> list[flo
     assert settings.wrench is not None
     pot_time, pot = series(recorded, POT)
     time, force = series(recorded, FORCE)
-    start = _start(recorded, FORCE) - _start(recorded, POT)
+    start = start_of(recorded, FORCE) - start_of(recorded, POT)
     known = settings.wrench.load
     load = force * known.scale.value + known.offset.value
 
@@ -44,10 +44,6 @@ def touches(recorded: Recording, settings: Settings, contact: float) -> list[flo
             DAMAGED,
         )
     return found
-
-
-def _start(recorded: Recording, signal: Signal) -> float:
-    return float(recorded.arrays(f"/raw/{signal.channel}")["stamp"].min()) * 1e-9
 
 
 def _rises(time: Array, load: Array, contact: float) -> list[float]:

@@ -15,7 +15,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate.line import Point, fitted
 from gritd.tools.calibrate.outcome import Found, Outcome, residual_table
 from gritd.tools.calibrate.plateaus import mean_of, plateaus
-from gritd.tools.calibrate.sources import Signal, Source, series
+from gritd.tools.calibrate.sources import Signal, Source, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
 SUMMARY = "torques on a lever, a wheel spun in the air, or a torque sensor: constant and friction"
@@ -157,10 +157,7 @@ def _current(recorded: Recording, settings: Settings) -> tuple[Array, Array]:
 
 def _offset(recorded: Recording, signal: Signal, other: Signal) -> float:
     """Seconds by which one channel begins after another."""
-    first, second = (
-        float(recorded.arrays(f"/raw/{s.channel}")["stamp"].min()) * 1e-9 for s in (signal, other)
-    )
-    return first - second
+    return start_of(recorded, signal) - start_of(recorded, other)
 
 
 # --- a torque sensor ---

@@ -1,0 +1,47 @@
+"""A plate in the place of the wheel, pressed into the soil by the testbed itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.recording.salvage import Recording
+from gritd.tools.calibrate.procedures import soil
+from gritd.tools.calibrate.procedures.datum import FORCE, POT
+from gritd.tools.calibrate.sources import series, start_of
+from gritd.tools.cli.command import DAMAGED, CommandError
+
+BLOCK = 0.1  # [s] over which force and depth are averaged
+
+
+def read(recorded: Recording, settings: Settings, radius: float, contact: float) -> soil.Press:
+    """One press: the force/torque sensor's load over the potentiometer's depth, which counts from
+    where the load last was below `contact` [N]; radius of the plate [m]. Raises CommandError.
+    """
+    assert settings.wrench is not None
+    time, volts = series(recorded, POT)
+    at, force = series(recorded, FORCE)
+    at = at + start_of(recorded, FORCE) - start_of(recorded, POT)
+    known = settings.wrench.load
+    load = np.interp(time, at, force) * known.scale.value + known.offset.value
+    depth = volts * settings.channels["sinkage_pot"].calibration.scale.value
+
+    block = ((time - time[0]) / BLOCK).astype(int)
+    count = np.maximum(np.bincount(block), 1)
+    weight, height = (np.bincount(block, values) / count for values in (load, depth))
+    filled = np.bincount(block) > 0
+    weight, height = weight[filled], height[filled]
+
+    hanging = np.flatnonzero(weight < contact)
+    first = int(hanging[0]) if hanging.size else weight.size - 1
+    last = first + int(np.argmax(weight[first:]))
+    free = hanging[hanging < last]
+    if not free.size or weight[last] < contact:
+        raise CommandError(
+            f"{recorded.path}: found no press; expected the load to rise from below "
+            f"{contact:g} N, the plate in the air, to its largest value",
+            DAMAGED,
+        )
+    pressed = slice(int(free[-1]), last + 1)
+    rows = np.column_stack([weight[pressed], 1e3 * (height[pressed] - height[free[-1]])])
+    return soil.of_rows(recorded.path.name, radius, rows)

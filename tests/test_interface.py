@@ -117,3 +117,32 @@ def test_a_diagnosis_draws_itself_in_a_notebook(tmp_path):
     assert result.verdict == "explained" and "coulomb_friction" in result.accepted
     assert "<iframe" in result._repr_html_() and "Coulomb" in result._repr_html_()
     assert result.report(tmp_path / "r.html").exists() and "verdict" in str(result)
+
+
+def test_what_a_notebook_shows_of_a_value_is_one_line(simulated, recorded):
+    run = gritd.read(recorded)
+    assert "run.mcap" in repr(run) and "topics" in repr(run)
+    for shown in (repr(run), repr(simulated), repr(gritd.Filter(packaged()).run(run))):
+        assert "\n" not in shown and len(shown) < 200
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda: gritd.simulate(schedule=[{"duration": 5.0}]), "segment 1: found duration"),
+        (lambda: gritd.simulate(schedule=STEPS, soil={"cohesio": 1.0}), "did you mean cohesion"),
+        (lambda: gritd.diagnose([], packaged()), "runs: found none"),
+        (lambda: gritd.diagnose("run.mcap", packaged()), "expected a list"),
+        (lambda: gritd.Filter(packaged()).run({"wheel_encoder": ([0.0], [1])}), "both encoders"),
+        (
+            lambda: gritd.Filter(packaged()).run(
+                {"wheel_encoder": ([0.0, np.nan], [1, 2]), "carriage_encoder": ([0.0], [1])}
+            ),
+            "not finite",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_that_says_what_was_expected(wrong, told):
+    with pytest.raises(ValueError, match=told) as error:
+        wrong()
+    assert "\n" not in str(error.value)

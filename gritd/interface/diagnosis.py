@@ -6,6 +6,7 @@ import html
 import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +14,9 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.interface.runs import Place, Run, configured
 from gritd.tools.commands.diagnose import of_files
 from gritd.tools.commands.diagnose_text import text
+from gritd.tools.diagnose.explain.provenance import check_rig
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.report import lab
 from gritd.tools.report import reference as references
 
@@ -54,6 +57,9 @@ class Result:
     def __str__(self) -> str:
         return text(self.diagnosis)
 
+    def __repr__(self) -> str:
+        return f"Result({self.verdict}: {self.diagnosis.summary})"
+
     def _repr_html_(self) -> str:
         page = importlib.import_module("gritd.tools.report.diagnosis").render(self.diagnosis)
         return (
@@ -71,6 +77,7 @@ def diagnose(
     seed: int = 0,
     jobs: int = 1,
     quick: bool = False,
+    other_rig: bool = False,
     step: Callable[[str], None] = lambda what: None,
 ) -> Result:
     """Where runs and model differ, and which physics was left out.
@@ -79,12 +86,19 @@ def diagnose(
     reference: recordings of the same rig with nothing new; then what is named is what is new.
     bed: with a reference, "same" or "prepared". seed: of the surrogates. jobs: processes that fit.
     quick: a first answer, for which only the likeliest effects are fitted, each alone.
+    other_rig: config may be of another testbed than the runs.
     step: is told what begins.
 
-    Raises CommandError and ConfigError, one line.
+    Raises ValueError without runs, CommandError and ConfigError; one line.
     """
+    if isinstance(runs, Run | str | PathLike):
+        raise ValueError("runs: found a single run; expected a list of runs or files")
+    if not runs:
+        raise ValueError("runs: found none; expected recordings or their files")
     given = references.given([_file(each) for each in reference], bed)
     files, configuration = [_file(run) for run in runs], configured(config)
+    if not other_rig:
+        check_rig(read_all([*files, *given.files]), configuration.settings, configuration.source)
     found, damage = of_files(files, configuration, seed, step, jobs, "", given, quick)
     return Result(lab.with_runs(found, files, configuration), tuple(damage))
 

@@ -109,6 +109,8 @@ class Filter:
         else:
             settings = self._settings(self.configuration.run, load)
             raw = {channel: _rows(channel, series) for channel, series in readings.items()}
+            if missing := [channel for channel in ENCODERS if channel not in raw]:
+                raise ValueError(f"{missing[0]}: found no readings; expected both encoders")
             made = followed(settings, streams_of(raw, settings.rates.tick), start=start)
         return Estimates(made.rows, made)
 
@@ -132,6 +134,11 @@ def _rows(channel: str, series: Series) -> Table:
         raise ValueError(
             f"{channel}: found times {np.shape(series[0])} and values {np.shape(series[1])}; "
             f"expected (n,) and (n{', ' + str(len(names)) if len(names) > 1 else ','})"
+        )
+
+    if not (np.isfinite(time).all() and np.isfinite(values.astype(np.float64)).all()):
+        raise ValueError(
+            f"{channel}: found a number that is not finite; expected a gap to have no reading"
         )
 
     kind: Any = np.int64 if channel in ENCODERS else np.float64

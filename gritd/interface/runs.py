@@ -65,9 +65,20 @@ class Run(Mapping[str, Table]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
+    def __repr__(self) -> str:
+        """One line: a notebook shows it where a cell ends with a run."""
+        load = "" if self.info.nominal_load is None else f", {self.info.nominal_load:g} N"
+        count = self.recording.counts.total()
+        return f"Run({str(self.path)!r}{load}, {count} messages of {len(self)} topics)"
+
     def frame(self, topic: str) -> Any:
-        """A topic as a pandas data frame, by seconds since its first message. Needs pandas."""
-        pandas = importlib.import_module("pandas")
+        """A topic as a pandas data frame, by seconds since its first message. Raises ImportError
+        without pandas, which gritd does not bring.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError:
+            raise ImportError("frame: needs pandas: pip install pandas") from None
         rows = self[topic]
         time = (rows["log_time"] - rows["log_time"][:1]) / NS
         index = pandas.Index(time, name="time")

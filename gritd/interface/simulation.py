@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from gritd.config import packaged
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.model.forward import Response
@@ -23,6 +24,8 @@ from gritd.tools.testbed import schedule as schedules
 from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.simulation import Run as Made
 from gritd.tools.testbed.simulation import simulate_run, soil_of
+
+SOIL = ("cohesion", "tan_phi", "shear_modulus", "exponent", "modulus_factor")
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,11 @@ class Simulation:
         return {
             name: (np.array(times), np.array(values)) for name, (times, values) in found.items()
         }
+
+    def __repr__(self) -> str:
+        time = np.asarray(self.motion.time)
+        soil = f"c {float(self.soil.cohesion):.0f} Pa, tan φ {float(self.soil.tan_phi):.4f}"
+        return f"Simulation({np.ptp(time):.1f} s, {soil})"
 
     def write(self, path: Place) -> Run:
         """The recording of it. Raises RecordingError where the file is there or cannot be made."""
@@ -96,17 +104,38 @@ def simulate(
 
     motion = schedules.motion_of(_schedule(schedule), settings.wheel.radius, settings.rates.tick)
     acting = tuple(library.make(name, values) for name, values in (effects or {}).items())
-    true = soil_of(settings, soil)
+    true = soil_of(settings, _checked(soil))
     made = simulate_run(settings, true, motion, acting, seed)
     return Simulation(configuration, true, made)
 
 
 def _schedule(given: Place | Schedule | Sequence[Mapping[str, float]] | None) -> Schedule:
-    """Raises ConfigError, TypeError."""
+    """Raises ConfigError, ValueError."""
     if isinstance(given, Schedule):
         return given
     if given is None:
         return schedules.read(packaged("schedule.yaml"))
     if isinstance(given, Sequence) and not isinstance(given, str):
-        return Schedule(tuple(Segment(**segment) for segment in given), 0.5)
+        return Schedule(tuple(_segment(number, each) for number, each in enumerate(given, 1)), 0.5)
     return schedules.read(Path(given))
+
+
+def _segment(number: int, given: Mapping[str, float]) -> Segment:
+    """Raises ValueError where a key is missing or unknown."""
+    expected = [field.name for field in fields(Segment)]
+    if set(given) != set(expected):
+        raise ValueError(
+            f"segment {number}: found {', '.join(given) or 'nothing'}; "
+            f"expected {', '.join(expected)}"
+        )
+    return Segment(**given)
+
+
+def _checked(soil: Mapping[str, float] | None) -> Mapping[str, float] | None:
+    """Raises ValueError for an unknown name."""
+    for name in soil or ():
+        if name not in SOIL:
+            raise ValueError(
+                f"soil: found {name!r}{did_you_mean(name, SOIL)}; expected {', '.join(SOIL)}"
+            )
+    return soil

@@ -1,4 +1,4 @@
-# `make` lists what there is. Everything is set up in .venv by itself, and again when pyproject.toml changes.
+# `make` lists what there is. Everything is set up in .venv by itself, and again when pyproject.toml or the C sources change.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -14,7 +14,7 @@ help: ## list the targets
 venv: $(READY) ## set up .venv (the other targets do it when they need it)
 
 # --upgrade makes a venv that an older Python or an interrupted set-up left behind whole again.
-$(READY): pyproject.toml
+$(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "gritd needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "setting up $(VENV) (a minute or two, once) …"

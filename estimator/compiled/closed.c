@@ -386,17 +386,13 @@ static PyTypeObject ClosedType = {
     .tp_dealloc = closed_dealloc,
     .tp_methods = methods};
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "closed", "The closed forms, compiled.", -1, NULL,
-                                    NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "closed", .m_size = -1};
 
 PyMODINIT_FUNC PyInit_closed(void) {
     PyObject *made;
     if (PyType_Ready(&ClosedType) < 0) return NULL;
     made = PyModule_Create(&module);
     if (made == NULL) return NULL;
-    if (PyModule_AddObjectRef(made, "Closed", (PyObject *)&ClosedType) < 0) {
-        Py_DECREF(made);
-        return NULL;
-    }
+    if (PyModule_AddObjectRef(made, "Closed", (PyObject *)&ClosedType) < 0) Py_CLEAR(made);
     return made;
 }

@@ -20,14 +20,14 @@ from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.plain_engine import CompiledEngine, PlainEngine
 from gritd.estimator.online.pipeline import Pipeline
-from tests.estimator.filter.test_review import SETTINGS, consumed
+from tests.estimator import live_run
+from tests.estimator.live_run import SETTINGS
 
 pytestmark = pytest.mark.skipif(
     not arithmetic.BUILT, reason="gritd was installed without a compiler"
 )
 
 DRAWS = 2000
-__all__ = ["consumed"]  # a fixture
 
 
 def models(monkeypatch, settings):
@@ -154,7 +154,9 @@ def _line(rng, components, nuisances):
     return Line(y, H, G, R, D)
 
 
-def test_ticks_are_those_of_python_to_the_bit(consumed, monkeypatch):
+def test_ticks_are_those_of_python_to_the_bit(monkeypatch):
+    consumed = live_run.consumed()
+
     def rows():
         pipeline = Pipeline(SETTINGS)
         state, rows = pipeline.start(), []

@@ -53,7 +53,7 @@ def verify(recordings: list[Recording], configuration: Configuration) -> int:
     )
     by = by_processor(configuration)
     if differences.ticks and by:
-        print(f"  {by}: the last digits depend on the processor, here perhaps on nothing else")
+        print(f"  {by}: another processor alone may give other last digits")
     return _code(recordings, differences)
 
 

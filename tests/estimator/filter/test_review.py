@@ -2,37 +2,23 @@
 
 from __future__ import annotations
 
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import pytest
 
-from gritd.config import packaged
-from gritd.estimator.config.configuration import load
 from gritd.estimator.filter import review, smoother
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online import checkpoint
 from gritd.estimator.online.pipeline import Pipeline
-from tests.linear_plant import readings
-
-SETTINGS = load(packaged()).settings
-TRUTH = (720.0, 0.62, 0.025)
-SCHEDULE = [(2.0, 50.0, 0.2), (2.0, 90.0, 0.4), (2.0, 60.0, 0.1), (2.0, 80.0, 0.5)]
-JUMP, MORE_VOLTS = 6.0, 0.05  # [s] from which on the shunt reads so much more: a change of the soil
-
-
-def _more(reading):
-    late = reading.channel == "motor_shunt" and reading.stamp > JUMP * 1e9
-    return reading._replace(value=reading.value + MORE_VOLTS) if late else reading
+from tests.estimator import live_run
+from tests.estimator.live_run import SETTINGS
 
 
 @pytest.fixture(scope="module")
 def consumed():
-    """(stamp, readings) of every tick at 250 Hz."""
-    plant = readings(SETTINGS, TRUTH, SCHEDULE, seed=4, rate=250)
-    each = (_more(reading) for _, batch in plant for reading in batch)
-    return [(stamp, list(group)) for stamp, group in groupby(each, key=lambda r: r.stamp)]
+    return live_run.consumed()
 
 
 def _finished(reviewer, state, step):

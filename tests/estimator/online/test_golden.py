@@ -34,16 +34,13 @@ def test_they_hold_a_change_of_the_soil():
 
 HASHED = """
 import hashlib, numpy
-from tests.estimator.filter.test_review import SETTINGS
 from gritd.estimator.online.pipeline import Pipeline
-from tests.linear_plant import readings
-pipeline, ticks = Pipeline(SETTINGS), hashlib.sha256()
+from tests.estimator import live_run
+pipeline, ticks = Pipeline(live_run.SETTINGS), hashlib.sha256()
 state = pipeline.start()
-loads = [(1.0, 50.0, 0.2), (1.0, 90.0, 0.4), (1.0, 60.0, 0.1)]
-for _, batch in readings(SETTINGS, (720.0, 0.62, 0.025), loads, seed=4, rate=250):
-    for reading in batch:
-        state, row = pipeline.step(state, [reading], reading.stamp)
-        ticks.update(numpy.array(row).tobytes())
+for stamp, batch in live_run.consumed(live_run.SCHEDULE[:2]):
+    state, row = pipeline.step(state, batch, stamp)
+    ticks.update(numpy.array(row).tobytes())
 print(ticks.hexdigest(), state.track.updates)
 """
 OTHER = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX2 FMA3"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from argparse import Namespace
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from math import sqrt
 from pathlib import Path
@@ -61,12 +61,22 @@ def _parser() -> Parser:
     parser = Parser(
         prog="gritd bed", description="The bed in the bin: show it, or begin a new one."
     )
-    parser.add_argument("--config", metavar="F", help="the testbed: its logging.directory is meant")
-    parser.add_argument("--directory", metavar="DIR", help="the folder of the logs")
+    _add_place(parser, default=None)
     commands = parser.add_subparsers(dest="what", metavar="show|new")
-    commands.add_parser("show", help="what is known of it")
+    shown = commands.add_parser("show", help="what is known of it")
     new = commands.add_parser(
         "new", help="a bed prepared anew: the next run begins with the stated prior"
     )
     new.add_argument("name", type=file_name, help="of the bed")
+    for command in (shown, new):  # behind the word too; there they replace what stands before it
+        _add_place(command, default=SUPPRESS)
     return parser
+
+
+def _add_place(parser: ArgumentParser, default: str | None) -> None:
+    parser.add_argument(
+        "--config", metavar="F", default=default, help="the testbed: its logging.directory is meant"
+    )
+    parser.add_argument(
+        "--directory", metavar="DIR", default=default, help="the folder of the logs"
+    )

@@ -231,7 +231,9 @@ def _soil_changes(given: Sequence[str]) -> dict[str, float]:
         kind = SOIL_VALUES[name]
         changes[name] = _quantity(f"--soil {text}", value, kind.unit or "")
         if not kind.holds(changes[name]):
-            raise CommandError(f"--soil {text}: found {value}; expected {kind.expected}", USAGE)
+            degrees = f", such as {value} deg" if kind.unit == "rad" else ""
+            expected = f"{kind.expected}{degrees}"
+            raise CommandError(f"--soil {text}: found {value}; expected {expected}", USAGE)
 
     if "phi" in changes:
         changes["tan_phi"] = tan(changes.pop("phi"))

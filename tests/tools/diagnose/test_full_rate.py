@@ -9,10 +9,13 @@ import pytest
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.fit.shared import rippling_columns
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.full_rate import beside_lines, restored
-from gritd.tools.proof.ours.cases import draw, record_fully, rig_of
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
 
 
@@ -72,6 +75,22 @@ def test_a_table_of_steady_states_has_no_lines() -> None:
     )
     assert steady_states(table)
     assert beside_lines([table], [lambda: full], 1.0)[1].every == ()
+
+
+def test_a_ripple_of_the_reference_goes_on_with_its_exact_order() -> None:
+    """67.1 a turn lies between the orders that are tried on the grid."""
+    ripple, still = _ripple(67.1), plan(seed=5, standstill=False)
+    before = record_fully(still, ripple)  # type: ignore[arg-type]
+    rig = rig_of(plan(seed=6, standstill=False), ripple, before, "same")  # type: ignore[arg-type]
+    assert rig.lines.new and rig.lines.orders(2.0, 200.0) == []
+
+    stack = Stack(rig)
+    smooth = Stack(WheelRig([*record(still, ())] * 2, settings(), 3, "same", lines=rig.lines))
+    residual = stack.measured - smooth.measured
+    torque = stack.of("torque") & (stack.covariate("speed") > 0.0)
+    columns, rippling = rippling_columns(stack, residual)[torque], residual[torque]
+    left = rippling - columns @ np.linalg.lstsq(columns, rippling, rcond=None)[0]
+    assert np.std(left) < 0.1 * np.std(rippling)
 
 
 def _diagnosed(acting: tuple[object, ...], seconds: float = 16.0) -> Diagnosis:

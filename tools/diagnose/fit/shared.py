@@ -100,10 +100,12 @@ class _Waves:
 
 def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
     """Pairs (N, 2) of all channels, orders and runs."""
-    orders = _orders(stack)
+    usual_orders = _orders(stack)
     moving = stack.covariate("speed") > 0.0
-    for channel in stack.rig.channels if orders.size else ():
+    for channel in stack.rig.channels if usual_orders.size else ():
         own = stack.of(channel) & moving
+        shown = [line.at for line in restored(stack.rig, channel)]
+        orders = np.union1d(usual_orders, shown)
         whole = _undamped(stack, channel, orders)
         waves = {n: _waves(stack, own, n, orders, whole) for n in np.unique(stack.run[own])}
         of_reference = [w for n, w in waves.items() if not stack.rig.new[n]]

@@ -28,6 +28,7 @@ SOIL = {  # field -> label, factor
 HEIGHT, TOP, BOTTOM = 220.0, 22.0, 182.0  # [px] of a picture and its axes
 CURVE = 40  # points of a curve over slip
 ELLIPSES = 5  # of one run, over its time
+PANELS = 18  # of a figure in view: a printed page
 KEY = {"recorded": "recorded", "before": "original, Eqs. 1–10", "after": "closed form, Eqs. 20–22"}
 LATE = 5.0  # usual distances of two messages: what is farther is a gap
 
@@ -140,7 +141,10 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
     ]
     for channel, label in FORCES.items():
         drawn = [
-            figures.panel(name, _over_slip(part, channel, label), _share(part, channel))
+            (
+                part.off(channel, "original"),
+                figures.panel(name, _over_slip(part, channel, label), _share(part, channel)),
+            )
             for name, part in parts
             if isfinite(part.off(channel, "original"))
         ]
@@ -148,7 +152,20 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
             name = label.split(" ")[0]
             caption = f"{name} against slip, original and closed form beside what was recorded."
             legend = figures.legend(KEY)
-            yield figures.figure(caption, figures.panels(drawn), legend=legend, whole=True)
+            yield figures.figure(caption, *_in_view(drawn), legend=legend, whole=True)
+
+
+def _in_view(drawn: Sequence[tuple[float, Markup]]) -> Iterator[Markup]:
+    """Panels in their order. Of more than a page holds, those that differ most are in view and
+    printed; the others are folded.
+    """
+    order = sorted(range(len(drawn)), key=lambda at: -drawn[at][0])
+    chosen, rest = (sorted(some) for some in (order[:PANELS], order[PANELS:]))
+    yield figures.panels(drawn[at][1] for at in chosen)
+    if rest:
+        summary = tag("summary", f"{counted(len(rest), 'more load')}, with smaller differences")
+        folded = figures.panels(drawn[at][1] for at in rest)
+        yield tag("details", summary, folded, class_="unprinted")
 
 
 def _share(part: Beside, channel: str) -> str:

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import pytest
 
+import gritd
 from gritd.config import packaged
+from gritd.tools.commands import report
 from gritd.tools.report import diagnosis
 from tests.tools.report import cases
 
@@ -92,6 +94,33 @@ def test_prints(case: str, tmp_path: Path) -> None:
         text.startswith(b"%PDF") and 2 <= len(re.findall(rb"/Type\s*/Page\b", text)) <= MOST_PAGES
     )
     assert re.search(rb"/MediaBox\s*\[\s*0 0 59[45][.\d]* 84[12]", text)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of `gritd report`: six runs at four loads each, forces and estimates."""
+    folder, runs = tmp_path_factory.mktemp("campaign"), []
+    steps = [
+        {"duration": 3.0, "load": load, "slip": slip, "speed": 0.02}
+        for load in (30.0, 50.0, 70.0, 90.0)
+        for slip in (0.1, 0.4)
+    ]
+    for seed in range(6):
+        runs.append(str(folder / f"run-{seed}.mcap"))
+        gritd.simulate(schedule=steps, seed=seed).write(runs[-1])
+    assert report.main([*runs, "-o", str(folder / "page.html")]) == 0
+    return folder / "page.html"
+
+
+def test_a_campaign_fits_a_phone_and_six_pages(campaign: Path, tmp_path: Path) -> None:
+    outer, printed = tmp_path / "outer.html", tmp_path / "page.pdf"
+    page = campaign.read_text(encoding="utf-8")
+    outer.write_text(MEASURE.format(width=390, page=html.escape(page)), encoding="utf-8")
+    title = re.search(r"<title>(\d+) (\d+)</title>", browse(tmp_path, outer, "--dump-dom"))
+    assert title is not None and int(title[1]) <= 390 and title[2] == "0"
+
+    browse(tmp_path, campaign, f"--print-to-pdf={printed}", "--no-pdf-header-footer")
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed.read_bytes())) <= MOST_PAGES
 
 
 def test_a_drag_zooms_and_a_double_click_shows_the_whole_again(tmp_path: Path) -> None:

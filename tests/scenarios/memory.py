@@ -4,7 +4,7 @@ module makes it fail: memory of every kind, Python objects and raw blocks.
 
 from __future__ import annotations
 
-from threading import Thread
+import _thread
 
 import pytest
 
@@ -34,9 +34,12 @@ def failing(number, run):
     """What `run` returns, or the exception it raises, where its allocation of this number fails and
     no other. In a thread of its own: it must come back.
     """
-    outcome = []
+    outcome, gate, done = [], _thread.allocate_lock(), _thread.allocate_lock()
+    gate.acquire()
+    done.acquire()
 
     def inject():
+        gate.acquire()
         testcapi.set_nomemory(number, number + 1)
         try:
             found = run()
@@ -44,10 +47,12 @@ def failing(number, run):
             found = error
         testcapi.remove_mem_hooks()
         outcome.append(found)
+        done.release()
 
-    thread = Thread(target=inject, daemon=True)
-    thread.start()
-    thread.join(PATIENCE)
+    # whoever waits must not allocate meanwhile: the one that fails could be its own
+    _thread.start_new_thread(inject, ())
+    gate.release()
+    came_back = done.acquire(True, PATIENCE)
     testcapi.remove_mem_hooks()
-    assert not thread.is_alive(), f"hangs after allocation {number} failed"
+    assert came_back, f"hangs after allocation {number} failed"
     return outcome[0] if outcome else MemoryError()

@@ -21,6 +21,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.topics import TICK_TOPIC, TOPICS
 from gritd.tools import main as cli
 from gritd.tools.cli.command import CommandError
+from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.yaml_edit import EditedYaml
 from gritd.tools.commands import replay, replay_verify
 from gritd.tools.diagnose.explain.apply_form import set_discrepancy
@@ -102,6 +103,12 @@ def test_a_replay_does_not_depend_on_hash_order(recorded, seed):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "identical bit for bit" in done.stdout
+
+
+@pytest.fixture(autouse=True)
+def no_progress(monkeypatch):
+    """A slow computer shows it among what else is said."""
+    monkeypatch.setattr(Progress, "shown", False)
 
 
 @pytest.fixture

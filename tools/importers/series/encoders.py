@@ -20,6 +20,7 @@ CHANNELS = {
 }
 COUNTED = ("wheel_count", "carriage_count")  # counts already
 SPEEDS = ("wheel_speed", "rim_speed", "carriage_speed")
+LEAST_COUNT = 1e-11  # [rad, m]: programs write sixteen digits of what no encoder resolves
 FINEST = 2.0**-40  # of its range: a finer count would not fit into 64 bits with room to spare
 LEAST = 0.3  # [count] standard deviation of what only rounds, and a little jitter
 
@@ -36,7 +37,7 @@ def quantum(runs: Sequence[SeriesRun], name: str, column: Mapped) -> float:
         step = values.resolution or spacing(values.numbers)
         time = run.interval if column.channel in SPEEDS else 1.0
         span = float(np.nanmax(np.abs(values.numbers), initial=0.0)) * time
-        found.append(max(step * time, span * FINEST, 1e-15))
+        found.append(max(step * time, span * FINEST, LEAST_COUNT / column.per_unit))
     return min(found)
 
 

@@ -101,8 +101,8 @@ def _run(table: SeriesTable, seconds: Array, name: str, mapped: SeriesMap) -> Se
     if np.any(np.diff(seconds) <= 0.0):
         at = int(np.argmax(np.diff(seconds) <= 0.0))
         raise RigFileError(
-            f"{table.path}: {name}: found {seconds[at + 1]:.9g} s after {seconds[at]:.9g} s, with "
-            "other values; expected times that rise"
+            f"{table.path}: {name}: found {seconds[at + 1]:.15g} s after {seconds[at]:.15g} s, "
+            "with other values; expected times that rise"
         )
     run = SeriesRun(_info(table, name, mapped), table, seconds, repeated=int(again.sum()))
     return run if mapped.resample is None else _resampled(run, mapped.resample)

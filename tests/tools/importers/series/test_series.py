@@ -96,6 +96,20 @@ def test_rows_written_twice_count_once(tmp_path: Path, capsys: pytest.CaptureFix
     assert "with other values; expected times that rise" in said
 
 
+def test_sixteen_digits_of_a_speed_are_no_resolution(tmp_path: Path) -> None:
+    """Programs write every digit of a float; an encoder has counts of a size."""
+    rng, t = np.random.default_rng(1), np.arange(0.0, 5.0, 0.02)
+    speeds = 10.0 + 0.01 * rng.standard_normal(t.size)
+    rows = [f"{x!r},{rpm!r},60.0,3.0" for x, rpm in zip(t.tolist(), speeds.tolist(), strict=True)]
+    (tmp_path / "run.csv").write_text("\n".join(["t,rpm,v,M", *rows]))
+    output = imported(tmp_path, tmp_path / "run.csv")
+    scale = config.load(output / "csv.yaml").settings.channels["wheel_encoder"].calibration.scale
+    counts = read(output / "run.mcap").arrays("/raw/wheel_encoder")["count"]
+    turned = float(counts[-1] - counts[0]) * scale.value
+    assert scale.value >= 0.99e-11
+    assert turned == pytest.approx(np.trapezoid(speeds, t) * np.pi / 30, abs=1e-7)
+
+
 def test_a_header_without_rows_is_told(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("t,rpm,v,M\n")
     assert "found no rows" in complaint(DAMAGED, tmp_path / "run.csv", "--guess")

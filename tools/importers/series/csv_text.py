@@ -85,23 +85,26 @@ def _split(path: Path, text: Sequence[str], separator: str) -> Iterator[list[str
 
 
 def _names(path: Path, header: Sequence[str], body: Rows) -> dict[int, str]:
-    """The names of the columns by place; those that have neither name nor content are left out.
-    Raises RigFileError.
+    """The names of the columns by place. A column without a name, such as the index that pandas
+    writes, is called by its place; one without content too is left out. Raises RigFileError.
     """
     names = [name.strip() for name in header]
-    for name in names:
-        if name and names.count(name) > 1:
+    for number, row in enumerate(body, start=1):
+        if any(cell.strip() for cell in row[len(names) :]):
             raise RigFileError(
-                f"{path}: found the column {name!r} twice; expected each column with its own name"
+                f"{path}: line {number} below the header: found {len(row)} fields; "
+                f"expected {len(names)}"
             )
 
-    named = {at: name for at, name in enumerate(names) if name}
-    for number, row in enumerate(body, start=1):
-        if any(cell.strip() for at, cell in enumerate(row) if at not in named):
-            raise RigFileError(
-                f"{path}: found a column without a name, with content in line {number} below the "
-                "header; expected each column with its own name"
-            )
+    filled = {at for row in body for at, cell in enumerate(row[: len(names)]) if cell.strip()}
+    named = {
+        at: name or f"column {at + 1}" for at, name in enumerate(names) if name or at in filled
+    }
+    given = list(named.values())
+    if twice := next((name for name in given if given.count(name) > 1), ""):
+        raise RigFileError(
+            f"{path}: found the column {twice!r} twice; expected each column with its own name"
+        )
     return named
 
 

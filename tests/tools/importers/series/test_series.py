@@ -75,10 +75,18 @@ def test_empty_columns_and_separators_at_the_end_hold_nothing(tmp_path: Path) ->
     for name in ("named.csv", "rows.csv"):
         assert list(csv_text.read(tmp_path / name).columns) == ["t", "rpm", "v", "M"]
 
-    (tmp_path / "hidden.csv").write_text(
-        "\n".join([lines[0] + ",", *(f"{x},7" for x in lines[1:])])
-    )
-    assert "without a name" in complaint(DAMAGED, tmp_path / "hidden.csv", "--guess")
+    index = ["," + lines[0], *(f"{number},{line}" for number, line in enumerate(lines[1:]))]
+    (tmp_path / "pandas.csv").write_text("\n".join(index))
+    assert list(csv_text.read(tmp_path / "pandas.csv").columns) == [
+        "column 1",
+        "t",
+        "rpm",
+        "v",
+        "M",
+    ]
+
+    (tmp_path / "ragged.csv").write_text("\n".join([*lines, lines[-1] + ",7"]))
+    assert "found 5 fields; expected 4" in complaint(DAMAGED, tmp_path / "ragged.csv", "--guess")
 
 
 def test_rows_written_twice_count_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

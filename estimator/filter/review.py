@@ -31,10 +31,11 @@ from gritd.estimator.filter.track import (
 
 MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
 
-# What a tick does. A memory of 36 stretches is judged, linearised and passed in 19 of the 24 ticks
-# that lie between two windows at 250 Hz and 10 Hz.
-LINES = 3  # tangents, each about as long as an update
-PASSED = 8  # stretches of a pass, each an update without its tangent
+# What a tick does. A memory of 36 stretches is judged, linearised and passed in 14 of the 24 ticks
+# that lie between two windows at 250 Hz and 10 Hz. A change of the soil takes tangents three times
+# over, 36 ticks for a full memory: the rest is then done with the next window.
+LINES = 4  # tangents
+PASSED = 12  # stretches of a pass, each an update without its tangent
 
 
 class Reviewer:
@@ -100,22 +101,24 @@ class Reviewer:
         judgement = self._smoother.judgement(state.memory, state.trust.doubt)
         if judgement is None or not judgement.change:
             return self._weighed(state, task.same)
-        return self._restarted(state, state.memory.changed_at(judgement.change, state.estimate))
+        memory = state.memory.changed_at(judgement.change, state.estimate)
+        return self._restarted(state, memory, task.same)
 
-    def _restarted(self, state: TrackState, memory: Memory) -> TrackState:
-        """The state with a memory in which the soil changed."""
+    def _restarted(self, state: TrackState, memory: Memory, same: bool) -> TrackState:
+        """The state with a memory in which the soil changed: linearised where the estimate is, and
+        once more where that is a new condition and leads far.
+        """
         before = state.before
         varied = before is not None and slip_varies(memory, before.slip.sigma)
         state = state._replace(memory=memory, slip_varied=varied)
-        return state._replace(
-            trust=state.trust.changed(), task=Relining((self.estimates_k(state), state.estimate.x))
-        )
+        point = (self.estimates_k(state), state.estimate.x)
+        return state._replace(trust=state.trust.changed(), task=Relining(point, same))
 
     def _weighed(self, state: TrackState, same: bool) -> TrackState:
         """On one soil: linearised anew where the condition changes and the estimate has moved."""
         point = (self.estimates_k(state), state.estimate.x)
         anew = not same and self._moved(state.linearised, point)
-        return state._replace(task=Relining(point) if anew else None)
+        return state._replace(task=Relining(point, last=True) if anew else None)
 
     def _moved(self, before: Point | None, now: Point) -> bool:
         """Whether the state is so far from where the memory was linearised that its Jacobians no
@@ -132,7 +135,7 @@ class Reviewer:
         if len(lines) < len(state.memory.stretches):
             return state._replace(task=task._replace(lines=lines))
         memory = state.memory.along(lines)
-        return state._replace(memory=memory, task=Passing(task.point, memory.anchor))
+        return state._replace(memory=memory, task=Passing(task.point, task.last, memory.anchor))
 
     def _more(self, memory: Memory, x: Vector, lines: tuple[Line, ...]) -> tuple[Line, ...]:
         """A share of the tangents at x (3,) more."""
@@ -148,11 +151,11 @@ class Reviewer:
         )
         stretches = (*task.stretches, *stretches)
         if len(stretches) < len(state.memory.stretches):
-            return state._replace(task=Passing(task.point, estimate, stretches))
+            return state._replace(task=task._replace(estimate=estimate, stretches=stretches))
 
         memory = state.memory._replace(stretches=stretches)
         estimate = self._bounds.inside(estimate)
-        return state._replace(
+        state = state._replace(
             estimate=estimate,
             memory=memory,
             linearised=task.point,
@@ -160,3 +163,4 @@ class Reviewer:
             trust=self._bounds.stood(state.trust, estimate),
             task=None,
         )
+        return self._weighed(state, task.last)

@@ -10,6 +10,7 @@ from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.measurement import Columns
 from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.trust import Trust
+from gritd.estimator.messages.tick import Aid
 from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.wheel_state import WheelState
 
@@ -43,6 +44,7 @@ class Relining(NamedTuple):
     """The memory is linearised anew: its tangents so far."""
 
     point: Point
+    last: bool  # whatever the pass then finds, it is not linearised once more
     lines: tuple[Line, ...] = ()
 
 
@@ -50,11 +52,21 @@ class Passing(NamedTuple):
     """The filter runs over the memory that was linearised anew: the stretches it has been over."""
 
     point: Point
+    last: bool
     estimate: Estimate
     stretches: tuple[Stretch, ...] = ()
 
 
 Task = Ended | Judging | Again | Relining | Passing
+
+
+class Withheld(NamedTuple):
+    """The innovations of the window whose review is under way. They count towards the trust in the
+    estimate when it is complete: what a change of the soil explains is no surprise.
+    """
+
+    aids: tuple[Aid, ...]
+    elapsed: float  # [s] of driving since the window before
 
 
 class TrackState(NamedTuple):
@@ -76,6 +88,8 @@ class TrackState(NamedTuple):
     started: bool = False  # every required channel has filled a window once
     origin: float | None = None  # where the carriage stood in the first full window [m]
     task: Task | None = None  # of the review of the record that is under way
+    withheld: Withheld | None = None  # likewise
+    resets_told: int = 0  # of `resets`, those that a tick has flagged
 
 
 def slip_varies(memory: Memory, sigma: float) -> bool:

@@ -27,7 +27,7 @@ from gritd.estimator.filter.measurement import Measurement, selected, soil
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother
-from gritd.estimator.filter.track import Task, TrackState, slip_varies
+from gritd.estimator.filter.track import Task, TrackState, Withheld, slip_varies
 from gritd.estimator.filter.tuning import CHANGE, TRUST
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
@@ -104,7 +104,8 @@ class Tracker:
         """
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
         closes = state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window
-        state = self.reviewer.finished(state) if closes else self.reviewer.step(state)
+        if state.task is not None:
+            state = self.reviewed(state) if closes else self._concluded(self.reviewer.step(state))
 
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
@@ -116,7 +117,21 @@ class Tracker:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state, now, elapsed)
 
-        return state, self._account(state, snapshot, now, status, aids)
+        account = self._account(state, snapshot, now, status, aids)
+        if aids and state.resets != state.resets_told:
+            state = state._replace(resets_told=state.resets)
+        return state, account
+
+    def reviewed(self, state: TrackState) -> TrackState:
+        """The state with the review that is under way done at once."""
+        return self._concluded(self.reviewer.finished(state))
+
+    def _concluded(self, state: TrackState) -> TrackState:
+        """When the review is complete, what the innovations of its window say of the estimate."""
+        if state.task is not None or state.withheld is None:
+            return state
+        trust = state.trust.surprised(*state.withheld)
+        return self._set_back(state._replace(trust=trust, withheld=None))
 
     def _account(
         self,
@@ -165,32 +180,32 @@ class Tracker:
         """Walk over the elapsed time, gate, update, remember; where a stretch ends, begin a review
         of the record.
         """
-        state = self._set_back(
-            state._replace(columns=now.columns, trust=state.trust.passed(elapsed))
-        )
-        walked = self.smoother.walked(state.estimate, elapsed, state.trust.unrest)
+        trust = state.trust.passed(elapsed)
+        walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
 
         update = self.measurement.linearise(now, self.measurement.predict(walked, now))
         aids = self._gate(walked, now, update)
         taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
-        estimate, trust = walked, state.trust
+        estimate = walked
         if taken:
             update = selected(update, taken)
             estimate = self.engine.update(walked, update, not self.reviewer.estimates_k(state))
             estimate = self._bounds.inside(estimate)
             trust = self._bounds.stood(trust, estimate, elapsed)
 
-        memory, task = self._remembered(state, now, taken, elapsed)
+        memory, task = self._remembered(state, now, taken, elapsed, trust.unrest)
         state = state._replace(
             estimate=estimate,
+            columns=now.columns,
             memory=memory,
             slip_varied=state.slip_varied or slip_varies(memory, now.slip.sigma),
             unlinearised=state.unlinearised + 1,
-            trust=trust.surprised(aids, elapsed),
+            trust=trust.surprised(aids, elapsed) if task is None else trust,
             updates=state.updates + bool(taken),
             task=task,
+            withheld=None if task is None else Withheld(aids, elapsed),
         )
-        return state, aids
+        return (self._set_back(state) if task is None else state), aids
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate, variances = self.settings.filter.gate, self.measurement.variances
@@ -204,11 +219,16 @@ class Tracker:
         return tuple(aids)
 
     def _remembered(
-        self, state: TrackState, now: WheelState, taken: tuple[int, ...], elapsed: float
+        self,
+        state: TrackState,
+        now: WheelState,
+        taken: tuple[int, ...],
+        elapsed: float,
+        unrest: float,
     ) -> tuple[Memory, Task | None]:
         """The memory with one more window; where a stretch ends, a review of the record begins."""
         radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
-        memory, begun = state.memory.extended(now, taken, radius, elapsed, state.trust.unrest)
+        memory, begun = state.memory.extended(now, taken, radius, elapsed, unrest)
         if not begun or not before:
             return memory, None
         return memory, self.reviewer.begun(before[0].like(now, taken), state.unlinearised + 1)
@@ -250,7 +270,7 @@ class Tracker:
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
             + Flag.K_ESTIMATED * self.reviewer.estimates_k(state)
             + Flag.GATED * (not all([aid.accepted for aid in aids]))
-            + Flag.RESET * (bool(aids) and trust.since_reset == 0.0)
+            + Flag.RESET * (bool(aids) and state.resets > state.resets_told)
             + Flag.MISMATCH * disagrees
             + Flag.CHANGED * (trust.since_change < CHANGE.settled)
             + Flag.TORQUE_OFF * (disagrees and torque >= drawbar_pull)

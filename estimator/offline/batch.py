@@ -143,7 +143,7 @@ def followed(
                 rows, flags = [], account.flags
             advance(done, len(chosen))
 
-    state = tracker.reviewer.finished(state)
+    state = tracker.reviewed(state)
     return Replayed(
         np.concatenate(tables),
         state.estimate,

@@ -57,7 +57,12 @@ def carry_over(pipeline: Pipeline, state: State, before: Settings) -> State:
     recall = {name: old.recall.get(name, value) for name, value in fresh.track.recall.items()}
     origin = None if old.origin is None else _read_anew(old.origin, before, pipeline.settings)
     track = fresh.track._replace(
-        updates=old.updates, resets=old.resets, began=old.began, recall=recall, origin=origin
+        updates=old.updates,
+        resets=old.resets,
+        resets_told=old.resets,
+        began=old.began,
+        recall=recall,
+        origin=origin,
     )
     if pipeline.settings.soil == before.soil:
         track = _kept(track, state.track)

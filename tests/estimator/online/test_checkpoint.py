@@ -59,7 +59,7 @@ def test_a_state_read_back_goes_on_to_the_same_bits(consumed, at):
 
 
 def test_a_state_of_an_older_version_may_lack_the_last_fields(consumed):
-    """Of TrackState `origin`: the place counts from there on; and `task`."""
+    """Of TrackState `origin`: the place counts from there on; and what a review holds."""
     pipeline = Pipeline(SETTINGS)
     state, _ = run(pipeline, pipeline.start(), consumed[:333])
     parts = json.loads(checkpoint.encode(state))
@@ -68,11 +68,13 @@ def test_a_state_of_an_older_version_may_lack_the_last_fields(consumed):
         for item in parts["rest"]
         if isinstance(item, dict) and "TrackState" in item
     )
-    track.pop()
+    del track[-3:]
     assert track.pop() == state.track.origin
     restored = checkpoint.decode(json.dumps(parts), pipeline.settings)
-    assert restored.track == state.track._replace(origin=None, task=None)
-    track += [None, None, 1]
+    assert restored.track == state.track._replace(
+        origin=None, task=None, withheld=None, resets_told=0
+    )
+    track += [None, None, None, 0, 1]
     with pytest.raises(ValueError, match="not a state of this configuration"):
         checkpoint.decode(json.dumps(parts), pipeline.settings)
 

@@ -53,7 +53,7 @@ def test_spread_over_ticks_or_at_once_a_window_leaves_the_same(consumed, monkeyp
 
 
 def test_no_tick_between_windows_takes_more_than_its_share_of_tangents(consumed, monkeypatch):
-    """A tick that closes a window takes what is left, which one change of the soil can leave."""
+    """Nor is anything left for a tick that closes a window, with a memory as short as this."""
     taken, line_of = [], smoother.line_of
 
     def counted(*arguments):
@@ -70,8 +70,8 @@ def test_no_tick_between_windows_takes_more_than_its_share_of_tangents(consumed,
         closed = state.track.window_end != before.track.window_end
         (closing if closed else between).append(len(taken))
     assert max(between) == review.LINES
-    assert sum(count > 0 for count in between) > 30
-    assert sum(count > 0 for count in closing) <= 2
+    assert sum(count > 0 for count in between) > 20
+    assert not any(closing)
 
 
 def test_the_estimate_stays_what_the_window_left_until_the_review_is_complete(consumed):

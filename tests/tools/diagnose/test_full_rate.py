@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,6 +110,23 @@ def test_a_gear_that_the_grid_does_not_hold_is_named(order: float) -> None:
     assert known["ripple_sin"].value == pytest.approx(0.05, abs=0.01)
     assert not any("ripple" in note for note in found.caveats)
     assert [line.at for line in found.lines] == [pytest.approx(order, abs=0.05)]
+
+
+@pytest.mark.slow
+def test_a_gear_is_named_where_the_encoder_begins_anew_each_run() -> None:
+    made = record_fully(plan(), _ripple(50.0))  # type: ignore[arg-type]
+    turned = []
+    for number, (known, full) in enumerate(made):
+        zero = 0.9 * number
+        time, angle = full["wheel_encoder"]
+        full = {**full, "wheel_encoder": (time, angle + zero)}
+        turned.append((replace(known, wheel_angle=known.wheel_angle + zero), full))
+
+    signals, reads = zip(*turned, strict=True)
+    beside, lines = beside_lines(signals, [lambda read=read: read for read in reads], 2.0)
+    found = diagnose(WheelRig(beside, settings(), lines=lines), quick=True)
+    assert [h.effect for h in found.accepted] == ["gear_ripple"]
+    assert any("begins at other angles" in note for note in found.caveats)
 
 
 @pytest.mark.slow

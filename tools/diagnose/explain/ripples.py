@@ -66,7 +66,14 @@ def late(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
 
 
 def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
-    """A sentence for new ripples that no accepted effect has, and one for vibrations."""
+    """Sentences for new ripples that no accepted effect has, for vibrations, and where ripples
+    aligned the runs.
+    """
+    if rig.lines.aligned:
+        yield (
+            "The wheel's encoder begins at other angles from run to run: a ripple of"
+            f" {rig.lines.aligned:.2f} a turn aligned the runs."
+        )
     named = [order for effect in accepted if (order := _order(effect)) is not None]
     ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
     if ripples:

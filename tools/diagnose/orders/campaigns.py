@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,10 +16,13 @@ Runs = Sequence[Mapping[str, Samples]]
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of the new campaign and of the reference, which may be none."""
+    """Lines of the new campaign and of the reference, which may be none. aligned: the ripples a
+    turn by which the wheel angles of the new runs were aligned (phases.py); 0 where they were not.
+    """
 
     new: tuple[Line, ...] = ()
     reference: tuple[Line, ...] = ()
+    aligned: float = 0.0
 
     @property
     def every(self) -> tuple[Line, ...]:
@@ -32,7 +35,7 @@ class Lines:
         def told(lines: Sequence[Line]) -> tuple[Line, ...]:
             return tuple(x.scaled(channel, scale) if x.channel == name else x for x in lines)
 
-        return Lines(told(self.new), told(self.reference))
+        return replace(self, new=told(self.new), reference=told(self.reference))
 
     def of(self, channel: str) -> list[Line]:
         """All lines of a channel, those of both campaigns once."""

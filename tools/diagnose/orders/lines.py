@@ -224,12 +224,22 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
         at = first.refined(axis, place)
         support = sum(channel.support(axis, at) for channel in channels)
         for channel in (first, *(c for c in channels if c is not first)):
-            tries = tried if channel is first else len(channels)
+            tries = tried if channel is first else TUNING.orders.near_places * len(channels)
             log_p = (chance if channel is first else channel.near(axis, at)) + np.log(tries)
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
-                found += [] if _rest(line, found) else [line]
+                found += [] if _rest(line, found) else [line, *_overtones(channel, line, len(runs))]
     return tuple(_with_harmonics(found, channels))
+
+
+def _overtones(channel: _Channel, line: Line, runs: int) -> Iterator[Line]:
+    """Harmonics of a line, which few places need be tried for."""
+    times = range(2, TUNING.orders.harmonics + 1)
+    for at in (k * line.at for k in times):
+        log_p = channel.near(line.axis, at) + np.log(TUNING.orders.near_places * len(times))
+        if log_p <= np.log(TUNING.orders.level):
+            at = channel.refined(line.axis, round(at / channel.places[line.axis].spacing))
+            yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
 
 
 def _rest(line: Line, found: Sequence[Line]) -> bool:

@@ -14,7 +14,9 @@ from gritd.estimator.offline.windows import block_mean
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
+from gritd.tools.diagnose.orders.lines import Line
 from gritd.tools.diagnose.orders.on_grid import on_grid
+from gritd.tools.diagnose.orders.phases import guide, shifts
 from gritd.tools.diagnose.orders.stretches import Motion, Samples, Series, steady_samples
 from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.signals import Signals, series_of
@@ -48,6 +50,9 @@ def beside_lines(
     if not found.every:
         return list(signals), found
     beside = [restored(known, read(), found) for known, read in pairs]
+    line = guide(found)
+    beside[reference:] = aligned(beside[reference:], line)
+    found = replace(found, aligned=line.at if line else 0.0)
     return beside, found.renamed("current", "torque", torque_constant)
 
 
@@ -74,6 +79,16 @@ def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
         less, ripple = on_grid(lines.of(name), motion, angle, read, signals.time)
         analogue[name] = block_mean(*less, edges) + ripple
     return replace(signals, analogue=analogue)
+
+
+def aligned(signals: Sequence[Signals], line: Line | None) -> list[Signals]:
+    """Runs of the new campaign with wheel angles that count from one angle, as a ripple tells."""
+    if line is None:
+        return list(signals)
+    moved = shifts(line).tolist()
+    return [
+        replace(s, wheel_angle=s.wheel_angle + by) for s, by in zip(signals, moved, strict=True)
+    ]
 
 
 def _motion(signals: Signals) -> Motion:

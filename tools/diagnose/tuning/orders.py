@@ -57,7 +57,13 @@ class Orders:
     behind: float = tuned(10.0, "nats", "of support: orders so far behind the best are no count")
     apart_sigma: float = tuned(4.0, "σ", "of their places: closer lines are one")
     known: float = tuned(0.5, "-", "of a line's size: of as much in the reference it is not new")
+    near_places: float = tuned(3.0, "places", "that are tried about a known one")
     harmonics: int = tuned(6, "times", "the order of a louder line: its harmonic")
+
+    # --- phases.py ---
+    two_speeds: float = tuned(1.2, "-", "fastest over slowest: one speed cannot tell a ripple")
+    out_of_step: float = tuned(0.6, "rad", "of a ripple: runs that differ by less begin alike")
+    sure_phase: float = tuned(6.0, "σ", "of a ripple in a run, whose phase then is known")
 
     # --- latency.py ---
     lag_rate: float = tuned(50.0, "Hz", "grid on which lags are told", "run time")

@@ -88,3 +88,16 @@ def test_a_wheel_that_stands_or_speeds_up_is_not_steady() -> None:
     assert len(spans) == 2
     assert 2.5 < spans[0][0] < 3.4 and 5.4 < spans[0][1] < 6.0
     assert 7.0 < spans[1][0] < 7.6 and 8.9 < spans[1][1] < 10.0
+
+
+def test_a_hub_that_lifts_once_a_turn_is_a_line_where_the_run_is_long() -> None:
+    """Twelve turns; in sinkage alone."""
+    rng = np.random.default_rng(9)
+    run = {
+        "sinkage": readings(rng, ripple=(0.2, 0.3, 1.0), seconds=300.0),
+        "torque": readings(rng, seconds=300.0),
+    }
+    (line,) = find_lines([run])
+    assert (line.channel, line.axis) == ("sinkage", "angle")
+    assert abs(line.at - 1.0) < 4.0 * line.sigma
+    assert line.size == pytest.approx(np.hypot(0.2, 0.3), rel=0.1)

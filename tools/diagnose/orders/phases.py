@@ -1,0 +1,60 @@
+"""The angle at which the encoder of each run begins, told by a ripple of the wheel.
+
+An incremental encoder counts from where it was switched on. Runs of another day then ripple with
+another phase, though gear or lugs are the same. The phases of one sure ripple tell the difference,
+up to a whole tooth or lug.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.orders.campaigns import Lines
+from gritd.tools.diagnose.orders.lines import Line
+from gritd.tools.diagnose.orders.stretches import TURN
+from gritd.tools.diagnose.orders.wave import Amplitude
+from gritd.tools.diagnose.tuning import TUNING
+
+
+def guide(lines: Lines) -> Line | None:
+    """The ripple by which the runs of the new campaign are aligned; None where they are already, or
+    where one speed alone cannot tell it from a vibration.
+    """
+    found = [line for line in lines.fresh() if line.p < TUNING.screen.line and _at_speeds(line)]
+    if not found:
+        return None
+    best = max(found, key=lambda line: (line.support, -line.p))
+    apart = [abs(turn) for turn in _turns(best)]
+    return best if max(apart, default=0.0) > TUNING.orders.out_of_step else None
+
+
+def shifts(line: Line) -> Array:
+    """To be added to the wheel's angle of each run (r,) [rad]; 0 where the run does not tell."""
+    return np.array(_turns(line)) / line.at
+
+
+def _at_speeds(line: Line) -> bool:
+    low, high = line.frequency
+    return high > TUNING.orders.two_speeds * low
+
+
+def _turns(line: Line) -> list[float]:
+    """By what the ripple of each run is behind that of the surest one [rad of the ripple]."""
+    surest = max((a for a in line.amplitudes if a is not None), key=lambda a: a.size / a.sigma)
+    return [
+        _wrapped(_phase(surest) - _phase(a)) if a is not None and _sure(a) else 0.0
+        for a in line.amplitudes
+    ]
+
+
+def _phase(a: Amplitude) -> float:
+    return float(np.arctan2(a.sin, a.cos))
+
+
+def _sure(a: Amplitude) -> bool:
+    return a.size > TUNING.orders.sure_phase * a.sigma
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + 0.5 * TURN) % TURN - 0.5 * TURN)

@@ -182,14 +182,14 @@ class Memory(NamedTuple):
         """The memory with the latest two neighbours joined that are of one condition and old
         enough.
         """
-        after = 0
-        for at in range(len(self.stretches) - 2, 0, -1):
-            left, right = self.stretches[at - 1 : at + 1]
+        after, stretches = 0, self.stretches
+        for at in range(len(stretches) - 2, 0, -1):
+            left, right = stretches[at - 1], stretches[at]
             allowed = min(LONGEST, after // AGEING)
             if left.windows + right.windows <= allowed and _alike(left, right):
                 joined = left.joined(right, radius)
-                rest = self.stretches[at + 1 :]
-                return self._replace(stretches=(*self.stretches[: at - 1], joined, *rest))
+                rest = stretches[at + 1 :]
+                return self._replace(stretches=(*stretches[: at - 1], joined, *rest))
             after += right.windows
         return self
 

@@ -7,18 +7,20 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
 
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
-own, since another formula shares the effect out among the channels in another way. A ripple may
-also have other harmonics. What the parameters of the model's effects can do is taken out of all
-this, so that a strength is what its effect does on the whole. ρ is how far published forms differ;
-its prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
-never told as if it were exact: where the soil can absorb most of an effect, another form of it
-changes the soil and hardly the fit.
+own, since another formula shares the effect out among the channels in another way. What an effect
+does may follow slip and load over an arc of rolling, and build up where each run begins: soil has
+to move first. A ripple may also have other harmonics. What the parameters of the model's effects
+can do is taken out of all this, so that a strength is what its effect does on the whole. ρ is how
+far published forms differ; its prior is over 0 to 40 %. Our own form may be the best one to name an
+effect by, but the soil is never told as if it were exact: where the soil can absorb most of an
+effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import shares
@@ -46,6 +48,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
+            columns = np.column_stack((columns, _following(stack, added)))
             columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
             found.append(freedom(effect.name, columns, noise, bending_sizes(), least))
@@ -57,6 +60,24 @@ def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)
     return fitted.predicted - stack.predict(fitted.u, others)
+
+
+def _following(stack: Stack, added: Array) -> Array:
+    """What is still wanting of an effect (N, m) that follows slip and load over an arc of rolling,
+    and of one that begins where each run begins.
+    """
+    group = np.asarray(stack.run * len(stack.rig.channels) + stack.channel, dtype=float)
+    begins = run_begins(group, stack.size)
+    angle = stack.covariate("wheel_angle")
+    turned = np.where(begins, 0.0, np.abs(np.diff(angle, prepend=angle[0])))
+    rolled = np.cumsum(turned)
+    rolled -= rolled[begins][np.cumsum(begins) - 1]
+
+    columns = []
+    for arc in TUNING.fit.following_arcs:
+        share = -np.expm1(-turned / arc)
+        columns += [followed(added, share, group) - added, -added * np.exp(-rolled / arc)]
+    return np.column_stack(columns)
 
 
 def _beside(noise: Noise, columns: Array, fitted: Fitted) -> Array:

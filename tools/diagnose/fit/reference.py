@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.base import BaseFit, refit_beside
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.shared import rippling_columns, shared_columns, shared_freedoms
 from gritd.tools.diagnose.noise.colour import Noise
-from gritd.tools.diagnose.noise.estimate import estimate_of_reference, louder
+from gritd.tools.diagnose.noise.estimate import estimate_of_reference, louder, restless
 from gritd.tools.diagnose.noise.saturated import Explainable
 
 
@@ -38,7 +38,7 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
     found = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
-    noise = louder(noise, found)
+    noise = restless(louder(noise, found), stack.measured - predicted)
     return refit_beside(again, noise, shared_freedoms(noise, shared, ripples))
 
 

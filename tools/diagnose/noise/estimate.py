@@ -132,6 +132,39 @@ def louder(one: Noise, other: Noise) -> Noise:
     )
 
 
+def restless(noise: Noise, residual: Array) -> Noise:
+    """Where a residual (N,) differs from one value to the next by more than the noise does, the
+    noise is larger: rough going, a stick and slip, a run of larger forces.
+
+    A reference campaign tells the noise of what it did; what is new may be rougher, and a fit would
+    follow its roughness. Slow misfits hardly change such differences.
+    """
+    stack, louder_by = noise.stack, np.ones(noise.stack.size)
+    for channel, number in stack.parts:
+        index = np.flatnonzero(stack.of(channel) & (stack.run == number))
+        colour = noise.colours[stack.rig.channels.index(channel)]
+        louder_by[index] = _restlessness(residual[index], stack.gaps[index], colour)
+
+    sigma = np.array([c.sigma for c in noise.colours])[stack.channel]
+    more = sigma * np.sqrt(louder_by**2 - 1.0)
+    return replace(noise, uncertain=np.hypot(noise.uncertain, more))
+
+
+def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:
+    """By what the noise is larger about each value (n,); 1 where it is hardly larger."""
+    tuned = TUNING.noise
+    if residual.size < tuned.restless_values:
+        return np.ones(residual.size)
+    kept_slow = np.exp(-step_of(gaps) / colour.time)
+    kept_fast = np.exp(-1.0 / tuned.fast_time)
+    shared = colour.slow * kept_slow + colour.fast * kept_fast
+    usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, tuned.restless_least))
+
+    differences = np.abs(np.diff(residual, prepend=residual[0]))
+    about = 1.4826 * median_filter(differences, tuned.restless_values, mode="nearest") / usual
+    return np.where(about > tuned.restless, about, 1.0)
+
+
 def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
     """Values of a channel that are hardly noisier than it is; at least half of them."""
     own = stack.of(channel)

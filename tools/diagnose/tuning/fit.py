@@ -33,6 +33,10 @@ class Fit:
         (0.2, 0.3, 0.35, 0.15), "prior", "probability of each of the sizes", FORMS
     )
 
+    following_arcs: tuple[float, ...] = tuned(
+        (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
+    )
+
     # --- descent.py ---
     gain: float = tuned(0.005, "nats", "a step that would gain less ends the descent")
     near: float = tuned(1.0, "nats", "a good step that gains less leaves the slopes as they are")

@@ -50,6 +50,11 @@ class Noise:
         6.0, "σ", "from the median of its neighbours: such a value counts as much less certain"
     )
     spike_neighbours: int = tuned(5, "values", "whose median tells a spike")
+    restless: float = tuned(
+        1.5, "-", "times the noise's differences from value to value: the noise is larger there"
+    )
+    restless_values: int = tuned(41, "values", "whose median tells how the differences are there")
+    restless_least: float = tuned(0.05, "share", "of the noise that differs from value to value")
     floor: float = tuned(
         1e-5, "-", "of a channel's size: no noise is below it, simulations need a scale"
     )

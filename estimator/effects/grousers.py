@@ -73,7 +73,7 @@ class Grousers(Effect):
     )
     confusable_with = told_apart(
         gear_ripple="load_step",
-        wheel_eccentricity="lifted_spin",
+        wheel_eccentricity="load_step",
         wheel_radius_error="tape",
         slip_sinkage="smooth_wheel",
     )

@@ -152,17 +152,17 @@ def restless(noise: Noise, residual: Array) -> Noise:
 
 def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:
     """By what the noise is larger about each value (n,); 1 where it is hardly larger."""
-    tuned = TUNING.noise
-    if residual.size < tuned.restless_values:
+    if residual.size < TUNING.noise.restless_values:
         return np.ones(residual.size)
     kept_slow = np.exp(-step_of(gaps) / colour.time)
-    kept_fast = np.exp(-1.0 / tuned.fast_time)
+    kept_fast = np.exp(-1.0 / TUNING.noise.fast_time)
     shared = colour.slow * kept_slow + colour.fast * kept_fast
-    usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, tuned.restless_least))
+    usual = colour.sigma * np.sqrt(2.0 * max(1.0 - shared, TUNING.noise.restless_least))
 
     differences = np.abs(np.diff(residual, prepend=residual[0]))
-    about = 1.4826 * median_filter(differences, tuned.restless_values, mode="nearest") / usual
-    return np.where(about > tuned.restless, about, 1.0)
+    about = median_filter(differences, TUNING.noise.restless_values, mode="nearest")
+    larger = 1.4826 * about / usual
+    return np.where(larger > TUNING.noise.restless, larger, 1.0)
 
 
 def _steady(stack: Stack, channel: str, before: Noise) -> Bools:

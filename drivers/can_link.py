@@ -8,18 +8,19 @@ import os
 import socket
 import stat
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
 import can
 
 from gritd.drivers.errors import DeviceError
-from gritd.drivers.framing_can import ERROR, EXTENDED, REMOTE, pack
+from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, pack
 from gritd.drivers.link import POLL, Chunk, Clock
+from gritd.drivers.port import Port
+from gritd.drivers.slcan import LONGEST_LINE, SlcanLines
 from gritd.estimator.config.settings import Device
 
-LONGEST_LINE = 4096  # [bytes] of slcan; a message takes 32
 # [bytes] asked of the kernel, so that a burst waits there instead of being lost
 RECEIVE_BUFFER = 1 << 20
 
@@ -28,6 +29,9 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "udp_multicast": {"hop_limit": 0},  # never leaves this machine
     "slcan": {"sleep_after_open": 0.1},  # the library's 2 s would outlast a stop
 }
+
+
+Decode = Callable[[bytes], tuple[bytes, int]]  # bytes read -> messages packed, messages damaged
 
 
 class CanLink:
@@ -45,6 +49,7 @@ class CanLink:
         self._filters = filters
         self._clock = clock
         self._bus: can.BusABC | None = None
+        self._direct: tuple[Port, Decode] | None = None  # past python-can, which is slower
 
     def open(self) -> None:
         device = self._device
@@ -67,18 +72,29 @@ class CanLink:
             raise DeviceError(device.name, f"cannot open {where}: {_reason(error)}") from None
 
         _enlarge_receive_buffer(bus)
-        self._bus = bus
+        self._bus, self._direct = bus, self._past(bus)
+
+    def _past(self, bus: can.BusABC) -> tuple[Port, Decode] | None:
+        """How to read an open bus without python-can; None where that is not known."""
+        with suppress(Exception):  # an adapter that is reached over a network has no descriptor
+            if self._device.interface == "socketcan":
+                return Port(bus.fileno()), of_kernel
+            if self._device.interface == "slcan":
+                return Port(bus.fileno()), SlcanLines(self._wanted()).decode
+        return None
+
+    def _wanted(self) -> frozenset[int]:
+        """The wanted identifiers, with their flag."""
+        return frozenset(
+            int(f["can_id"]) | (EXTENDED if f["extended"] else 0) for f in self._filters
+        )
 
     def read(self) -> Chunk | None:
         if self._bus is None:
             raise DeviceError(self._device.name, f"{self._device.channel} is not open")
 
         try:
-            message = self._bus.recv(POLL)
-            if message is None:
-                self._discard_endless()
-                return None
-            return Chunk(self._clock(), packed(message))
+            return self._take(*self._direct) if self._direct else self._receive(self._bus)
         except Exception as error:  # every backend has exceptions of its own
             if not _is_damage(self._device.interface, error):
                 raise DeviceError(
@@ -86,6 +102,19 @@ class CanLink:
                 ) from None
             self._discard_damage(error)
             return None
+
+    def _take(self, port: Port, decode: Decode) -> Chunk | None:
+        data, received = port.read(), self._clock()
+        messages, damaged = decode(data)
+        self.damaged += damaged
+        return Chunk(received, messages) if messages else None
+
+    def _receive(self, bus: can.BusABC) -> Chunk | None:
+        message = bus.recv(POLL)
+        if message is not None:
+            return Chunk(self._clock(), packed(message))
+        self._discard_endless()
+        return None
 
     def _discard_endless(self) -> None:
         """slcan keeps a line until it ends; one of a wrong baud rate never does."""
@@ -104,7 +133,7 @@ class CanLink:
                 self._bus._buffer.clear()  # type: ignore[attr-defined]
 
     def close(self) -> None:
-        bus, self._bus = self._bus, None
+        bus, self._bus, self._direct = self._bus, None, None
         if bus is None:
             return
         with suppress(Exception):  # a device that is gone cannot be told to stop
@@ -125,6 +154,17 @@ def packed(message: can.Message) -> bytes:
     if message.dlc != len(data) and not message.is_remote_frame:
         raise ValueError(f"length {message.dlc}, but {len(data)} bytes")
     return pack(message.arbitration_id | flags, data)
+
+
+def of_kernel(frame: bytes) -> tuple[bytes, int]:
+    """A message as the kernel gives it, struct can_frame or canfd_frame of linux/can.h; nothing of
+    no bytes. Raises struct.error where there are too few.
+    """
+    if not frame:
+        return b"", 0
+    can_id, length = HEAD.unpack_from(frame)
+    data = b"" if can_id & REMOTE else frame[HEAD.size : HEAD.size + length]
+    return pack(can_id, data), 0
 
 
 def _is_damage(interface: str, error: Exception) -> bool:

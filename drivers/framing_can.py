@@ -27,7 +27,7 @@ from gritd.drivers.framing import Counts, FieldValue, Frame, SequenceGap
 EXTENDED = 1 << 31
 REMOTE = 1 << 30
 ERROR = 1 << 29
-_HEAD = struct.Struct("<IB3x")
+HEAD = struct.Struct("<IB3x")
 
 COUNTERS = ("sequence", "cycle")
 DEVICE_TIME = "devicetime"
@@ -37,7 +37,7 @@ def pack(can_id: int, data: bytes) -> bytes:
     """One message as a chunk. can_id carries the flags EXTENDED, REMOTE, ERROR. Raises struct.error
     out of range.
     """
-    return _HEAD.pack(can_id, len(data)) + data
+    return HEAD.pack(can_id, len(data)) + data
 
 
 @dataclass
@@ -104,9 +104,9 @@ class CanFraming:
     def decode(self, chunk: bytes) -> list[Frame]:
         frames: list[Frame] = []
         at = 0
-        while len(chunk) - at >= _HEAD.size:
-            can_id, length = _HEAD.unpack_from(chunk, at)
-            data_at = at + _HEAD.size
+        while len(chunk) - at >= HEAD.size:
+            can_id, length = HEAD.unpack_from(chunk, at)
+            data_at = at + HEAD.size
             if data_at + length > len(chunk):
                 break
             frames += self._message(can_id, chunk[data_at : data_at + length])

@@ -11,6 +11,7 @@ import serial
 
 from gritd.drivers.errors import DeviceError
 from gritd.drivers.link import POLL, Chunk, Clock
+from gritd.drivers.port import Port
 
 # what pyserial lets through; SerialException is an OSError
 _FAILURES = (OSError, ValueError, TypeError, termios.error)
@@ -28,22 +29,21 @@ class SerialLink:
         self._baud = baud
         self._clock = clock
         self._port: serial.Serial | None = None
+        self._bytes: Port | None = None
 
     def open(self) -> None:
         try:
             self._port = serial.Serial(self._path, self._baud, timeout=POLL, exclusive=True)
+            self._bytes = Port(self._port.fileno())
         except _FAILURES as error:
             raise DeviceError(self._device, f"cannot open {self._path}: {_reason(error)}") from None
 
     def read(self) -> Chunk | None:
-        if self._port is None:
+        if self._bytes is None:
             raise DeviceError(self._device, f"{self._path} is not open")
         try:
-            data = self._port.read(1)
-            if not data:
-                return None
-            data += self._port.read(self._port.in_waiting)
-            return Chunk(self._clock(), data)  # no byte of it came later
+            data = self._bytes.read()
+            return Chunk(self._clock(), data) if data else None  # no byte of it came later
         except _FAILURES as error:
             raise DeviceError(self._device, f"cannot read {self._path}: {_reason(error)}") from None
 
@@ -51,7 +51,7 @@ class SerialLink:
         if self._port is not None:
             with suppress(*_FAILURES):
                 self._port.close()
-        self._port = None
+        self._port = self._bytes = None
 
 
 def _reason(error: Exception) -> str:

@@ -6,8 +6,10 @@ line: to go on without it would change results in silence.
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint, EntryPoints
 
 EFFECTS, SENSORS, IMPORTERS = "gritd.effects", "gritd.sensors", "gritd.importers"  # the groups
 
@@ -19,11 +21,18 @@ class PluginError(Exception):
 def plugins(group: str) -> dict[str, Any]:
     """What the entry points of a group name, by their names, in order. Raises PluginError."""
     found: dict[str, Any] = {}
-    for entry in sorted(entry_points(group=group), key=lambda each: each.name):
+    for entry in sorted(_offered(group), key=lambda each: each.name):
         if entry.name in found:
             raise refused(group, entry.name, "found it twice; expected each name once")
         found[entry.name] = _loaded(entry)
     return found
+
+
+def _offered(group: str) -> EntryPoints:
+    # loaded here: it takes a fifth of the time in which a command without plug-ins ends
+    from importlib.metadata import entry_points
+
+    return entry_points(group=group)
 
 
 def _loaded(entry: EntryPoint) -> Any:
@@ -36,6 +45,6 @@ def _loaded(entry: EntryPoint) -> Any:
 
 def refused(group: str, name: str, why: str) -> PluginError:
     """The error for a plug-in that offers something else than was expected."""
-    named = [each for each in entry_points(group=group) if each.name == name]
+    named = [each for each in _offered(group) if each.name == name]
     packages = ", ".join(sorted({each.dist.name for each in named if each.dist})) or "unknown"
     return PluginError(f"plug-in {name} of {group} (package {packages}): {why}")

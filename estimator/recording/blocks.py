@@ -6,7 +6,7 @@ Every length is held against the lengths inside its record before it is believed
 
 from __future__ import annotations
 
-import zlib
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
@@ -16,6 +16,7 @@ import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
+from gritd.estimator.compiled.records import crc32
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.mcapfile import (
     MESSAGE_DTYPE,
@@ -91,11 +92,23 @@ class Texts:
 
 
 class Unpacker:
-    """Unpacks block after block with one zstd context, which costs as much as a small block."""
+    """Unpacks block after block with one zstd context, which costs as much as a small block, and
+    reads them into one piece of memory.
+    """
 
     def __init__(self) -> None:
+        self._packed = bytearray()
         self._zstd = zstandard.ZstdDecompressor(max_window_size=MAX_WINDOW)
         self._largest = int(limits().chunk)
+
+    def read(self, file: BinaryIO, start: int, size: int) -> memoryview:
+        """`size` bytes of the file from `start` on, or as many as there are; until the next
+        call.
+        """
+        if len(self._packed) < size:
+            self._packed = bytearray(1 << size.bit_length())  # seldom again
+        view = memoryview(self._packed)[:size]
+        return view[: os.preadv(file.fileno(), [view], start)]
 
     def whole(self, block: Block, data: memoryview) -> bytes | None:
         """The records of a block from its stored bytes, its checksum verified; None where it is not
@@ -107,7 +120,7 @@ class Unpacker:
             content = self._content(block, data)
         except (Damaged, zstandard.ZstdError):
             return None
-        if len(content) != block.size or (block.crc and zlib.crc32(content) != block.crc):
+        if len(content) != block.size or (block.crc and crc32(content) != block.crc):
             return None
         return content
 
@@ -135,7 +148,7 @@ def unpack(file: BinaryIO, block: Block) -> bytes:
     content = _decompress(block, file.read(block.stored))
     if len(content) != block.size:
         raise Damaged(f"unpacks to {len(content)} bytes instead of {block.size}")
-    if block.crc and zlib.crc32(content) != block.crc:
+    if block.crc and crc32(content) != block.crc:
         raise Damaged("its checksum does not hold")
     return content
 

@@ -8,7 +8,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from gritd.estimator.recording.blocks import Damaged, Texts
+from gritd.estimator.recording.blocks import Damaged, Texts, records
 from gritd.estimator.recording.cdr import CODES, TIME, Codec, Topic, parse_schema
 from gritd.estimator.recording.decoding import Source
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -44,6 +44,14 @@ class Definitions:
         else:
             self._channel(Texts(body))
         self._seen.add((opcode, body))
+
+    def known(self, preamble: bytes) -> bool:
+        """Whether these records are definitions, and each was met before, to the byte."""
+        try:
+            found = list(records(preamble))
+        except Damaged:
+            return False
+        return all((opcode, preamble[start:end]) in self._seen for opcode, start, end in found)
 
     def _schema(self, fields: Texts) -> None:
         schema = Schema(

@@ -2,20 +2,24 @@
 messages.
 
 A pile is opened only where all of it is as it should be: every block unpacks and its checksum
-holds, the message index names messages that lie end to end, each of them fits its fields. Where
-anything is not so the pile stays closed, and its blocks are read one by one, which tells what is
-wrong and keeps the rest.
+holds, messages lie end to end behind its definitions, each of them fits its fields. Where anything
+is not so the pile stays closed, and its blocks are read one by one, which tells what is wrong and
+keeps the rest.
+
+Compiled, the messages are walked from head to head. numpy, which cannot walk, takes their places
+from the message index and proves them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
 
+from gritd.estimator.compiled import records
 from gritd.estimator.limits import limits
 from gritd.estimator.recording.blocks import Block, Unpacker
 from gritd.estimator.recording.cdr import Rows
@@ -95,7 +99,59 @@ def opened(
 
     content = contents[0] if len(contents) == 1 else b"".join(contents)
     ends = np.cumsum([len(each) for each in contents])
-    bases = ends - [len(each) for each in contents]
+    found = (
+        _walked(content, ends, sources)
+        if records.BUILT
+        else _pointed(content, ends, indexes, sources)
+    )
+    if found is None:
+        return None
+
+    chunk, cuts = found
+    begins = (chunk.starts[cuts[:-1]] - _bases(ends)).tolist()
+    return Pile(chunk, cuts, tuple(c[:b] for c, b in zip(contents, begins, strict=True)))
+
+
+def _bases(ends: Starts) -> Starts:
+    """Where blocks begin that are joined and end there."""
+    return np.append(0, ends[:-1])
+
+
+def _walked(
+    content: bytes, ends: Starts, sources: Mapping[int, Source]
+) -> tuple[Chunk, Starts] | None:
+    """The messages of joined blocks that end at `ends`, and the cuts between them, by walking from
+    head to head.
+    """
+    sizes = np.full(max(sources, default=0) + 1, records.UNKNOWN, np.int64)
+    for channel, source in sources.items():
+        flat = source.codec is not None and source.codec.flat
+        sizes[channel] = source.codec.size if source.codec and flat else records.NOT_FIXED
+
+    found = records.walk(content, ends, sizes)
+    if found is None:
+        return None
+
+    starts, heads, cuts, numbers, counts = found
+    order = np.frombuffer(numbers, np.int64)
+    edges = pairwise(accumulate(counts.values(), initial=0))
+    groups = {channel: order[a:b] for channel, (a, b) in zip(counts, edges, strict=True)}
+    chunk = Chunk(content, np.frombuffer(starts, np.int64), np.frombuffer(heads, _HEAD), groups)
+
+    loose = (channel for channel in groups if sizes[channel] == records.NOT_FIXED)
+    if not all(np.all(sound(chunk, groups[channel], sources[channel])) for channel in loose):
+        return None
+    return chunk, np.frombuffer(cuts, np.int64)
+
+
+def _pointed(
+    content: bytes,
+    ends: Starts,
+    indexes: Sequence[tuple[int, memoryview]],
+    sources: Mapping[int, Source],
+) -> tuple[Chunk, Starts] | None:
+    """The same, where the message indexes point to."""
+    bases = _bases(ends)
     starts = _starts(indexes, bases, len(content))
     if starts is None:
         return None
@@ -108,11 +164,7 @@ def opened(
         return None
 
     chunk = Chunk(content, starts, heads)
-    if not _sound(chunk, sources):
-        return None
-
-    begins = (starts[cuts[:-1]] - bases).tolist()
-    return Pile(chunk, cuts, tuple(c[:b] for c, b in zip(contents, begins, strict=True)))
+    return (chunk, cuts) if _sound(chunk, sources) else None
 
 
 def _sound(chunk: Chunk, sources: Mapping[int, Source]) -> bool:
@@ -147,8 +199,7 @@ def _unpacked(
     reach = max(max(b.start + b.stored, b.index[1]) for b in blocks) - origin
     if reach > 2 * max(int(limits().chunk), REACH):
         return [], []
-    file.seek(origin)
-    packed = memoryview(file.read(reach))
+    packed = unpacker.read(file, origin, reach)
 
     contents, indexes = list[bytes](), list[tuple[int, memoryview]]()
     for number, block in enumerate(blocks):

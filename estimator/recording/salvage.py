@@ -198,12 +198,20 @@ class _Check:
         return True
 
     def _is_known(self, preamble: bytes) -> bool:
-        """Whether a chunk's definitions are, to the byte, those of a chunk before."""
+        """Whether a chunk's definitions are, to the byte, those of a chunk before or of the
+        index.
+        """
         if preamble != self._preamble:  # hashing takes longer
             if preamble not in self._preambles:
-                return False
+                if not self._definitions.known(preamble):
+                    return False
+                self._note(preamble)
             self._preamble = preamble
         return True
+
+    def _note(self, preamble: bytes) -> None:
+        if len(self._preambles) < MAX_PREAMBLES:
+            self._preambles.add(preamble)
 
     def _ends_within(self, blocks: Sequence[Block]) -> bool:
         """Whether reading might end inside a pile; `_ending` then says where."""
@@ -246,8 +254,8 @@ class _Check:
         self._waste += _COST * (len(starts) - len(chunk.starts))
         self._place(block, chunk)
         self._keep([block], alone(chunk))
-        if len(starts) and len(self._preambles) < MAX_PREAMBLES:
-            self._preambles.add(content[: int(starts[0])])
+        if len(starts):
+            self._note(content[: int(starts[0])])
 
     def _place(self, block: Block, chunk: Chunk) -> None:
         """Hold the messages' numbers against those before. Raises Damaged for a chunk that stands

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gritd.estimator.compiled import records
 from gritd.estimator.recording.cdr import BILLION, TIME, Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source
 from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, Starts, gather
@@ -40,14 +41,32 @@ class _Copy(NamedTuple):
     pieces: tuple[str, ...]  # fields of both
     times: tuple[tuple[str, str, str], ...]  # field of the row; seconds and nanoseconds in `record`
 
-    def into(self, rows: Rows, chunk: Chunk, own: Starts) -> None:
-        """Decode the messages numbered `own`, shape (n,), into n rows that lie side by side."""
-        records = gather(chunk.content, chunk.starts[own] + self.low, self.record)
+    def into(self, rows: Rows, chunk: Chunk, own: Starts, before: int) -> None:
+        """Decode the messages numbered `own`, shape (n,), into n rows that lie side by side;
+        `before` are in the file before the chunk.
+        """
+        rows["log_time"] = chunk.heads["log_time"][own]
+        rows["order"] = own + before
+        found = gather(chunk.content, chunk.starts[own] + self.low, self.record)
         target = rows.view(self.row)
         for name in self.pieces:
-            target[name] = records[name]
+            target[name] = found[name]
         for name, seconds, rest in self.times:
-            rows[name] = records[seconds].astype(np.int64) * BILLION + records[rest]
+            rows[name] = found[seconds].astype(np.int64) * BILLION + found[rest]
+
+
+class _CompiledCopy(NamedTuple):
+    """The same, where every piece is copied as it is."""
+
+    reach: int  # bytes of a record that are looked at
+    pieces: tuple[tuple[int, int, int], ...]  # place in the record, in the row, bytes
+    times: tuple[tuple[int, int, int], ...]  # place of the seconds, in the row, of the nanoseconds
+
+    def into(self, rows: Rows, chunk: Chunk, own: Starts, before: int) -> None:
+        """As `_Copy.into`."""
+        records.fill(
+            chunk.content, chunk.starts, own, rows, self.reach, before, self.pieces, self.times
+        )
 
 
 class Table:
@@ -60,7 +79,7 @@ class Table:
         kinds = dict(topic.codec.table_dtype)
         self.dtype = np.dtype([*KEYS, *((name, kinds[name]) for name in chosen)])
         self._names, self._whole = chosen, fields is None
-        self._copies: dict[int, _Copy] = {}
+        self._copies: dict[int, _Copy | _CompiledCopy] = {}
         self._used = 0
         try:
             self._rows = np.empty(expected, self.dtype)
@@ -84,17 +103,14 @@ class Table:
         groups = [chunk.groups[channel] for channel in channels]
         own = groups[0] if len(groups) == 1 else np.sort(np.concatenate(groups))
         rows = self._room(len(own))
-        rows["log_time"] = chunk.heads["log_time"][own]
-        rows["order"] = own + before
-
         for channel, group in zip(channels, groups, strict=True):
             copy = self._copy(channel, sources[channel])
             if len(groups) == 1:
-                copy.into(rows, chunk, own)
+                copy.into(rows, chunk, own, before)
                 continue
             places = np.searchsorted(own, group)
             some = rows[places]
-            copy.into(some, chunk, group)
+            copy.into(some, chunk, group, before)
             rows[places] = some
 
     def done(self) -> Rows:
@@ -112,12 +128,12 @@ class Table:
             self._rows.resize(self._used + self._used // 8, refcheck=False)
         return self._rows[start : self._used]
 
-    def _copy(self, channel: int, source: Source) -> _Copy:
+    def _copy(self, channel: int, source: Source) -> _Copy | _CompiledCopy:
         if channel not in self._copies:
             self._copies[channel] = self._copy_of(source)
         return self._copies[channel]
 
-    def _copy_of(self, source: Source) -> _Copy:
+    def _copy_of(self, source: Source) -> _Copy | _CompiledCopy:
         """By the places of the fields in the messages of a source, neighbours joined."""
         assert source.codec is not None
         record, pieces = source.codec.record_dtype(MESSAGE_HEAD.size), list[_Piece]()
@@ -135,6 +151,9 @@ class Table:
             kinds.append(_kind(record, part))
             offsets.append(_offset(record, part))
 
+        if records.BUILT and all(piece.kind == piece.row_kind for piece in pieces):
+            return self._compiled(record, pieces, times)
+
         names = [str(number) for number in range(len(pieces))]
         low = min(offsets)
         parts = [part for _, *both in times for part in both]
@@ -144,6 +163,19 @@ class Table:
             _dtype(names, [p.row_kind for p in pieces], [p.row_offset for p in pieces], self.dtype),
             tuple(names),
             tuple(times),
+        )
+
+    def _compiled(
+        self, record: np.dtype[np.void], pieces: list[_Piece], times: list[tuple[str, str, str]]
+    ) -> _CompiledCopy:
+        lengths = [np.dtype(piece.kind).itemsize for piece in pieces]
+        return _CompiledCopy(
+            record.itemsize,
+            tuple((p.offset, p.row_offset, n) for p, n in zip(pieces, lengths, strict=True)),
+            tuple(
+                (_offset(record, seconds), _offset(self.dtype, name), _offset(record, rest))
+                for name, seconds, rest in times
+            ),
         )
 
 

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import random
 import tracemalloc
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.records import Channel, Schema
 
+from gritd.estimator.compiled import records
 from gritd.estimator.limits import limits
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording import piles, salvage
 from gritd.estimator.recording.cdr import Topic
-from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, McapFile, RecordingError
+from gritd.estimator.recording.mcapfile import (
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    McapFile,
+    RecordingError,
+)
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.salvage import read
@@ -89,7 +96,11 @@ def test_an_intact_recording_is_read_in_piles(
     monkeypatch.setattr(salvage._Check, "_block", lambda *given: singly.append(1) or one(*given))
     write_sample(tmp_path / "a.mcap", 200, every=4)
     assert read(tmp_path / "a.mcap").complete
-    assert len(singly) == 1, "the first chunk alone tells what is new"
+    assert not singly, "the index defines every channel"
+
+    write_sample(tmp_path / "b.mcap", 200, every=4, close=False)
+    assert not read(tmp_path / "b.mcap").complete
+    assert len(singly) == 1, "without an index the first chunk alone tells what is new"
 
 
 def test_other_writers_files_are_read_in_piles_too(
@@ -213,3 +224,97 @@ def test_a_pile_reaches_no_further_than_it_may(tmp_path: Path) -> None:
     for blocks in recording._piles:
         assert len(blocks) == 1 or sum(block.size for block in blocks) <= piles.ROOM
     assert len(list(recording.chunks())) == 200
+
+
+compiled = pytest.mark.skipif(not records.BUILT, reason="gritd was installed without a compiler")
+
+
+@compiled
+@pytest.mark.parametrize("seed", range(12))
+def test_compiled_and_by_numpy_the_same_is_read_and_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    rng, path = random.Random(100 + seed), tmp_path / "a.mcap"
+    write_sample(path, 60, close=seed % 3 > 0, every=4)
+    whole = path.read_bytes()
+
+    for number in range(6):
+        path.write_bytes(damaged(whole, rng) if number else whole)
+        found = everything(path)
+        with monkeypatch.context() as patched:
+            patched.setattr(records, "BUILT", False)
+            assert everything(path) == found
+
+
+@compiled
+def test_compiled_and_by_numpy_other_writers_files_are_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_foreign(tmp_path / "a.mcap", 3000, chunk_size=4000)
+    write_two_channels(tmp_path / "b.mcap")
+    wanted = {"/mixed": ("stamp", "a")}
+
+    def both() -> object:
+        rows = read(tmp_path / "b.mcap", tables=wanted).tables(wanted)["/mixed"]
+        return everything(tmp_path / "a.mcap"), rows.tolist()
+
+    found = both()
+    monkeypatch.setattr(records, "BUILT", False)
+    assert both() == found
+
+
+@compiled
+def test_what_is_walked_is_held_against_its_bounds() -> None:
+    """Random bytes, lengths and ends: nothing, or messages that lie inside."""
+    rng, walked = random.Random(3), 0
+    sizes = np.array([records.UNKNOWN, 20, records.NOT_FIXED], np.int64)
+    for _ in range(20_000):
+        content = b"".join(some_record(rng) for _ in range(rng.randrange(1, 5)))
+        content = content[: rng.randrange(len(content) + 1)] if rng.random() < 0.2 else content
+        end = len(content) + rng.choice((0, 0, 0, -1, 5))
+        found = records.walk(content, np.array([end], np.int64), sizes)
+        if found is None:
+            continue
+        walked += 1
+        starts = np.frombuffer(found[0], np.int64)
+        assert end <= len(content) and starts[0] >= 0 and starts[-1] + 33 <= len(content)
+        assert sum(found[4].values()) == len(starts) == len(found[1]) // 33
+        assert set(found[4]) <= {1, 2}
+    assert 1000 < walked < 19_000
+
+
+def some_record(rng: random.Random) -> bytes:
+    """A message or a definition, more often right than wrong."""
+    opcode = rng.choices((5, 3, 4, 9), (20, 1, 1, 1))[0]
+    body = MESSAGE_HEAD.pack(opcode, 0, rng.choices((1, 2, 0, 7), (10, 4, 1, 1))[0], 0, 0, 0)[9:]
+    body += b"\x00\x01\x00\x00" + bytes(rng.choice((16, 16, 16, 18, 24, 60)))
+    length = rng.choices((len(body), rng.randrange(100), 1 << 63), (20, 1, 1))[0]
+    return RECORD_HEAD.pack(opcode, length) + body
+
+
+@compiled
+def test_what_is_copied_lies_within_its_record_and_its_row() -> None:
+    starts, own, rows = np.array([0]), np.array([0]), np.zeros(24, np.uint8)
+    given = (bytes(40), starts, own, rows, 40, 0)
+    records.fill(*given, ((32, 16, 8),), ())
+    for pieces, times in [
+        (((33, 16, 8),), ()),
+        (((32, 17, 8),), ()),
+        (((-1, 16, 8),), ()),
+        (((0, 0, -1),), ()),
+        ((), ((37, 16, 0),)),
+        ((), ((0, 17, 4),)),
+    ]:
+        with pytest.raises(ValueError, match="outside"):
+            records.fill(*given, pieces, times)
+    for own in (np.array([1]), np.array([-1])):
+        with pytest.raises(ValueError, match="outside its block"):
+            records.fill(bytes(40), starts, own, rows, 40, 0, (), ())
+
+
+def test_the_checksum_is_that_of_zlib() -> None:
+    rng = random.Random(4)
+    for size in (*range(200), 1000, 4097, 1 << 17):
+        data = rng.randbytes(size)
+        assert records.crc32(data) == zlib.crc32(data)
+        assert records.crc32(memoryview(data)[1:]) == zlib.crc32(data[1:])

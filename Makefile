@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
+JOBS   ?= 1
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
@@ -53,8 +54,8 @@ docs: $(READY) ## the generated parts of the documents
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their part of docs/proof.md
 	@$(BIN)/python -m gritd.tools.proof.real
 
-scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
-	@$(BIN)/python -m gritd.tools.dev.reliability
+scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page (JOBS=4: four at a time)
+	@$(BIN)/python -m gritd.tools.dev.reliability --jobs $(JOBS)
 
 coverage: $(READY) ## which branches of estimator and drivers the tests take; writes that part of docs/reliability.md
 	@$(BIN)/python -m gritd.tools.dev.coverage

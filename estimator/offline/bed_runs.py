@@ -10,6 +10,7 @@ from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.offline.batch import Replayed, replayed
 from gritd.estimator.online.bed import Known, after_run, before_run, surprise
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.recording import Recording
 
 Advance = Callable[[int, int], None]
@@ -39,7 +40,7 @@ def bed_runs(
     advance: Advance = lambda done, total: None,
 ) -> Iterator[BedRun]:
     """Each run, in the order given. A run that the filter does not believe adds nothing. Raises
-    RecordingError.
+    RecordingError, also where a run has no readings.
     """
     known: Known | None = None
     for settings, recording in runs:
@@ -47,6 +48,9 @@ def bed_runs(
         known = known or Known(prior, 0)
 
         alone = replayed(settings, recording, engine, None, advance)
+        if not len(alone.rows):
+            raise RecordingError(f"{recording.path}: holds no readings")
+
         start = before_run(known, repeatability)
         carried = alone
         if known.runs:

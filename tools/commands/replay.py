@@ -82,11 +82,15 @@ def _carried(paths: Sequence[Path], arguments: Namespace) -> int:
     engine = configurations[0].settings.filter.engine
     runs = []
     with Progress("replaying") as progress:
-        for run in bed_runs(
+        each = bed_runs(
             zip(given, recordings, strict=True), repeatability, engine, progress.reached
-        ):
-            runs.append(run)
-            print(report(run.recording.path, run.carried.rows, "windows"))
+        )
+        try:
+            for run in each:
+                runs.append(run)
+                print(report(run.recording.path, run.carried.rows, "windows"))
+        except RecordingError as error:
+            raise CommandError(error, DAMAGED) from None
 
     print("\n".join(["", *lines(runs, repeatability)]))
     return DAMAGED if any(recording.damage for recording in recordings) else DONE

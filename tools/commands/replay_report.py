@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isnan, sqrt
+from math import isfinite, isnan, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +38,19 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"  k          {last['shear_modulus'] * 1e3:.1f} ± "
             f"{last['shear_modulus_sigma'] * 1e3:.1f} mm",
             *_side_by_side(rows),
-            f"  σ          {honesty(float(last['consistency']))}: innovations squared over their "
-            f"variance {last['consistency']:.2f} in the last 2 s (1 where σ is honest, above "
-            f"{TRUST.mismatch:g} the model disagrees)",
+            f"  σ          {_honesty(float(last['consistency']))}",
         ]
+    )
+
+
+def _honesty(consistency: float) -> str:
+    """What the innovations say of σ."""
+    words = honesty(consistency)
+    if not isfinite(consistency):
+        return words
+    return (
+        f"{words}: innovations squared over their variance {consistency:.2f} in the last 2 s "
+        f"(1 where σ is honest, above {TRUST.mismatch:g} the model disagrees)"
     )
 
 

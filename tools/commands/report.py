@@ -49,8 +49,6 @@ def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign
         except RecordingError as error:
             raise CommandError(error, DAMAGED) from None
 
-    if not any(len(run.carried.rows) for run in runs):
-        raise CommandError(f"{recordings[0].path}: holds no readings", DAMAGED)
     made = lab.lab_runs(runs)
     return campaign.Campaign(
         given[0].testbed,

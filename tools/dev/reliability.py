@@ -1,5 +1,5 @@
 """docs/reliability.md from what the scenarios measure: `python -m gritd.tools.dev.reliability
-[--quick]`.
+[--quick] [--jobs J]`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from gritd.tools.cli.command import DONE, FAILED, Parser
+from gritd.tools.cli.command import DONE, FAILED, Parser, whole
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reliability.md"
@@ -102,6 +102,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--quick", action="store_true", help="without the long ones")
     parser.add_argument(
+        "--jobs", type=whole(1, 64), default=1, metavar="J", help="scenarios side by side"
+    )
+    parser.add_argument(
         "--figures", metavar="FILE", help="write the page from figures measured before"
     )
 
@@ -112,7 +115,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as folder:
         figures = Path(folder) / "figures.jsonl"
         began = time.monotonic()
-        if _run(figures, arguments.quick):
+        if _run(figures, arguments.quick, arguments.jobs):
             return FAILED
 
         print(f"all scenarios in {time.monotonic() - began:.0f} s")
@@ -141,8 +144,9 @@ def _write(path: Path) -> int:
     return FAILED if above else DONE
 
 
-def _run(figures: Path, quick: bool) -> int:
+def _run(figures: Path, quick: bool, jobs: int) -> int:
     chosen = "not slow" if quick else "slow or not slow"
+    side_by_side = ["-n", str(jobs), "--dist", "worksteal"] if jobs > 1 else []
     command = [
         sys.executable,
         "-m",
@@ -151,6 +155,7 @@ def _run(figures: Path, quick: bool) -> int:
         "-rs",
         "-m",
         chosen,
+        *side_by_side,
         str(ROOT / "tests" / "scenarios"),
     ]
 

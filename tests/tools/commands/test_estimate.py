@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 
 from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.run_writer import RunWriter
+from gritd.estimator.recording.topics import TOPICS
 from gritd.tools import main as cli
 from gritd.tools.commands import simulate
 from gritd.tools.dev import six_runs
@@ -83,6 +87,16 @@ def test_replay_carries_the_posterior_on(runs, capsys):
     carried = capsys.readouterr().out
     assert carried.count("filter updates") == 3 and "3 runs together" in carried
     assert cli.main(["replay", "--carry", "--verify", str(runs[0])]) == 2
+
+
+@pytest.mark.parametrize("command", [("estimate",), ("report",), ("replay", "--carry")])
+def test_a_recording_without_readings_is_one_line(tmp_path, capsys, command):
+    """A daemon that was stopped before its sensors spoke."""
+    empty = tmp_path / "empty.mcap"
+    RunWriter(empty, TOPICS, config.load(packaged()).text, RunInfo("empty", 60.0)).close()
+    out = ("-o", str(tmp_path / "page.html")) if command == ("report",) else ()
+    assert cli.main([*command, str(empty), *out]) == 3
+    assert capsys.readouterr().err == f"gritd: {empty}: holds no readings\n"
 
 
 @pytest.mark.slow

@@ -21,3 +21,15 @@ def test_a_soil_that_is_the_prior_is_said_to_be(flags, told):
     said = "  soil       the prior: the filter's own estimate is not believed at the end"
     assert (said in lines) == told
     assert any("MISMATCH" in line for line in lines) == told
+
+
+@pytest.mark.parametrize("consistency", [float("nan"), 1.25])
+def test_a_run_without_innovations_shows_no_figure_of_them(consistency):
+    rows = np.ones(3, dtype=[(name, "<f8") for name in TICK_NAMES])
+    rows["consistency"] = consistency
+    (line,) = (x for x in report(Path("a"), rows, "ticks").splitlines() if x.startswith("  σ "))
+    said = line.split(maxsplit=1)[1]
+    if np.isfinite(consistency):
+        assert "variance 1.25 in the last 2 s" in said
+    else:
+        assert said == "no innovations yet"

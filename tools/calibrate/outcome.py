@@ -48,6 +48,12 @@ class Outcome:
         ]
         return "\n".join([*self.lines, *rows, *(f"warning: {each}" for each in self.warnings)])
 
+    def serial(self, before: EditedYaml) -> str:
+        """Key and serial number that the configuration has of the sensor; '' where it has none."""
+        path = (*self.sensor, "serial")
+        number = before.written(*path) if self.sensor else ""
+        return f"{'.'.join(path)}: {number}" if number else ""
+
 
 def written(outcome: Outcome, document: EditedYaml, date: str, serial: str) -> str:
     """The text of the configuration with what was found."""

@@ -61,6 +61,8 @@ def main(argv: Sequence[str]) -> int:
     text = _text(outcome, configuration_file.edited(source), arguments)
     backup = configuration_file.save(text, source, place)
     print(f"written: {place}" + (f"; as it was: {backup}" if backup else ""))
+    if not arguments.serial and (kept := outcome.serial(before)):
+        print(f"{kept}: kept beside the new date; --serial N states another sensor's")
     return DONE
 
 

@@ -210,7 +210,11 @@ def test_the_configuration_gets_value_sigma_date_and_serial_number(
     options += ["--known-sigma", "0.01 mm", "--serial", "LP-7", "--date", "2026-11-22"]
     assert main(["pot", *options, "--in-place"]) == 0
     said = capsys.readouterr().out
-    assert "(was 25 mm/V)" in said and "mm r.m.s." in said
+    assert "(was 25 mm/V)" in said and "mm r.m.s." in said and "kept" not in said
+
+    assert main(["pot", *options[:-4], "--apply", str(tmp_path / "later.yaml")]) == 0
+    kept = "channels.sinkage_pot.serial: LP-7: kept beside the new date"
+    assert kept in capsys.readouterr().out
 
     known = config.load(file).settings.channels["sinkage_pot"].calibration
     assert known.scale.value == pytest.approx(0.0253, rel=1e-3) and known.scale.sigma > 0.0

@@ -100,12 +100,16 @@ def _run(table: SeriesTable, seconds: Array, name: str, mapped: SeriesMap) -> Se
     table, seconds = table.at(~again), seconds[~again]
     if np.any(np.diff(seconds) <= 0.0):
         at = int(np.argmax(np.diff(seconds) <= 0.0))
-        raise RigFileError(
-            f"{table.path}: {name}: found {seconds[at + 1]:.15g} s after {seconds[at]:.15g} s, "
-            "with other values; expected times that rise"
-        )
+        raise RigFileError(f"{table.path}: {name}: {_fallen(seconds[at], seconds[at + 1])}")
     run = SeriesRun(_info(table, name, mapped), table, seconds, repeated=int(again.sum()))
     return run if mapped.resample is None else _resampled(run, mapped.resample)
+
+
+def _fallen(before: float, after: float) -> str:
+    """What is wrong with a time [s] that does not lie behind the one before it."""
+    if after == before:
+        return f"found two rows of {before:.15g} s with different values; expected one row a time"
+    return f"found {after:.15g} s after {before:.15g} s; expected times that rise"
 
 
 def _info(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:

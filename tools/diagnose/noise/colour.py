@@ -6,7 +6,7 @@ slopes share) and a slow one of correlation time τ. Its size and colour are fou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from scipy import sparse
 from scipy.signal import lfilter
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -55,10 +55,54 @@ class Noise:
         for channel, number in self.stack.parts:
             colour = self.colours[self.stack.rig.channels.index(channel)]
             own = self.stack.of(channel) & (self.stack.run == number)
-            inverse = whiten_unit(np.eye(int(own.sum())), self.stack.gaps[own], [colour])[0][0]
-            inverse[np.abs(inverse) < TUNING.noise.negligible] = 0.0
-            blocks.append(sparse.csr_matrix(inverse / (colour.sigma * self.loose[own])))
+            unit = unit_whitener(self.stack.gaps[own], colour)
+            unit.data /= (colour.sigma * self.loose[own])[unit.indices]
+            blocks.append(unit)
         return sparse.block_diag(blocks, format="csr")
+
+    @cached_property
+    def _last_touched(self) -> Index:
+        """(N,) the last innovation in which a value weighs."""
+        by_value = self.whitener.tocsc()
+        return np.asarray(by_value.indices[by_value.indptr[1:] - 1], dtype=np.intp)
+
+    def touched(self, first: int, end: int) -> slice:
+        """Innovations in which the values from first to before end weigh."""
+        return slice(first, int(self._last_touched[first:end].max()) + 1)
+
+
+def unit_whitener(gaps: Array, colour: Colour) -> sparse.csr_matrix:
+    """(n, n): n values of unit variance to innovations, as `whiten_unit` makes them, without
+    weights that are negligible.
+
+    Diagonal by diagonal: what every value weighs in the innovation so many values later. All are
+    soon forgotten, so the matrix is a narrow band.
+    """
+    kept, gain, scale = (np.squeeze(part, -1) for part in _recursion(gaps, [colour]))
+    kept, gain = kept[..., 0], gain[..., 0]
+    forgotten = TUNING.noise.forgotten * TUNING.noise.negligible * scale.min(initial=1.0)
+
+    slow, fast = np.zeros(gaps.size), np.zeros(gaps.size)
+    values, rows, columns = [], [], []
+    for lag in range(gaps.size):
+        left = gaps.size - lag
+        slow, fast = slow[:left] * kept[0, lag:], fast[:left] * kept[1, lag:]
+        innovation = float(lag == 0) - slow - fast
+
+        weight = innovation / scale[lag:]
+        acting = np.flatnonzero(np.abs(weight) >= TUNING.noise.negligible).astype(np.int32)
+        values.append(weight[acting])
+        rows.append(acting + np.int32(lag))
+        columns.append(acting)
+
+        slow, fast = slow + gain[0, lag:] * innovation, fast + gain[1, lag:] * innovation
+        if np.max(np.abs(slow) + np.abs(fast)) < forgotten:
+            break
+
+    if not values:
+        return sparse.csr_matrix((0, 0))
+    entries = (np.concatenate(rows), np.concatenate(columns))
+    return sparse.csr_matrix((np.concatenate(values), entries), shape=(gaps.size, gaps.size))
 
 
 def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
@@ -68,23 +112,49 @@ def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple
     The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear
     in n.
     """
-    kept, gain, scale = _recursion(gaps, colours)
-    out = np.empty((len(colours), *columns.shape))
-    slow, fast = (
-        np.zeros((len(colours), columns.shape[1])),
-        np.zeros((len(colours), columns.shape[1])),
-    )
+    recursion = _recursion(gaps, colours)
+    pieces = list(_innovations(columns, recursion, len(columns)))
+    out = np.concatenate([np.empty((len(colours), 0, columns.shape[1])), *pieces], axis=1)
+    return out, _log_det(recursion)
 
-    for i in range(len(columns)):
-        slow *= kept[0, i]
-        fast *= kept[1, i]
-        innovation = columns[i] - slow - fast
-        out[:, i] = innovation
-        slow += gain[0, i] * innovation
-        fast += gain[1, i] * innovation
 
-    out /= scale.T[:, :, None]
-    return out, 2.0 * np.log(scale).sum(axis=0)
+def products_of_innovations(
+    columns: Array, gaps: Array, colours: Sequence[Colour]
+) -> tuple[Array, Array]:
+    """Products (g, m, m) of the innovations of columns (n, m), which are never all in memory; log
+    det of each correlation.
+    """
+    recursion, (_, width) = _recursion(gaps, colours), columns.shape
+    rows = max(TUNING.noise.whitened_at_once // max(len(colours) * width, 1), 1)
+    gram = np.zeros((len(colours), width, width))
+    for piece in _innovations(columns, recursion, rows):
+        gram += piece.transpose(0, 2, 1) @ piece
+    return gram, _log_det(recursion)
+
+
+def _innovations(
+    columns: Array, recursion: tuple[Array, Array, Array], at_once: int
+) -> Iterator[Array]:
+    """Of so many rows after the other, (g, k, m)."""
+    kept, gain, scale = recursion
+    slow, fast = (np.zeros((scale.shape[1], columns.shape[1])) for _ in range(2))
+
+    for first in range(0, len(columns), max(at_once, 1)):
+        rows = range(first, min(first + at_once, len(columns)))
+        out = np.empty((scale.shape[1], len(rows), columns.shape[1]))
+        for place, i in enumerate(rows):
+            slow *= kept[0, i]
+            fast *= kept[1, i]
+            innovation = columns[i] - slow - fast
+            out[:, place] = innovation
+            slow += gain[0, i] * innovation
+            fast += gain[1, i] * innovation
+        yield out / scale[rows.start : rows.stop].T[:, :, None]
+
+
+def _log_det(recursion: tuple[Array, Array, Array]) -> Array:
+    """Of the correlation of each colour (g,)."""
+    return np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
 def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Array]:

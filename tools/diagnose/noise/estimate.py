@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise import replicates
-from gritd.tools.diagnose.noise.colour import Colour, Noise, step_of, whiten_unit
+from gritd.tools.diagnose.noise.colour import Colour, Noise, products_of_innovations, step_of
 from gritd.tools.diagnose.noise.lines import standing
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
@@ -194,8 +194,8 @@ def _fit_channel(
     columns = np.column_stack((mean, residual[own]))
 
     tried = colours()
-    whitened, log_det = whiten_unit(columns, stack.gaps_of(own), tried)
-    likelihood, variance = restricted(whitened.transpose(0, 2, 1) @ whitened, log_det, len(columns))
+    gram, log_det = products_of_innovations(columns, stack.gaps_of(own), tried)
+    likelihood, variance = restricted(gram, log_det, len(columns))
     posterior = likelihood + log_prior(tried, stack.gaps)
     weight = np.exp(posterior - posterior.max())
 

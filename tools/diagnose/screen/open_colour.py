@@ -32,7 +32,7 @@ from scipy.special import logsumexp
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.noise.colour import Colour, whiten_unit
+from gritd.tools.diagnose.noise.colour import Colour, products_of_innovations
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.tuning import TUNING
@@ -138,14 +138,8 @@ class OpenNoise:
 
 
 def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour]) -> Squares:
-    columns, grams, dets = columns / loose[:, None], [], []
-    for some in np.array_split(
-        np.arange(len(tried)), -(-len(tried) * columns.size // TUNING.screen.whitened_at_once)
-    ):
-        whitened, log_det = whiten_unit(columns, gaps, [tried[i] for i in some])
-        grams.append(whitened.transpose(0, 2, 1) @ whitened)
-        dets.append(log_det)
-    return Squares(np.concatenate(grams), np.concatenate(dets), len(columns))
+    gram, log_det = products_of_innovations(columns / loose[:, None], gaps, tried)
+    return Squares(gram, log_det, len(columns))
 
 
 def _term(part: SuitableColours, at: int, size: float) -> tuple[Array, float]:

@@ -149,7 +149,7 @@ def waves(
     blocks = []
     stretches = _stretches(stack, channel, stack.new if acting is None else acting)
     for index in stretches if frequencies.size else ():
-        rows = _rows(stack.of(channel) & (stack.run == stack.run[index[0]]))
+        rows = noise.touched(int(index[0]), int(index[-1]) + 1)
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
         blocks.append(_block(noise, nulls, rows, raw))

@@ -21,6 +21,10 @@ class Noise:
     negligible: float = tuned(
         1e-5, "-", "weight of a value long past in an innovation: it is left out", "run time"
     )
+    forgotten: float = tuned(
+        0.01, "of what is negligible", "a state that no later innovation shows", "run time"
+    )
+    whitened_at_once: int = tuned(4_000_000, "numbers", "whitened at once", "memory")
     apart: int = tuned(5, "correlation times", "between runs of a surrogate: enough to forget")
 
     # --- estimate.py ---

@@ -53,7 +53,6 @@ class Screen:
         10.0, "nats", "a colour so far behind the best for a channel alone is not tried in it"
     )
     colour_sweeps: int = tuned(2, "sweeps", "over the channels")
-    whitened_at_once: int = tuned(8_000_000, "numbers", "whitened at once", "memory")
 
     # --- covered.py ---
     coverage_points: int = tuned(120, "points", "inducing points at most", "run time")

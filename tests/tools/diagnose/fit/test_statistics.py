@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -10,10 +13,18 @@ from scipy.stats import norm
 from gritd.tools.diagnose.explain.result import plain
 from gritd.tools.diagnose.fit.evidence import log_bayes, strength_sizes
 from gritd.tools.diagnose.fit.projection import Projection
-from gritd.tools.diagnose.noise.colour import Colour, coloured, whiten_unit
+from gritd.tools.diagnose.noise.colour import (
+    Colour,
+    Noise,
+    coloured,
+    products_of_innovations,
+    unit_whitener,
+    whiten_unit,
+)
 from gritd.tools.diagnose.noise.estimate import restricted
 from gritd.tools.diagnose.noise.saturated import saturated_mean
 from gritd.tools.diagnose.screen.screen import tail_quantile
+from gritd.tools.diagnose.tuning import TUNING, replaced
 
 GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
 
@@ -38,6 +49,48 @@ def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
     apart = np.abs(time[:, None] - time)
     covariance = 0.5 * np.exp(-apart / 2.0) + 0.3 * np.exp(-apart / 0.15) + 0.2 * np.eye(50)
     np.testing.assert_allclose(root @ covariance @ root.T, np.eye(50), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "colour", [Colour(1.0, 0.5, 0.0), Colour(1.0, 10.0, 0.15, 0.34), Colour(1.0, 4.0, 0.99, 0.005)]
+)
+def test_the_banded_whitener_holds_all_that_is_not_negligible(colour: Colour) -> None:
+    gaps = GAPS.copy()
+    gaps[200], gaps[300] = 1.5, np.inf
+    whole = whiten_unit(np.eye(gaps.size), gaps, [colour])[0][0]
+    whole[np.abs(whole) < TUNING.noise.negligible] = 0.0
+    np.testing.assert_array_equal(unit_whitener(gaps, colour).toarray(), whole)
+
+
+def test_a_stretch_touches_the_innovations_in_which_it_weighs_and_none_of_another_run() -> None:
+    run = np.repeat(np.arange(3), 200)
+    stack = SimpleNamespace(
+        parts=[("pull", 0), ("pull", 1), ("pull", 2)],
+        rig=SimpleNamespace(channels=("pull",)),
+        of=lambda channel: np.ones(GAPS.size, bool),
+        run=run,
+        channel=np.zeros(GAPS.size, int),
+        gaps=GAPS,
+    )
+    colour = Colour(1.0, 0.5, 0.3, 0.3)
+    nothing = np.zeros((GAPS.size, 0))
+    noise = Noise(cast(Any, stack), (colour,), ((colour,),), np.zeros(GAPS.size), nothing)
+
+    touched = noise.touched(210, 240)
+    weighs = np.flatnonzero(np.any(noise.whitener[:, 210:240].toarray() != 0.0, axis=1))
+    assert (touched.start, touched.stop) == (weighs[0], weighs[-1] + 1)
+    assert 240 < touched.stop < 400
+    assert noise.touched(390, 400).stop == 400
+
+
+def test_products_of_innovations_are_the_same_however_many_are_in_memory() -> None:
+    columns = np.random.default_rng(3).standard_normal((GAPS.size, 4))
+    tried = [Colour(1.0, 2.0, 0.5, 0.3), Colour(1.0, 0.5, 0.0)]
+    whitened, log_det = whiten_unit(columns, GAPS, tried)
+    with replaced("noise", whitened_at_once=8 * 17):
+        gram, same = products_of_innovations(columns, GAPS, tried)
+    np.testing.assert_allclose(gram, whitened.transpose(0, 2, 1) @ whitened, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(same, log_det)
 
 
 def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:

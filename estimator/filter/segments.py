@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.tuning import CHANGE
+from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.wheel.chain import Added, Here
 from gritd.estimator.wheel.geometry import EntryAngle, entry_angle
 from gritd.estimator.wheel.sync import Measured
@@ -38,6 +39,7 @@ SAME_LOAD = 0.02  # relative
 SAME_ANGLE = 0.02  # relative change of θ₁
 
 
+@quickly_replaced
 class Stretch(NamedTuple):
     """Windows of one condition, merged: the mean state, how many windows, which components were
     accepted.
@@ -110,6 +112,7 @@ def _blend(old: tuple[float, ...], now: tuple[float, ...], weight: float) -> Any
     return tuple([a + (b - a) * weight for a, b in zip(old, now, strict=True)])
 
 
+@quickly_replaced
 class Memory(NamedTuple):
     """The anchor and what came after it; the last stretch is still open."""
 

@@ -10,6 +10,7 @@ from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.measurement import Columns
 from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.trust import Trust
+from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.tick import Aid
 from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.wheel_state import WheelState
@@ -69,6 +70,7 @@ class Withheld(NamedTuple):
     elapsed: float  # [s] of driving since the window before
 
 
+@quickly_replaced
 class TrackState(NamedTuple):
     """Everything the tracker remembers from window to window."""
 

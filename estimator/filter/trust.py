@@ -13,10 +13,12 @@ from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.tuning import CHANGE, TRUST
+from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import Aid
 
 
+@quickly_replaced
 class Trust(NamedTuple):
     """What is remembered to judge the estimate by. Times are of driving, from update to update."""
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import REQUIRED
+from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
 from gritd.estimator.terramechanics.soil import Wheel
@@ -36,6 +37,7 @@ BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is push
 REQUIRED_BITS = sum(CHANNEL_BITS[name] for name in REQUIRED)
 
 
+@quickly_replaced
 class WheelState(NamedTuple):
     """One window in the wheel's own terms, SI; `_sigma` is noise, not calibration error."""
 
@@ -186,9 +188,8 @@ def classify(
 
 def _unread(settings: Settings, now: WheelState) -> bool:
     """Whether the wrench, where there is one, sends nothing usable of what is needed of it."""
-    return isnan(now.torque.value) or (
-        settings.wrench is not None and bool(now.flags & Flag.LOAD_ASSUMED)
-    )
+    assumed = int(now.flags) & Flag.LOAD_ASSUMED.value  # numbers: a flag is made anew each time
+    return isnan(now.torque.value) or (settings.wrench is not None and assumed > 0)
 
 
 def _contact(settings: Settings, now: WheelState) -> Status | None:

@@ -77,6 +77,7 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     )  # r is the residual without tolerance
     penalty = fitted.penalty**2
     gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
+    spread = float(np.linalg.slogdet(gram)[1])
     density, predicted = [], fitted.predicted.copy()
     for fold in folds:
         inside = j[fold]
@@ -85,16 +86,20 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
         predicted[fold] = (
             fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
         )
-        density.append(_log_density(r[fold] - inside @ step, inside, less))
+        beyond = spread - float(np.linalg.slogdet(less)[1])
+        density.append(_log_density(r[fold] - inside @ step, inside, gram, beyond))
     return HeldOut(np.array(density), predicted)
 
 
-def _log_density(error: Array, jacobian: Array, gram: Array) -> float:
-    """ln N(error; 0, I + J gram⁻¹ Jᵀ) without the constant, by the matrix inversion lemma."""
-    joint = gram + jacobian.T @ jacobian
+def _log_density(error: Array, jacobian: Array, joint: Array, beyond: float) -> float:
+    """ln N(error; 0, I + J A⁻¹ Jᵀ) without the constant, by the matrix inversion lemma, for
+    products A (q, q) of the other values.
+
+    joint: A + JᵀJ; beyond: by what its log determinant exceeds that of A.
+    """
     pulled = jacobian.T @ error
     square = error @ error - pulled @ np.linalg.solve(joint, pulled)
-    return float(-0.5 * (square + np.linalg.slogdet(joint)[1] - np.linalg.slogdet(gram)[1]))
+    return float(-0.5 * (square + beyond))
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:

@@ -19,10 +19,9 @@ from itertools import product
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import log_bayes
+from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.problem import Fitted, Free
 from gritd.tools.diagnose.rig.interface import Bools, Index
@@ -99,7 +98,7 @@ class Marginal:
         top = average = self.log_evidence(chosen)
         for number in range(len(self.freedoms)):
             values = [self.log_evidence(c) for c in self._along(chosen, number)]
-            average += float(logsumexp(values)) - top
+            average += float(log_sum(values)) - top
         return chosen, average
 
     def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
@@ -146,7 +145,7 @@ class Marginal:
         least = [f.least for f in self.freedoms]
         ordered = sorted(c for c in every if all(n >= low for n, low in zip(c, least, strict=True)))
         values = np.array([self.log_evidence(c) for c in ordered])
-        return ordered, np.asarray(np.exp(values - logsumexp(values)))
+        return ordered, np.asarray(np.exp(values - log_sum(values)))
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""
@@ -277,7 +276,7 @@ def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) 
     ]
     pull = b + a @ at  # seen from strengths of nought
     found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
-    return float(logsumexp(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
+    return float(log_sum(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
 
 
 def _choices(strengths: list[int]) -> list[list[int]]:

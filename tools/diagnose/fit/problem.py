@@ -16,7 +16,7 @@ from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
 from gritd.tools.diagnose.fit.freedom import Freedom
-from gritd.tools.diagnose.fit.projection import Projection, Surrogates
+from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -137,9 +137,23 @@ class Fitted:
 
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
-        scaled = self.jacobian / self.penalty
-        centre = np.concatenate((self.centre, np.zeros_like(self.slack)))
-        return Projection(scaled, self.residual, centre * self.penalty, surrogates)
+        return Projection(self._scaled(), self.residual, self._strain(), surrogates)
+
+    def resized(self, sizes: Sequence[Array]) -> ResizedProjections:
+        """The same with some more sizes (q + p + t,) of the directions, for each its own."""
+        return ResizedProjections(self._scaled(), self.residual, self._strain(), sizes)
+
+    def _scaled(self) -> Array:
+        """Directions (N, q + p + t) in prior σ."""
+        scaled = self.jacobian
+        scaled /= self.penalty
+        return scaled
+
+    def _strain(self) -> Array:
+        """The fitted unknowns in prior σ (q + p + t,), of what is allowed none: the residual does
+        not include it.
+        """
+        return np.concatenate((self.centre, np.zeros_like(self.slack))) * self.penalty
 
 
 def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:

@@ -13,13 +13,14 @@ of the recordings and of every surrogate of their noise alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -90,11 +91,10 @@ class Projection:
         self.jacobian, self.residual, self.strain = jacobian, residual, strain
         self.surrogates, self._nulls = surrogates, _sized(surrogates, jacobian)
         self._root = np.linalg.cholesky(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
-        self._pulled = np.linalg.solve(self._root, jacobian.T @ residual - strain)
 
-        self._every = np.column_stack((residual, self._nulls.residuals))
-        strains = np.column_stack((strain, self._nulls.strains))
-        self._every_pulled = np.linalg.solve(self._root, jacobian.T @ self._every - strains)
+        nulls = jacobian.T @ self._nulls.residuals - self._nulls.strains
+        every = np.column_stack((jacobian.T @ residual - strain, nulls))
+        self._every_pulled = self._solved(every)  # of the recordings first, then the surrogates
 
     def with_columns(self, columns: Array) -> Projection:
         """With more whitened columns (N, m) in the model, each one standard deviation."""
@@ -118,24 +118,23 @@ class Projection:
         inside = self._inside(columns)
         return (
             columns.T @ columns - inside.T @ inside,
-            columns.T @ self.residual - inside.T @ self._pulled,
+            columns.T @ self.residual - inside.T @ self._every_pulled[:, 0],
         )
 
     def project_all(self, columns: Array) -> Projected:
         """The same of whitened columns (N, m) for the surrogates too."""
-        a, b = self.project(columns)
-        noise, strains = self._nulls.residuals, self._nulls.strains
-
-        pulled = np.linalg.solve(self._root, self.jacobian.T @ noise - strains)
-        nulls = columns.T @ noise - self._inside(columns).T @ pulled
-        return Projected(a, np.column_stack((b, nulls)))
+        return self._projected(columns, self._inside(columns), slice(None))
 
     def project_rows(self, columns: Array, rows: Bools) -> Projected:
         """The same for whitened columns (n, m) that are 0 outside n marked values, rows (N,)."""
-        inside = np.linalg.solve(self._root, self.jacobian[rows].T @ columns)
+        return self._projected(columns, self._solved(self.jacobian[rows].T @ columns), rows)
+
+    def _projected(self, columns: Array, inside: Array, rows: Bools | slice) -> Projected:
+        """From columns on some of the values, and their coordinates in the model's directions."""
+        recorded, nulls = self.residual[rows], self._nulls.residuals[rows]
+        own = np.column_stack((columns.T @ recorded, columns.T @ nulls))
         return Projected(
-            columns.T @ columns - inside.T @ inside,
-            columns.T @ self._every[rows] - inside.T @ self._every_pulled,
+            columns.T @ columns - inside.T @ inside, own - inside.T @ self._every_pulled
         )
 
     def project_block(self, block: Block) -> tuple[Array, Array, Array]:
@@ -146,7 +145,7 @@ class Projection:
         acting = np.any(jacobian != 0.0, axis=0)
         inside = np.zeros((jacobian.shape[1], block.columns.shape[1]))
         inside[acting] = jacobian[:, acting].T @ block.columns
-        inside = solve_triangular(self._root, inside, lower=True, check_finite=False)
+        inside = self._solved(inside)
 
         nulls = block.surrogates[:, : self._every_pulled.shape[1] - 1]
         own = np.column_stack((block.columns.T @ self.residual[block.rows], nulls))
@@ -154,7 +153,62 @@ class Projection:
 
     def _inside(self, columns: Array) -> Array:
         """Coordinates of columns (N, m) in the model's directions (q, m)."""
-        return np.linalg.solve(self._root, self.jacobian.T @ columns)
+        return self._solved(self.jacobian.T @ columns)
+
+    def _solved(self, pulled: Array) -> Array:
+        """Products with the Jacobian, (q, m), as coordinates in the model's directions."""
+        return np.asarray(solve_triangular(self._root, pulled, lower=True, check_finite=False))
+
+
+class ResizedProjections:
+    """A model whose directions may have one of several sizes: what columns have in common with them
+    is formed once for all.
+    """
+
+    def __init__(
+        self, jacobian: Array, residual: Array, strain: Array, sizes: Sequence[Array]
+    ) -> None:
+        """jacobian (N, q) and residual (N,) whitened; strain (q,) the fitted unknowns in prior σ;
+        sizes: factors (q,) of the directions, of each projection. One of 0 leaves its direction
+        out.
+        """
+        self._jacobian, self._residual = jacobian, residual
+        gram, pulled = jacobian.T @ jacobian, jacobian.T @ residual
+        self._each = [_resized(gram, pulled, strain, size) for size in sizes]
+
+    def project(self, columns: Array) -> Iterator[tuple[Array, Array]]:
+        """A (m, m) and b (m,) of whitened columns (N, m) for the recordings, for each of the
+        sizes.
+        """
+        pulled = self._jacobian.T @ columns
+        squares, scores = columns.T @ columns, columns.T @ self._residual
+        for one in self._each:
+            inside = one.solved(one.size[:, None] * pulled[one.acting])
+            yield squares - inside.T @ inside, scores - inside.T @ one.recorded
+
+
+@dataclass(frozen=True, eq=False)
+class _Resized:
+    """acting: directions that are not left out (k,), of a size each; root (k, k) of their products
+    and prior; recorded: the residual in these directions (k,).
+    """
+
+    acting: Index
+    size: Array
+    root: Array
+    recorded: Array
+
+    def solved(self, pulled: Array) -> Array:
+        return np.asarray(solve_triangular(self.root, pulled, lower=True, check_finite=False))
+
+
+def _resized(gram: Array, pulled: Array, strain: Array, sizes: Array) -> _Resized:
+    acting = np.flatnonzero(sizes)
+    size = sizes[acting]
+    products = gram[np.ix_(acting, acting)] * size[:, None] * size
+    root = np.asarray(np.linalg.cholesky(products + np.eye(acting.size)))
+    one = _Resized(acting, size, root, np.zeros(0))
+    return replace(one, recorded=one.solved(size * pulled[acting] - strain[acting]))
 
 
 def _sized(surrogates: Surrogates | None, jacobian: Array) -> Surrogates:

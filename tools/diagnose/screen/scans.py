@@ -16,10 +16,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import digamma, logsumexp
+from scipy.special import digamma
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
+from gritd.tools.diagnose.fit.evidence import Signature, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
@@ -76,7 +76,8 @@ class Family:
     def average(self, beside: Projection) -> Array:
         """Log Bayes factor (1 + draws,) of the family."""
         every = self.evidence(beside, self.near)
-        return np.asarray(logsumexp(every, axis=(0, 1)) - np.log(every.shape[0] * every.shape[1]))
+        count = every.shape[0] * every.shape[1]
+        return np.asarray(log_sum(every.reshape(count, -1)) - np.log(count))
 
 
 def _weighed(
@@ -102,7 +103,7 @@ def _weighed(
             part += 0.5 * power / level / (size + scale**-2) - 0.5 * width * np.log1p(
                 scale**2 * size
             )
-    return np.asarray(logsumexp(parts, axis=0) - np.log(len(strength_sizes())))
+    return np.asarray(log_sum(parts) - np.log(len(strength_sizes())))
 
 
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:

@@ -16,10 +16,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
+from gritd.tools.diagnose.fit.evidence import Signature, log_evidence, log_sum
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -202,7 +201,7 @@ def _ranked(
         fixed[candidate] = [s.signature.fixed for _, s in tried]
         best[candidate] = tried[0][1]
         prior = np.array([s.signature.prior for _, s in tried])[:, None]
-        means[candidate] = logsumexp(np.stack([v for v, _ in tried]) + prior, axis=0)
+        means[candidate] = log_sum(np.stack([v for v, _ in tried]) + prior)
 
     usual = {of: _usual(mean[1:]) for of, mean in means.items()}
     surprises = [(mean[1:] - usual[of][0]) / usual[of][1] for of, mean in means.items()]

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
-from gritd.tools.diagnose.fit.projection import Projection
+from gritd.tools.diagnose.fit.projection import ResizedProjections
 from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
@@ -152,14 +152,14 @@ class Promise:
 
 
 @dataclass(frozen=True)
-class Setting:
-    """A model with other sizes of its forms; cost: log evidence that the model alone loses by it
-    [nats].
+class Settings:
+    """A model with several sizes of its forms; costs: log evidence that the model alone loses by
+    each [nats].
     """
 
-    sizes: Chosen
-    projection: Projection
-    cost: float
+    sizes: Sequence[Chosen]
+    costs: Sequence[float]
+    projections: ResizedProjections
 
 
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
@@ -189,20 +189,25 @@ def promises(search: Search, model: Model) -> list[Promise]:
     return sorted(found, key=lambda promise: -promise.gain)
 
 
-def _settings(search: Search, model: Model) -> list[Setting]:
+def _settings(search: Search, model: Model) -> Settings:
     """The model as it is, then with smaller forms."""
-    marginal, bends = model.marginal, model.chosen[len(model.sizes) :]
+    marginal, bends, fitted = model.marginal, model.chosen[len(model.sizes) :], model.fitted
     if marginal is None:
-        return [Setting(model.sizes, model.fitted.projection(), 0.0)]
+        as_it_is = np.ones(fitted.penalty.size)
+        return Settings([model.sizes], [0.0], fitted.resized([as_it_is]))
 
-    found = []
-    for sizes in _smaller(model.sizes):
-        chosen = (*sizes, *bends)
-        values = [f.sizes.values[n] for f, n in zip(marginal.freedoms, chosen, strict=True)]
-        allowed = search.problem.with_freedoms(marginal.freedoms, values).allowance
-        cost = marginal.log_evidence(model.chosen) - marginal.log_evidence(chosen)
-        found.append(Setting(sizes, model.fitted.allowed(allowed).projection(), cost))
-    return found
+    freedoms = marginal.freedoms
+    every = fitted.allowed(search.problem.with_freedoms(freedoms, [1.0] * len(freedoms)).allowance)
+    own = np.ones(every.penalty.size - sum(f.columns.shape[1] for f in freedoms))
+
+    smaller = _smaller(model.sizes)
+    costs, factors = [], []
+    for chosen in ((*sizes, *bends) for sizes in smaller):
+        values = [f.sizes.values[n] for f, n in zip(freedoms, chosen, strict=True)]
+        sized = [np.full(f.columns.shape[1], v) for f, v in zip(freedoms, values, strict=True)]
+        factors.append(np.concatenate((own, *sized)))
+        costs.append(marginal.log_evidence(model.chosen) - marginal.log_evidence(chosen))
+    return Settings(smaller, costs, every.resized(factors))
 
 
 def _smaller(sizes: Chosen) -> list[Chosen]:
@@ -213,7 +218,7 @@ def _smaller(sizes: Chosen) -> list[Chosen]:
 
 
 def _tried(
-    search: Search, model: Model, effect: type[Effect], settings: Sequence[Setting]
+    search: Search, model: Model, effect: type[Effect], settings: Settings
 ) -> Iterator[Promise]:
     """The promise of an effect for each of its likeliest signatures and each setting."""
     fitted, problem = model.fitted, search.problem
@@ -222,11 +227,10 @@ def _tried(
         if made is None:
             continue
         columns = whiten(problem.noise, made.columns)
-        for setting in settings:
-            a, b = setting.projection.project(columns)
-            gain = (1.0 + TUNING.search.curved) * float(log_evidence(a, b, made.sign))
-            gain -= setting.cost
-            yield Promise(gain, effect, _start(effect, made, a, b), setting.sizes)
+        projected = settings.projections.project(columns)
+        for sizes, cost, (a, b) in zip(settings.sizes, settings.costs, projected, strict=True):
+            gain = (1.0 + TUNING.search.curved) * float(log_evidence(a, b, made.sign)) - cost
+            yield Promise(gain, effect, _start(effect, made, a, b), sizes)
 
 
 def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:

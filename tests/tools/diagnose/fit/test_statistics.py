@@ -8,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.special import logsumexp
 from scipy.stats import norm
 
 from gritd.tools.diagnose.explain.result import plain
-from gritd.tools.diagnose.fit.evidence import log_bayes, strength_sizes
+from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import (
     Colour,
@@ -91,6 +92,11 @@ def test_products_of_innovations_are_the_same_however_many_are_in_memory() -> No
         gram, same = products_of_innovations(columns, GAPS, tried)
     np.testing.assert_allclose(gram, whitened.transpose(0, 2, 1) @ whitened, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(same, log_det)
+
+
+def test_a_sum_of_exponentials_is_that_of_scipy() -> None:
+    terms = np.array([[1e3, -np.inf, 0.0], [1e3 + 1.0, -np.inf, -800.0]])
+    np.testing.assert_allclose(log_sum(terms), logsumexp(terms, axis=0))
 
 
 def test_the_size_of_the_noise_is_found_beside_a_misfit() -> None:

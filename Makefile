@@ -3,7 +3,7 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-JOBS   ?= 1
+JOBS   ?= 2
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
@@ -54,11 +54,11 @@ docs: $(READY) ## the generated parts of the documents
 proof: $(READY) ## the proofs on real recordings in ../shared/real; writes their part of docs/proof.md
 	@$(BIN)/python -m gritd.tools.proof.real
 
-scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page (JOBS=4: four at a time)
+scenarios: $(READY) ## every fault of docs/reliability.md, the long ones too; writes that page
 	@$(BIN)/python -m gritd.tools.dev.reliability --jobs $(JOBS)
 
 coverage: $(READY) ## which branches of estimator and drivers the tests take; writes that part of docs/reliability.md
-	@$(BIN)/python -m gritd.tools.dev.coverage
+	@$(BIN)/python -m gritd.tools.dev.coverage --jobs $(JOBS)
 
 fuzz: $(READY) ## bytes, configurations, recordings and readings that nobody meant: the full counts
 	@$(BIN)/python -m gritd.tools.dev.fuzz

@@ -305,3 +305,18 @@ def test_the_thread_survives_any_byte_stream(framing):
     stats = reader.stats()
     assert stats.state == "ENDED"
     assert stats.last_error == "" and stats.bad > 1000
+
+
+def test_a_port_that_was_not_opened_is_an_error_of_the_device(tmp_path):
+    link = SerialLink("encoders", str(tmp_path / "port"), 9600, Ticking())
+    with pytest.raises(DeviceError, match="port is not open"):
+        link.read()
+
+
+def test_a_reader_that_runs_is_not_started_twice(tmp_path):
+    rig = Rig(tmp_path / "port")
+    rig.open()
+    threads = threading.active_count()
+    rig.reader.start()
+    assert threading.active_count() == threads and rig.reader.stats().state == "OPEN"
+    assert rig.reader.stop(60.0)

@@ -111,3 +111,14 @@ def test_one_that_is_wrong_is_one_line_with_its_package(
     assert done.stderr.startswith(f"gritd: plug-in {line.split()[0]} of gritd.{group}")
     assert "(package my-rig)" in done.stderr and said in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_two_packages_of_one_name_are_refused_not_chosen_from(package: Path) -> None:
+    offer(package, "[gritd.effects]\nsecond = my_rig.second:Second\n")
+    other = package / "other_rig-1.dist-info"
+    other.mkdir()
+    (other / "METADATA").write_text("Name: other-rig\nVersion: 1\n")
+    (other / "entry_points.txt").write_text("[gritd.effects]\nsecond = my_rig.second:Second\n")
+    done = python(package, "-m", "gritd", "effects")
+    said = "plug-in second of gritd.effects (package my-rig, other-rig): found it twice"
+    assert done.returncode == 2 and said in done.stderr

@@ -28,6 +28,7 @@ def test_the_bed_is_kept_to_the_bit_and_the_next_run_begins_with_it(tmp_path):
     assert bed_file.current(tmp_path, settings, 0.0) is None
 
     bed = bed_file.begin(tmp_path, "sand box 1", 0.0)
+    assert bed_file.useless(bed, settings, 0.0) == "no run on it yet"
     assert bed_file.start_of(bed, settings, 0.0) is None
 
     bed = bed_file.after(bed, settings, learnt(settings), 0.0, 100.0)
@@ -35,6 +36,9 @@ def test_the_bed_is_kept_to_the_bit_and_the_next_run_begins_with_it(tmp_path):
     again = bed_file.current(tmp_path, settings, 100.0)
     assert again == bed and again.runs == 1
     assert bed_file.start_of(again, settings, 100.0) == learnt(settings)
+
+    bed = bed_file.after(again, settings, learnt(settings), 200.0, 300.0)
+    assert bed.runs == 2 and bed.updated == 300.0
 
 
 def test_a_stale_bed_and_another_rig_begin_with_the_prior(tmp_path):

@@ -51,6 +51,20 @@ def test_the_folder_finds_it(cable_drag: type[Effect]) -> None:
     assert cable_drag.name == "cable_drag" and cable_drag.stage == "testbed"
 
 
+def test_a_file_of_two_effects_is_refused_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = block("python")
+    two = one.replace("class CableDrag", "class CableDragTwice").partition("@dataclass")[2]
+    (tmp_path / "cable_twice.py").write_text(f"{one}\n\n@dataclass{two}")
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    with pytest.raises(
+        TypeError, match=r"cable_twice\.py: expected one subclass of Effect, found 2"
+    ):
+        library._find()
+    sys.modules.pop("gritd.estimator.effects.cable_twice")
+
+
 def test_the_tests_of_the_folder_accept_it(cable_drag: type[Effect]) -> None:
     hard_run = test_effects.run_of_everything()
     test_effects.test_is_described("cable_drag")

@@ -4,6 +4,8 @@ that is bogged.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -256,3 +258,16 @@ def test_heating_on_line_follows_the_batch() -> None:
             effect.torque_factor(Situation(**{**vars(at), "memory": {effect.name: memory}}))
         )
     np.testing.assert_allclose(live[1:], batch[1:], rtol=0.01)
+
+
+def test_a_measured_sinkage_is_used_where_an_effect_asks_for_its_direction() -> None:
+    """The axis sticks against its motion: a wheel that rises carries more than one that sinks."""
+    effect, motion = typical(EFFECTS["load_axis_friction"]), campaign(1)[0]
+    sinking = 0.01 + 1e-4 * (np.asarray(motion.time) - motion.time[0])
+
+    def load(sinkage: np.ndarray) -> np.ndarray:
+        measured = replace(motion, sinkage=sinkage)
+        return np.asarray(forward.simulate_arrays(WHEEL, SOIL, measured, (effect,)).load)
+
+    apart = load(sinking[::-1]) - load(sinking)
+    assert apart[len(apart) // 2 :] == pytest.approx(2.0 * effect.friction, rel=0.01)

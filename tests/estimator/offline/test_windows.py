@@ -101,3 +101,9 @@ def test_windows_that_overlap_hold_what_lies_between_their_ends(seed: int) -> No
 def test_an_empty_window_has_no_reading_and_no_mean() -> None:
     nothing = members(np.array([5, 6, 7]), np.array([7, 0]), np.array([9, 4]))
     assert nothing.size.tolist() == [0, 0] and nothing.mean(np.ones(3)).tolist() == [0.0, 0.0]
+
+
+def test_one_window_alone_has_no_rate_and_therefore_no_mean_at_its_centre() -> None:
+    """What lies in it may be centred elsewhere, and nothing says how the value changes."""
+    time = np.arange(0.0, 0.1, 0.004)
+    assert np.isnan(block_mean(time, np.ones(time.size), EDGES)).all()

@@ -182,6 +182,12 @@ def test_what_needs_a_restart_is_named(section, value, key):
     assert needs_restart(SETTINGS, SETTINGS) == ""
 
 
+def test_a_rig_without_a_torque_sensor_takes_over_a_new_calibration():
+    plain = changed(wrench=None, drive=replace(SETTINGS.drive, torque_source="motor_shunt"))
+    other = replace(plain, drive=replace(plain.drive, torque_constant=Uncertain(2.1, 0.01)))
+    assert needs_restart(plain, other) == ""
+
+
 def test_a_recording_through_a_reload_and_a_loss_is_verified_bit_for_bit(
     consumed, tmp_path, capsys
 ):

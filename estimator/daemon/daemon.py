@@ -23,7 +23,7 @@ from gritd.estimator.daemon.feed import Feed
 from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
-from gritd.estimator.daemon.scheduling import undisturbed
+from gritd.estimator.daemon.scheduling import on_one_core, undisturbed
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.carry import needs_restart
@@ -147,11 +147,12 @@ class Daemon:
         thread.
         """
         self.writer.start()
-        for reader in self.readers:
-            reader.start()
         loop = Thread(target=self._run_loop, name="loop", daemon=True)
         with undisturbed():
-            loop.start()
+            with on_one_core():
+                for reader in self.readers:
+                    reader.start()
+                loop.start()
             while not self._stop.wait(WATCH):
                 self._look(loop, watch)
             left = self._drain(loop)

@@ -1,4 +1,6 @@
-"""How the process is scheduled: real-time priority, interpreter switches, garbage collection."""
+"""How the process is scheduled: real-time priority, cores, interpreter switches, garbage
+collection.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +26,25 @@ def undisturbed() -> Iterator[None]:
     finally:
         gc.unfreeze()
         sys.setswitchinterval(interval)
+
+
+@contextmanager
+def on_one_core() -> Iterator[None]:
+    """Threads started here stay on one core. They take turns with the interpreter anyway; on one
+    core a turn is passed without waking another, and what one leaves in the caches serves the next.
+
+    It is the last core that is allowed: interrupts go to the first as a rule.
+    """
+    try:
+        allowed = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {max(allowed)})
+    except (OSError, AttributeError):  # forbidden, or no Linux: they run where they like
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def real_time() -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain import changes, wording
@@ -384,6 +384,6 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
             and abs(u) > TUNING.explain.strain_far
         ):
             words = wording.strain(channel, what, constant.of(u), constant.unit, u)
-            p, share = float(2.0 * norm.sf(abs(u))), taken / float(nats.sum())
+            p, share = float(2.0 * ndtr(-abs(u))), taken / float(nats.sum())
             places.append(Place(taken, Location(channel, "constant", share, p, p, words)))
     return places

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
@@ -177,8 +177,6 @@ def _chance(power: Array, parts: int, near: Array) -> Array:
     for side in (np.tril(near), np.triu(near)):
         count = side.sum(axis=1)
         freedom = 2.0 * parts * np.maximum(count / TUNING.noise.line_density, 1.0)
-        beside = f_distribution.sf(
-            power * count / np.maximum(side @ power, 1e-300), 2.0 * parts, freedom
-        )
+        beside = fdtrc(2.0 * parts, freedom, power * count / np.maximum(side @ power, 1e-300))
         out = np.maximum(out, np.where(count > TUNING.noise.line_density, beside, 1.0))
     return out

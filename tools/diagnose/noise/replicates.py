@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, covariance
@@ -220,9 +220,7 @@ def _spread(differences: list[tuple[Array, Array]], count: int) -> Array:
         known = np.isfinite(difference)
         squares, chance = difference[known] ** 2, chance[known]
         if squares.size >= TUNING.noise.least_pairs:
-            rare = (
-                chi2.sf(float(np.sum(squares / chance)), squares.size) < TUNING.noise.drift_chance
-            )
+            rare = chdtrc(squares.size, float(np.sum(squares / chance))) < TUNING.noise.drift_chance
             if order == 0 or rare:
                 out[order] = np.sqrt(
                     _few(squares.size) * max(0.5 * float(np.mean(squares - chance)), 0.0)

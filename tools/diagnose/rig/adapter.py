@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.latencies import latencies_in
@@ -34,6 +33,9 @@ def rig_of(
             )
         series = [drive_series(r, settings) for r in recordings]
         names = [r.run.name or r.path.stem for r in recordings]
+        # loads scipy.signal and scipy.stats too: a second and 60 MB, which nobody pays for a wheel
+        from gritd.tools.diagnose.rig.drive import DriveRig
+
         return DriveRig(series, names, settings), TUNING.rig.drive_rate
 
     coarse = [

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.signal import lfilter
 from scipy.special import logsumexp
 from scipy.stats import norm
 
@@ -17,6 +18,7 @@ from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.noise.colour import (
     Colour,
     Noise,
+    _filtered,
     coloured,
     products_of_innovations,
     unit_whitener,
@@ -92,6 +94,11 @@ def test_products_of_innovations_are_the_same_however_many_are_in_memory() -> No
         gram, same = products_of_innovations(columns, GAPS, tried)
     np.testing.assert_allclose(gram, whitened.transpose(0, 2, 1) @ whitened, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(same, log_det)
+
+
+def test_a_relaxing_process_remembers_as_a_filter_of_first_order_does() -> None:
+    kicks = np.random.default_rng(6).standard_normal((300, 4))
+    np.testing.assert_allclose(_filtered(kicks, 0.97), lfilter([1.0], [1.0, -0.97], kicks, axis=0))
 
 
 def test_a_sum_of_exponentials_is_that_of_scipy() -> None:

@@ -1,0 +1,1 @@
+"""How far a diagnosis moves when a tuned number is halved or doubled."""

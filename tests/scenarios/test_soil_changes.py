@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.filter.tracker import Tracker
-from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.status import UPDATED, Flag, Status
 from gritd.tools.commands.status import summary
 from gritd.tools.dev import soil_changes as changes
 from tests.scenarios.rig import WIRES, driven, log_lines, service, verified
@@ -59,7 +59,7 @@ def test_a_loss_that_nobody_stated(seed, loss, figure):
         state, account = tracker.step(state, lossy)
         accounts.append(account)
 
-    updated = [a for a in accounts[100:] if a.status in changes.UPDATED]
+    updated = [a for a in accounts[100:] if a.status in UPDATED]
     believed = sum(a.status == Status.TRACKING for a in updated)
     figure(DEPTH, CASES, "updates still believed after 10 s", 1e2 * believed / len(updated), "%")
     assert any(a.flags & Flag.MISMATCH for a in accounts)

@@ -1,0 +1,103 @@
+"""What the filter makes of a case, and how honest its σ is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.filter.estimate import KPA, TAN_PHI, C
+from gritd.estimator.filter.tracker import Tracker
+from gritd.estimator.messages.readings import NS
+from gritd.estimator.messages.status import UPDATED, Flag
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.dev.soil_changes.cases import Case
+
+TOLD = Flag.MISMATCH | Flag.RESET | Flag.CHANGED | Flag.PRIOR
+BACK, STAYS = 15.0, 5.0  # [s] in which σ is to hold again, and for how long at least
+
+
+class Course(NamedTuple):
+    """What the filter made of a case, one row a window that was used, each (n,)."""
+
+    time: Array  # [s]
+    error: Array  # (n, 2) of c [Pa] and tan φ
+    sigma: Array  # (n, 2)
+    nees: Array  # normalised error squared of the pair, 2 when honest
+    told: NDArray[np.bool_]  # whether a flag warns of the estimate
+
+    @property
+    def away(self) -> Array:
+        """Error of c or of tan φ, whichever is the larger in its σ."""
+        worst: Array = np.max(np.abs(self.error) / self.sigma, axis=1)
+        return worst
+
+
+def followed(case: Case) -> Course:
+    """The filter over a case."""
+    tracker = Tracker(case.settings)
+    state, rows = tracker.start(), []
+    for number, snapshot in enumerate(case.snapshots):
+        state, account = tracker.step(state, snapshot)
+        if account.status not in UPDATED:
+            continue
+        estimate = account.estimate
+        covariance = np.array(estimate.P)[: TAN_PHI + 1, : TAN_PHI + 1]
+        error = np.array(
+            (
+                estimate.x[C] - case.cohesion[number] / KPA,
+                estimate.x[TAN_PHI] - case.tan_phi[number],
+            )
+        )
+        rows.append(
+            (
+                (snapshot.evaluated - case.snapshots[0].evaluated) / NS,
+                error,
+                np.sqrt(np.diag(covariance)),
+                error @ np.linalg.solve(covariance, error),
+                bool(account.flags & TOLD),
+            )
+        )
+    return Course(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+class Verdict(NamedTuple):
+    """One case in figures; times in s of driving."""
+
+    driven: float  # after the change began
+    beyond: float  # of it, beyond 3σ without a flag
+    far: float  # of it, beyond 5σ without a flag
+    told: float  # of it, with a flag
+    back: float  # from the end of the change until 2σ holds; inf where it never does
+    nees: float  # at the end
+
+
+def judged(case: Case, course: Course) -> Verdict:
+    """How honest σ was from the change on."""
+    step = 1.0 / case.settings.rates.update
+    after = course.time >= case.begins
+    silent = after & ~course.told
+    return Verdict(
+        driven=step * float(np.sum(after)),
+        beyond=step * float(np.sum(silent & (course.away > 3.0))),
+        far=step * float(np.sum(silent & (course.away > 5.0))),
+        told=step * float(np.sum(after & course.told)),
+        back=_back(course, case.settled, step),
+        nees=float(course.nees[-1]),
+    )
+
+
+def _back(course: Course, settled: float, step: float) -> float:
+    """Driving time from `settled` until error ≤ 2σ has begun to hold for some seconds."""
+    inside = course.away[course.time >= settled] <= 2.0
+    stays = round(STAYS / step)
+    if inside.size < stays:
+        return float("inf")
+    held = np.convolve(inside, np.ones(stays, int), "valid") == stays
+    return step * float(np.argmax(held)) if held.any() else float("inf")
+
+
+def begun(course: Course) -> int:
+    """How often a flag went up."""
+    return int(np.sum(np.diff(course.told.astype(int), prepend=0) > 0))

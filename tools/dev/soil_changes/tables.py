@@ -1,0 +1,74 @@
+"""Tables of many cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.estimate import KPA
+from gritd.tools.dev.soil_changes.cases import KINDS, UNCHANGED, Case, case
+from gritd.tools.dev.soil_changes.followed import BACK, Course, Verdict, begun, followed, judged
+from gritd.tools.testbed import plant
+
+
+def verdicts(
+    settings: Settings, seeds: Sequence[int], of: plant.PlantKind, rate: float
+) -> Iterator[tuple[Case, Verdict]]:
+    """Every seed as one of the kinds in turn."""
+    for seed in seeds:
+        each = case(settings, KINDS[(seed // 4) % len(KINDS)], seed, of, rate)
+        yield each, judged(each, followed(each))
+
+
+def table(found: Sequence[tuple[Case, Verdict]]) -> str:
+    """One line a kind, and one for all."""
+    head = (
+        f"{'change':18}{'cases':>6}{'beyond 3σ':>11}{'beyond 5σ':>11}{'flagged':>9}"
+        f"{'2σ in 15 s':>12}{'median':>9}{'90 %':>8}{'NEES':>7}"
+    )
+    groups: list[tuple[str, list[Verdict]]] = [
+        (f"{kind}, {'loads vary' if varied else 'one load'}", kept)
+        for kind in KINDS
+        for varied in (True, False)
+        if (kept := [v for c, v in found if (c.kind, c.varied) == (kind, varied)])
+    ]
+    groups.append(("all", [verdict for _, verdict in found]))
+    return "\n".join([head, *(_line(name, group) for name, group in groups)])
+
+
+def _line(name: str, group: Sequence[Verdict]) -> str:
+    total = sum(v.driven for v in group)
+    back = np.array([v.back for v in group])
+    return (
+        f"{name:18}{len(group):6}{sum(v.beyond for v in group) / total:11.2%}"
+        f"{sum(v.far for v in group) / total:11.2%}{sum(v.told for v in group) / total:9.1%}"
+        f"{np.mean(back <= BACK):12.0%}{np.median(back):7.1f} s"
+        f"{np.quantile(back, 0.9, method='nearest'):6.1f} s{np.mean([v.nees for v in group]):7.2f}"
+    )
+
+
+def unchanged(
+    settings: Settings, seeds: Sequence[int], of: plant.PlantKind, rate: float
+) -> Iterator[tuple[Case, Course]]:
+    for seed in seeds:
+        each = case(settings, "none", seed, of, rate)
+        yield each, followed(each)
+
+
+def quiet(courses: Sequence[Course]) -> str:
+    """False flags and honesty of runs without a change."""
+    hours = len(courses) * UNCHANGED / 3600.0
+    flags = [begun(course) for course in courses]
+    beyond = np.concatenate([(course.away > 3.0) & ~course.told for course in courses])
+    within = np.concatenate([course.away <= 2.0 for course in courses])
+    nees = [course.nees[-1] for course in courses]
+    sigma_c, sigma_t = np.median([course.sigma[-1] for course in courses], axis=0)
+    return (
+        f"unchanged, {hours:.1f} h: {sum(flags)} flags in {sum(f > 0 for f in flags)} of"
+        f" {len(courses)} runs, {sum(flags) / hours:.2f} an hour; beyond 3σ without a flag"
+        f" {beyond.mean():.2%} of the time, within 2σ {within.mean():.1%};"
+        f" NEES {np.mean(nees):.2f} of 2; median σ at the end {sigma_c * KPA:.0f} Pa,"
+        f" {sigma_t:.4f}"
+    )

@@ -8,7 +8,7 @@ import select
 
 from gritd.drivers.link import POLL
 
-ROOM = 1 << 16  # [bytes] taken at once
+ROOM = 1 << 12  # [bytes] taken at once: what a terminal of the kernel holds, 3 ms of decoding
 
 
 class Port:

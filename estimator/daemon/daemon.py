@@ -23,7 +23,7 @@ from gritd.estimator.daemon.feed import Feed
 from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
-from gritd.estimator.daemon.scheduling import on_one_core, undisturbed
+from gritd.estimator.daemon.scheduling import first, on_one_core, undisturbed
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.carry import needs_restart
@@ -185,6 +185,7 @@ class Daemon:
             self.fail(f"the watch failed: {type(error).__name__}: {error}")
 
     def _run_loop(self) -> None:
+        first()
         try:
             self.loop.run(self._loop_stop)
         # named, and the daemon stops: a dead loop must not look like a quiet one

@@ -229,12 +229,14 @@ class McapFile:
             return
 
         heads = gather(messages, np.asarray(starts, np.int64), MESSAGE_DTYPE)
-        preamble = b"".join(self._preambles[int(c)] for c in np.unique(heads["channel"]))
+        # np.unique would sort them
+        channels = np.flatnonzero(np.bincount(heads["channel"])).tolist()
+        preamble = b"".join(self._preambles[channel] for channel in channels)
         content = preamble + messages
         offsets = np.asarray(starts, np.uint64) + np.uint64(len(preamble))
         span = int(heads["log_time"].min()), int(heads["log_time"].max())
         chunk = record_bytes(self._chunk(content, span))
-        indexes = [_message_index(int(c), heads, offsets) for c in np.unique(heads["channel"])]
+        indexes = [_message_index(channel, heads, offsets) for channel in channels]
         lengths = [(channel, len(index)) for channel, index in indexes]
         counts = self._counts + Counter(heads["channel"].tolist())
         whole = self._span or span

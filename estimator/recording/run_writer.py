@@ -74,8 +74,14 @@ class RunWriter:
             raise ValueError(
                 f"{topic}: {tuple(values)!r:.200} does not fit its fields: {error}"
             ) from None
-        if len(self._pending.records) >= self._chunk_size:
+        if self._is_full():
             self.write_out()
+
+    def _is_full(self) -> bool:
+        try:
+            return len(self._pending.records) >= self._chunk_size
+        except MemoryError:  # the message was taken, and must not look as if it had not been
+            return False
 
     def write_out(self) -> None:
         """Close the chunk and hand it to the kernel: from here on it survives the death of this

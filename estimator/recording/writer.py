@@ -37,6 +37,9 @@ CAPACITY = 50_000  # messages; 40 s of 1 kHz of readings with ticks
 # [bytes] of an ordinary chunk; a fifth of a second of a whole rig makes half of it
 LARGEST = 1 << 17
 RETRY = 1.0  # [s] between attempts at a disk that failed
+# So many messages are encoded in a tenth of a millisecond. Then the writer pauses for as long [s]:
+# the loop, which may wait for the interpreter, shall not wait for all of a flush.
+TURN, PAUSE = 16, 1e-4
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 State = Literal["writing", "degraded", "closed"]
 
@@ -222,8 +225,12 @@ class WriterThread:
 
     def _encode(self) -> None:
         batch, self._batch = self._batch, []
+        turns = 0
         for item in batch:
+            turns = (turns + 1) % TURN  # a small number: memory may be short
             try:
+                if turns == 0:
+                    time.sleep(PAUSE)
                 if isinstance(item, Reading):
                     self._parts.writer.reading(item)
                 elif not isinstance(item, PartStart):  # which was taken apart before

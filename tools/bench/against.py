@@ -55,8 +55,9 @@ def compared(spent: Mapping[str, list[float]], ours: str, each: float) -> Figure
 
 
 def reading(path: Path, repeats: int) -> Figures:
-    """A message of a recording with ticks, into numbers, by every reader that is installed [s].
-    Raises AssertionError where one reads another number of messages.
+    """A message of a recording with ticks, into numbers, by every reader that is installed, and
+    what unpacking alone takes of it [s]. Raises AssertionError where one reads another number of
+    messages.
     """
     readers = peers.readers()
     messages = peers.ours(path)
@@ -66,7 +67,8 @@ def reading(path: Path, repeats: int) -> Figures:
     def run(reader: peers.Reader) -> Callable[[], object]:
         return lambda: reader(path)
 
-    spent = by_turns({name: run(reader) for name, reader in readers.items()}, repeats)
+    runs = {name: run(reader) for name, reader in readers.items()}
+    spent = by_turns({**runs, "unpacking": peers.unpacking(path)}, repeats)
     return compared(spent, "gritd", messages) | {"messages": messages}
 
 

@@ -6,18 +6,21 @@ of memory.
 from __future__ import annotations
 
 import os
+import re
 import time
 from pathlib import Path
 
 import numpy as np
 
 from gritd.config import packaged
+from gritd.estimator.messages.readings import NS
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.child import Child
 
 READY = 120.0  # [s] the longest that the testbed or a device may take
+SETTLED = 3.0  # [s] after the command everything has been opened and imported
 # [s] for which the testbed plays before the command, so that the wheel drives steadily, and after
 BEFORE, SPARE = 2.0, 10.0
 QUANTILES = (("median", 0.5), ("at_99_percent", 0.99), ("at_99.9_percent", 0.999), ("worst", 1.0))
@@ -41,10 +44,12 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
         time.sleep(BEFORE)
         began, clock = time.time(), time.monotonic()
         with Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "live") as daemon:
-            while time.monotonic() - clock < seconds:
+            settled, started = 0.0, 0.0
+            while (elapsed := time.monotonic() - clock) < seconds:
                 daemon.line(0.2)
+                if not settled and elapsed > SETTLED:
+                    settled, started = elapsed, _used(daemon.pid)[0]
             used, memory = _used(daemon.pid)
-            elapsed = time.monotonic() - clock
             daemon.stop()
 
     recording = read(next(folder.glob("*.mcap")))
@@ -52,8 +57,22 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
         **_started(recording.arrays("/tick"), began),
         "memory": memory,
         "share_of_a_core": used / elapsed,
+        "share_at_work": (used - started) / (elapsed - settled),
         **_punctual(recording.arrays("/loop")),
     }
+
+
+def at_rate(hertz: float, folder: Path) -> Path:
+    """The packaged testbed, its sensors and its loop at another rate, in a folder that is made."""
+    folder.mkdir()
+    packed = Path(packaged())
+    text, rates = re.subn(r"tick: [\d.]+ Hz", f"tick: {hertz:g} Hz", packed.read_text("utf-8"))
+    assert rates == 1, f"{packed}: found {rates} rates of ticks, expected one"
+    for file in packed.parent.glob("*.dbc"):
+        (folder / file.name).write_bytes(file.read_bytes())
+    path = folder / "testbed.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def _started(ticks: Rows, began: float) -> Figures:
@@ -71,7 +90,12 @@ def _punctual(loop: Rows) -> Figures:
     for name in ("lateness", "duration"):
         for label, share in QUANTILES:
             figures[f"{name}_{label}"] = float(np.quantile(loop[name], share))
-    return figures | {"ticks": float(len(loop)), "missed": float(loop["missed"][-1])}
+    at_work = loop[loop["stamp"] > loop["stamp"][0] + round(SETTLED * NS)]
+    return figures | {
+        "ticks": float(len(loop)),
+        "missed": float(loop["missed"][-1]),
+        "missed_at_work": float(at_work["missed"][-1] - at_work["missed"][0]),
+    }
 
 
 def _used(pid: int) -> tuple[float, float]:

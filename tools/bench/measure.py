@@ -36,7 +36,7 @@ from gritd.estimator.recording.topics import RAW_TOPICS, TOPICS, messages_of
 from gritd.estimator.terramechanics import linear, original, scalar
 from gritd.tools.bench import against, diagnosis, peers
 from gritd.tools.bench import forward as forward_bench
-from gritd.tools.bench.live import live
+from gritd.tools.bench.live import at_rate, live
 from gritd.tools.bench.start import start
 from gritd.tools.cli.progress import Progress
 from gritd.tools.testbed.schedule import Schedule, Segment, motion_of
@@ -44,6 +44,7 @@ from gritd.tools.testbed.simulation import Run, simulate_run, soil_of
 
 SEED = 2005
 RIM_SPEED = 0.02  # [m/s]
+FAST = 1000.0  # [Hz] of all sensors and of the loop
 LEVELS = [(load, slip) for load in (40.0, 70.0, 100.0) for slip in (0.1, 0.2, 0.3, 0.45, 0.6)]
 
 Figures = dict[str, float]
@@ -60,13 +61,14 @@ class Sizes:
     starts: int = 3  # of a process, for each engine
     simulated: float = 60.0  # [s] for the forward model
     live: float = 15.0  # [s] of the daemon on simulated wires
+    fast: float = 0.0  # [s] of the daemon at FAST; 0 for none
     long: float = 0.0  # [s] of a recording with ticks that is replayed whole; 0 for none
     runs: tuple[int, ...] = ()  # that are diagnosed together
     lengths: tuple[float, ...] = ()  # [s] of runs that are diagnosed alone
 
 
 # what takes minutes
-LONG = Sizes(long=3600.0, runs=diagnosis.RUNS, lengths=diagnosis.LENGTHS)
+LONG = Sizes(fast=60.0, long=3600.0, runs=diagnosis.RUNS, lengths=diagnosis.LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,10 @@ def measure(sizes: Sizes, folder: Path) -> dict[str, Figures]:
         "live": lambda subject: live(subject.sizes.live, folder / "live"),
         "forward_model": forward_model,
     }
+    if sizes.fast:
+        sections["live_at_1_khz"] = lambda subject: live(
+            sizes.fast, folder / "fast", at_rate(FAST, folder / "fast-rig")
+        )
     if sizes.long:
         sections["long_replay"] = lambda subject: long_replay(sizes, folder)
     if sizes.runs and sizes.lengths:

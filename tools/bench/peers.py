@@ -15,10 +15,12 @@ import numpy as np
 from mcap.writer import Writer
 
 from gritd.estimator.filter.estimate import STATES, Estimate, Update
+from gritd.estimator.recording.blocks import Unpacker
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.tables import Fields
 from gritd.estimator.recording.topics import RAW_TOPICS, TICK_TOPIC
+from gritd.estimator.recording.walk import Walk
 
 TOPICS: tuple[Topic, ...] = (*RAW_TOPICS, TICK_TOPIC)
 WANTED: dict[str, Fields] = {topic.name: None for topic in TOPICS}
@@ -69,6 +71,22 @@ READERS: dict[str, tuple[str, Reader]] = {  # name -> what it needs, reader
 def readers() -> dict[str, Reader]:
     """Those that are installed."""
     return {name: read for name, (module, read) in READERS.items() if find_spec(module)}
+
+
+def unpacking(path: Path) -> Callable[[], object]:
+    """What no reader can leave out: every chunk unpacked from memory, its checksum verified."""
+    data = memoryview(path.read_bytes())
+    with path.open("rb") as file:
+        walk = Walk(file, len(data))
+        walk.begin()
+        blocks = list(walk.blocks())
+
+    def run() -> None:
+        unpacker = Unpacker()
+        for block in blocks:
+            unpacker.whole(block, data[block.start : block.start + block.stored])
+
+    return run
 
 
 def write_by_mcap(path: Path, messages: Encoded) -> None:

@@ -40,8 +40,8 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--long",
         action="store_true",
-        help="also an hour's replay, and diagnoses of several runs and of long ones: a quarter of "
-        "an hour",
+        help="also a minute at 1 kHz, an hour's replay, and diagnoses of several runs and of long "
+        "ones: a quarter of an hour",
     )
 
     arguments = parser.parse_args(argv)
@@ -125,7 +125,8 @@ def report(figures: dict[str, Figures]) -> str:
                 f"tick, {s[f'{name}_memory'] / 1e6:.0f} MB"
                 for name in ENGINES
             ),
-            *_live(figures["live"]),
+            *_live("live", figures["live"]),
+            *_live("live 1 kHz", figures.get("live_at_1_khz", {})),
             f"simulator  {w['speed']:.0f} times real time, "
             f"with six effects {w['speed_with_six_effects']:.0f}",
             f"balance    a sample {_µs(w['balance'])}, brentq on adaptive quadrature "
@@ -147,19 +148,23 @@ def _long_replay(figures: Figures) -> list[str]:
     ]
 
 
-def _live(figures: Figures) -> list[str]:
+def _live(title: str, figures: Figures) -> list[str]:
     """When it is there, what it takes, how punctual it is."""
+    if not figures:
+        return []
     spans = [
         f"{name} {_µs(figures[f'{name}_median'])} at 50 %, {_µs(figures[f'{name}_at_99_percent'])} "
         f"at 99 %, worst {_µs(figures[f'{name}_worst'])}"
         for name in ("lateness", "duration")
     ]
     return [
-        f"live       first tick {figures['first_tick']:.2f} s, first estimate "
+        f"{title:11}first tick {figures['first_tick']:.2f} s, first estimate "
         f"{figures['first_estimate']:.2f} s after the command; "
-        f"{figures['share_of_a_core']:.0%} of a core, {figures['memory'] / 1e6:.0f} MB",
+        f"{figures['share_of_a_core']:.0%} of a core, {figures['share_at_work']:.0%} once started, "
+        f"{figures['memory'] / 1e6:.0f} MB",
         f"           a tick's {'; '.join(spans)}; "
-        f"{figures['missed']:.0f} missed of {figures['ticks'] + figures['missed']:.0f}",
+        f"{figures['missed']:.0f} missed of {figures['ticks'] + figures['missed']:.0f}, "
+        f"{figures['missed_at_work']:.0f} of them once started",
     ]
 
 

@@ -8,7 +8,15 @@ from threading import Thread
 
 import pytest
 
-from gritd.estimator.daemon.scheduling import SWITCH_INTERVAL, on_one_core, undisturbed
+from gritd.estimator.daemon.scheduling import (
+    FIRST,
+    PRIORITY,
+    SWITCH_INTERVAL,
+    first,
+    on_one_core,
+    real_time,
+    undisturbed,
+)
 
 
 def cores_of_a_thread() -> set[int]:
@@ -47,3 +55,23 @@ def test_the_switch_interval_is_put_back():
     with undisturbed():
         assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL)
     assert sys.getswitchinterval() == pytest.approx(before)
+
+
+def test_the_loop_comes_before_the_others_where_real_time_is_permitted():
+    told: list[tuple[str, int, int]] = []
+
+    def run() -> None:
+        why = real_time()
+        others = os.sched_getparam(0).sched_priority
+        first()
+        told.append((why, others, os.sched_getparam(0).sched_priority))
+
+    thread = Thread(target=run)
+    thread.start()
+    thread.join()
+    why, others, loop = told[0]
+    if why:
+        assert others == loop == 0, "without real time nothing changes"
+    else:
+        assert (others, loop) == (PRIORITY, FIRST) and loop > others
+    assert os.sched_getscheduler(0) != os.SCHED_FIFO, "only the thread that asked"

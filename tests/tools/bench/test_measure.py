@@ -7,7 +7,7 @@ import pytest
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.filter.filterpy_engine import FilterpyEngine
-from gritd.tools.bench import against, diagnosis, forward, measure, peers
+from gritd.tools.bench import against, diagnosis, forward, live, measure, peers
 from gritd.tools.testbed.simulation import soil_of
 
 SMALL = measure.Sizes(
@@ -26,7 +26,8 @@ def figures(tmp_path_factory):
 
 def test_every_figure_is_a_positive_number(figures):
     assert tuple(figures) == SECTIONS
-    assert figures["live"].pop("missed") >= 0.0
+    missed = figures["live"].pop("missed")
+    assert missed >= figures["live"].pop("missed_at_work") >= 0.0
     assert all(value > 0.0 for section in figures.values() for value in section.values())
 
 
@@ -92,11 +93,19 @@ def test_a_start_is_that_of_a_process_of_its_own(figures):
 
 
 def test_the_daemon_at_work_is_measured_from_the_command_on(figures):
-    live = figures["live"]
-    assert live["first_tick"] < live["first_estimate"] < 6.0
-    assert live["ticks"] > 500 and 20e6 < live["memory"] < 200e6
+    found = figures["live"]
+    assert found["first_tick"] < found["first_estimate"] < 6.0
+    assert found["ticks"] > 500 and 20e6 < found["memory"] < 200e6
+    assert found["share_at_work"] < 1.0
     for name in ("lateness", "duration"):
-        assert live[f"{name}_median"] <= live[f"{name}_at_99_percent"] <= live[f"{name}_worst"]
+        assert found[f"{name}_median"] <= found[f"{name}_at_99_percent"] <= found[f"{name}_worst"]
+
+
+def test_another_rate_is_that_of_the_loop_and_of_every_sensor(tmp_path):
+    settings = config.load(live.at_rate(1000.0, tmp_path / "rig")).settings
+    packed = config.load(packaged()).settings
+    assert settings.rates.tick == 1000.0
+    assert settings.channels == packed.channels and settings.filter == packed.filter
 
 
 def test_a_long_recording_is_replayed_whole(tmp_path):

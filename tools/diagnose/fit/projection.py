@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
@@ -45,12 +46,12 @@ class Surrogates:
 @dataclass(frozen=True, eq=False)
 class Block:
     """Whitened columns (n, m) on consecutive values `rows`, and their products with the surrogates
-    (m, draws).
+    (m, draws), of which there are many: seven digits are enough for what noise alone shows.
     """
 
     rows: slice
     columns: Array
-    surrogates: Array
+    surrogates: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class Projection:
         inside[acting] = jacobian[:, acting].T @ block.columns
         inside = self._solved(inside)
 
-        nulls = block.surrogates[:, : self._every_pulled.shape[1] - 1]
+        nulls = block.surrogates[:, : self._every_pulled.shape[1] - 1].astype(float)
         own = np.column_stack((block.columns.T @ self.residual[block.rows], nulls))
         return np.sum(block.columns**2, axis=0), inside, own - inside.T @ self._every_pulled
 

@@ -149,7 +149,8 @@ def _innovations(
             out[:, place] = innovation
             slow += gain[0, i] * innovation
             fast += gain[1, i] * innovation
-        yield out / scale[rows.start : rows.stop].T[:, :, None]
+        out /= scale[rows.start : rows.stop].T[:, :, None]
+        yield out
 
 
 def _log_det(recursion: tuple[Array, Array, Array]) -> Array:

@@ -66,12 +66,13 @@ class Family:
         """Log Bayes factor (phases, f, 1 + draws) of every shape beside a model; with neighbours,
         by what it stands out of them.
         """
-        return np.stack([self.in_phase(beside, shared, near) for shared in self.phases])
+        projected = [beside.project_block(block) for block in self.blocks]
+        return np.stack([_weighed(projected, self.at.size, one, near) for one in self.phases])
 
-    def in_phase(self, beside: Projection, shared: bool, near: Array | None = None) -> Array:
+    def in_phase(self, beside: Projection, shared: bool) -> Array:
         """The same (f, 1 + draws), with one coefficient for all blocks or one for each."""
         projected = [beside.project_block(block) for block in self.blocks]
-        return _weighed(projected, self.at.size, shared, near)
+        return _weighed(projected, self.at.size, shared, None)
 
     def average(self, beside: Projection) -> Array:
         """Log Bayes factor (1 + draws,) of the family."""
@@ -216,7 +217,7 @@ def _rows(own: Bools) -> slice:
 
 def _block(noise: Noise, nulls: Array, rows: slice, raw: Array) -> Block:
     white = np.asarray(noise.whitener[rows, rows] @ raw.reshape(len(raw), -1))
-    return Block(rows, white, white.T @ nulls[rows])
+    return Block(rows, white, (white.T @ nulls[rows]).astype(np.float32))
 
 
 # ---- those that stand out ----------------------------------------------------------------------

@@ -12,8 +12,9 @@ largest of *all* these surprises in every null, however many were tried and howe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -156,15 +157,25 @@ def tail_chance(values: Array, value: float) -> float:
 
 
 def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[WhitenedSignature]:
-    """All columns whitened in one pass."""
-    if not signatures:
-        return []
-    columns = whiten(noise, np.column_stack([s.columns for s in signatures]))
-    ends = np.cumsum([len(s.sign) for s in signatures])
-    return [
-        WhitenedSignature(s, columns[:, end - len(s.sign) : end])
-        for s, end in zip(signatures, ends, strict=True)
-    ]
+    """All columns whitened, some at a time."""
+    found = []
+    for some in _some(signatures):
+        columns = whiten(noise, np.column_stack([s.columns for s in some]))
+        ends = np.cumsum([len(s.sign) for s in some])
+        found += [
+            WhitenedSignature(s, columns[:, end - len(s.sign) : end].copy())
+            for s, end in zip(some, ends, strict=True)
+        ]
+    return found
+
+
+Taken = TypeVar("Taken")
+
+
+def _some(every: Sequence[Taken]) -> Iterator[Sequence[Taken]]:
+    """So many at a time that their columns are not all in memory twice."""
+    for first in range(0, len(every), TUNING.screen.at_once):
+        yield every[first : first + TUNING.screen.at_once]
 
 
 def screen_signatures(
@@ -178,14 +189,14 @@ def screen_signatures(
     """
     if not signatures:
         return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
-    projected = projection.project_all(np.column_stack([s.columns for s in signatures]))
-    ends = np.cumsum([s.columns.shape[1] for s in signatures])
-
     weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]] = {}
-    for s, end in zip(signatures, ends, strict=True):
-        own = slice(end - s.columns.shape[1], end)
-        value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
-        weighed.setdefault(s.signature.of, []).append((value, s))
+    for some in _some(signatures):
+        projected = projection.project_all(np.column_stack([s.columns for s in some]))
+        ends = np.cumsum([s.columns.shape[1] for s in some])
+        for s, end in zip(some, ends, strict=True):
+            own = slice(end - s.columns.shape[1], end)
+            value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
+            weighed.setdefault(s.signature.of, []).append((value, s))
     return _ranked(weighed, searched or {})
 
 

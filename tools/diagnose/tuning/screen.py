@@ -34,6 +34,8 @@ class Screen:
     counted: float = tuned(10.0, "nulls", "that must reach a value for its chance to be counted")
     trusted_tail: float = tuned(0.1, "-", "of the least chance that can be counted", TAIL)
 
+    at_once: int = tuned(24, "signatures", "whitened and projected at once", "memory")
+
     # --- screening.py ---
     nulls: int = tuned(300, "draws", "of noise alone", "run time")
     weighed: int = tuned(

@@ -114,3 +114,19 @@ def test_an_init_file_hands_names_on_and_no_more() -> None:
             text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
             names = isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
             assert text or names or isinstance(node, (ast.Import, ast.ImportFrom)), path
+
+
+def test_no_file_of_tests_is_imported_by_another() -> None:
+    """What several share stands in a module of its own. The page on adding an effect says that the
+    tests of the folder run on it, so they are run there.
+    """
+    runs_them = {"tests/estimator/effects/test_adding_an_effect.py"}
+    imports = {
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("tests")
+        for name in node.names
+        if any(part.startswith("test_") for part in [*node.module.split("."), name.name])
+    }
+    assert imports == runs_them

@@ -12,8 +12,8 @@ from gritd.estimator.online import checkpoint
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.run_writer import RunWriter
 from gritd.estimator.recording.topics import CHECKPOINT, TICK_TOPIC, TOPICS
+from tests.scenarios.commands import in_process
 from tests.scenarios.rig import TESTBED, driven
-from tests.scenarios.test_limits import in_process
 
 QUICK = True
 FORGED = "hostile checkpoints"

@@ -9,9 +9,7 @@ import re
 import struct
 import warnings
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
 from copy import deepcopy
-from io import StringIO
 
 import pytest
 import yaml
@@ -28,8 +26,8 @@ from gritd.estimator.recording.run_writer import RunWriter
 from gritd.tools.commands import recover
 from gritd.tools.commands.check_config import summary
 from gritd.tools.importers.rigs.table import CONSTANTS, MEASURED
-from gritd.tools.main import main
-from tests.estimator.recording.test_sequence import pieces
+from tests.estimator.recording.samples import pieces
+from tests.scenarios.commands import in_process
 from tests.scenarios.hostile import bomb, honest, later, mcap, record, tiny_chunks, watched
 from tests.scenarios.rig import TESTBED, driven
 
@@ -215,14 +213,6 @@ def with_metadata(path, name, entries):
     header = len(MAGIC) + 9 + int.from_bytes(before[9:17], "little")
     more = record_bytes(Metadata(name=name, metadata=sealed(name, found)))
     path.write_bytes(before[:header] + more + before[header:] + b"".join(chunks))
-
-
-def in_process(command, *arguments):
-    """Exit code and lines of a command, in this process."""
-    out = StringIO()
-    with redirect_stdout(out), redirect_stderr(out):
-        code = main([command, *map(str, arguments)])
-    return code, out.getvalue().splitlines()
 
 
 EXTREMES = ("1.0e+300", "1.0e-300", "1.0e+12", "1.0e-12")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
+from mcap.opcode import Opcode
 from mcap.writer import Writer
 
 from gritd.estimator.messages.readings import CHANNELS, Reading
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.blocks import records
 from gritd.estimator.recording.cdr import TIME, Codec, Topic
+from gritd.estimator.recording.mcapfile import MAGIC
 from gritd.estimator.recording.run_writer import RunWriter
 
 T0 = 1_700_000_000_123_456_789
@@ -103,3 +107,15 @@ def write_foreign(path: Path, count: int = 500, schema: str = FOREIGN, **options
                 writer.add_message(note, t, string.encode((f"load {i}",)), t)
                 writer.add_message(blob, t, b'{"a": 1}', t)
         writer.finish()
+
+
+def pieces(path: Path) -> tuple[bytes, list[bytes], bytes]:
+    """What stands before the chunks, each chunk with its indexes, and the rest."""
+    data = path.read_bytes()
+    body = data[len(MAGIC) : -len(MAGIC)]
+    places = [(opcode, start - 9, end) for opcode, start, end in records(body)]
+    first = next(start for opcode, start, _ in places if opcode == Opcode.CHUNK)
+    last = next(start for opcode, start, _ in places if opcode == Opcode.DATA_END)
+    cuts = [start for opcode, start, _ in places if opcode == Opcode.CHUNK] + [last]
+    chunks = [body[a:b] for a, b in pairwise(cuts)]
+    return data[: len(MAGIC) + first], chunks, data[len(MAGIC) + last :]

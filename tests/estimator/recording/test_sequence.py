@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import random
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap.opcode import Opcode
 
-from gritd.estimator.recording.blocks import records
-from gritd.estimator.recording.mcapfile import MAGIC
 from gritd.estimator.recording.salvage import read
 from gritd.estimator.recording.sequence import Sequence
 from gritd.tools.commands import recover
-from tests.estimator.recording.test_recording import write_sample
+from tests.estimator.recording.samples import pieces, write_sample
 
 
 def chunk_of(first: int, count: int, wrap: int = 2**32) -> dict[int, tuple[int, int, int]]:
@@ -37,18 +33,6 @@ def test_chunks_that_count_on_are_in_place_through_gaps_and_wraps(
         number += size + gap
     assert sequence.missing == gap * (len(sizes) - 1)
     assert sequence.counts() == {1: sum(sizes)}
-
-
-def pieces(path: Path) -> tuple[bytes, list[bytes], bytes]:
-    """What stands before the chunks, each chunk with its indexes, and the rest."""
-    data = path.read_bytes()
-    body = data[len(MAGIC) : -len(MAGIC)]
-    places = [(opcode, start - 9, end) for opcode, start, end in records(body)]
-    first = next(start for opcode, start, _ in places if opcode == Opcode.CHUNK)
-    last = next(start for opcode, start, _ in places if opcode == Opcode.DATA_END)
-    cuts = [start for opcode, start, _ in places if opcode == Opcode.CHUNK] + [last]
-    chunks = [body[a:b] for a, b in pairwise(cuts)]
-    return data[: len(MAGIC) + first], chunks, data[len(MAGIC) + last :]
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -224,10 +224,11 @@ class WriterThread:
             self._batch[0] = start.message
 
     def _encode(self) -> None:
-        batch, self._batch = self._batch, []
+        following, batch = list[Item](), iter(self._batch)
+        self._batch = following  # only now: making them may fail where memory is short
         turns = 0
         for item in batch:
-            turns = (turns + 1) % TURN  # a small number: memory may be short
+            turns = (turns + 1) % TURN  # a small number, which takes no memory
             try:
                 if turns == 0:
                     time.sleep(PAUSE)
@@ -257,7 +258,8 @@ class WriterThread:
     def _write_last(self) -> None:
         try:
             self._write_out()
-        except MemoryError:  # there is no later attempt: once more
+        # there is no later attempt: once more; numpy says SystemError where memory is short
+        except (MemoryError, SystemError):
             self._write_out()
 
 

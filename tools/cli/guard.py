@@ -52,8 +52,9 @@ def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split())
     if want := memory.line(error):
         return want
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.filename}: {error.strerror.lower()}"
+    if isinstance(error, OSError) and error.strerror:
+        where = f"{error.filename}: " if error.filename else ""
+        return where + error.strerror.lower()
     if isinstance(error, (CommandError, DeviceError, OSError, *SETTINGS)):
         return text
     return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"

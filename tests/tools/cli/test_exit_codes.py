@@ -4,6 +4,8 @@ wrong content.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -57,3 +59,12 @@ def test_numbers(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert stop.value.code == 2 and said.out == ""
     assert "expected a " in said.err and "found '" in said.err
     assert said.err.count("\n") == 1
+
+
+def test_an_output_that_is_full_is_one_line_without_a_number() -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "gritd", "effects"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (1, "gritd: no space left on device\n")

@@ -2,8 +2,7 @@
 offline.
 
 Two kinds of windows. `Members` are windows that may overlap, each with a beginning and an end of
-its
-own: what a tick looks back on. Blocks lie side by side between `edges`: a grid for a whole
+its own: what a tick looks back on. Blocks lie side by side between `edges`: a grid for a whole
 recording. On line `wheel/windows.py` makes the same means and slopes as `Members`, one reading
 after another.
 """

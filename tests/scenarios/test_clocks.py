@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from gritd.tools.testbed.clocks import history, judged, with_pot
+from tests.scenarios.clocks import history, judged, with_pot
 from tests.scenarios.rig import TESTBED, WIRES, driven, log_lines, rows, service, verified
 
 WRONG = "one wrong stamp of a device clock"

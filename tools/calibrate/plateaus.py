@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Uncertain
+from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 
 BLOCK = 0.1  # [s] a signal is looked at in means over this time
 STEP = 8.0  # [σ] of a block, beyond which the signal moves
 LEAST = 1.0  # [s] of a plateau
 EDGE = 0.2  # [s] left out at both ends
-NORMAL = 1.4826  # standard deviation of normal scatter over its median absolute deviation
 PARTS = 10  # of a plateau, whose means tell how uncertain its mean is
 
 

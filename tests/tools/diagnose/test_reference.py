@@ -14,7 +14,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
-from gritd.tools.diagnose.screen.screening import prepare_screening, screen_beside
+from gritd.tools.diagnose.screen.screening import prepare_screening, screen_of_base
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -57,7 +57,7 @@ def _rng() -> np.random.Generator:
 def test_the_reference_tells_what_its_single_runs_show() -> None:
     """What a run of the reference shows counts from where NEW is surprising."""
     base = fit_base(rig_of(HABITS, (NEW,)), np.random.default_rng(0))
-    screen = screen_beside(prepare_screening(base, _rng()), base.model)
+    screen = screen_of_base(prepare_screening(base, _rng()))
     loud = max(screen.evidence, key=lambda of: screen.evidence[of])
     raised = screen.beside_reference({loud: screen.evidence[loud]})
     assert raised.surprise(loud) < 0.0 < screen.surprise(loud)

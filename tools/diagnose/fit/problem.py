@@ -113,10 +113,6 @@ class Fitted:
         return np.concatenate((self.u, self.x))
 
     @property
-    def all_u(self) -> Array:
-        return np.concatenate((self.u, self.x, self.slack))
-
-    @property
     def nats(self) -> float:
         return 0.5 * self.objective
 

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import median_filter
 
+from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise import replicates
 from gritd.tools.diagnose.noise.colour import Colour, Noise, products_of_innovations, step_of
@@ -52,7 +53,7 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
     for channel in stack.rig.channels:
         inside = stack.of(channel) & np.isfinite(stack.gaps)
         step = np.diff(residual, prepend=0.0)[inside]
-        sigma = 1.4826 * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
+        sigma = NORMAL * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), TUNING.noise.slow_times[0], 0.0))
     draws = tuple((c,) for c in colours)
     nothing = np.zeros((stack.size, 0))
@@ -161,7 +162,7 @@ def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:
 
     differences = np.abs(np.diff(residual, prepend=residual[0]))
     about = median_filter(differences, TUNING.noise.restless_values, mode="nearest")
-    larger = 1.4826 * about / usual
+    larger = NORMAL * about / usual
     return np.where(larger > TUNING.noise.restless, larger, 1.0)
 
 

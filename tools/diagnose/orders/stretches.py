@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -153,7 +154,7 @@ def _changes(speed: Array, step: float) -> NDArray[np.bool_]:
     )
     whole = np.pad(change, (reach, known.size - change.size - reach))
 
-    noise = 1.4826 * float(np.median(change))
+    noise = NORMAL * float(np.median(change))
     usual = float(np.median(np.abs(known[known != 0.0]))) if np.any(known) else 0.0
     least = np.minimum(np.maximum(np.abs(known), usual), 2.0 * np.abs(known) + 1e-12)
     threshold = np.maximum(TUNING.orders.changed * least, TUNING.orders.change_noise * noise)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
@@ -91,7 +92,7 @@ def levels(time: Array, load: Array) -> Array:
 
 
 def _noise(values: Array) -> float:
-    return float(1.4826 * np.median(np.abs(np.diff(values))) / np.sqrt(2.0))
+    return float(NORMAL * np.median(np.abs(np.diff(values))) / np.sqrt(2.0))
 
 
 def _bridged(values: Array) -> Array:

@@ -80,25 +80,19 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     )
 
 
-def screen_beside(screening: Screening, model: Model, first: Screen | None = None) -> Screen:
-    """Evidence for one more effect, and for a misfit without a name, on top of a model.
-
-    first: the screen beside the base model, whose likeliest signatures alone are tried again.
-    """
-    problem, drawn = screening.problem, screening.surrogates
-    if problem.stack.referred and first is None:
+def screen_of_base(screening: Screening) -> Screen:
+    """Evidence for an effect, and for a misfit without a name, beside the base model."""
+    problem, model, drawn = screening.problem, screening.base, screening.surrogates
+    if problem.stack.referred:
         return replace(_screen_beside_reference(screening, model), ripple=_ripple(problem))
-    effects = _signatures(problem, model, first)
+    effects = _signatures(problem, model)
     signatures = [*effects, *screening.functions, *_strains(problem, model)]
     beside = without_harmonics(problem, model.fitted, drawn)
     searched = {family.shape: family.average(beside) for family in screening.families}
     projection = model.fitted.projection(drawn)
     screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
 
-    # whether there is a mismatch at all; beside an effect, explanations compete on even terms, and
-    # with a reference campaign the noise's colour is not open
-    if model.names or problem.stack.referred:
-        return screen
+    # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
     return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
 
 
@@ -113,7 +107,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     """
     problem, stack = screening.problem, screening.problem.stack
     projection = model.fitted.projection(screening.surrogates)
-    effects = _signatures(problem, model, None, everywhere=True)
+    effects = _signatures(problem, model, everywhere=True)
     both = whitened(problem.noise, [*effects, *smooth_signatures(stack, everywhere=True)])
 
     alone = projection.of_rows(~stack.new)  # what is new must not tell what is usual
@@ -142,21 +136,11 @@ def chance_of(
     return {shape: tail_chance(mean[1:], float(mean[0])) for shape, mean in averages.items()}
 
 
-def _signatures(
-    problem: Problem, model: Model, first: Screen | None, everywhere: bool = False
-) -> Iterator[Signature]:
-    """Signatures about the model's fit: all that there are at the first screen, later those that
-    were likeliest there; everywhere: in the reference campaign too.
-    """
+def _signatures(problem: Problem, model: Model, everywhere: bool = False) -> Iterator[Signature]:
+    """Signatures about the model's fit; everywhere: in the reference campaign too."""
     stack, fitted = problem.stack, model.fitted
-    for name, effect in stack.rig.effects.items():
-        if name in model.names:
-            continue
-        if first is None:
-            tried = list(shape_grid(stack.rig, effect))
-        else:
-            tried = first.fixed.get(name, [])[: TUNING.screen.again]
-
+    for effect in stack.rig.effects.values():
+        tried = list(shape_grid(stack.rig, effect))
         prior = -np.log(max(len(tried), 1))
         for fixed in _worth(problem, model, effect, tried):
             made = signature(
@@ -181,11 +165,7 @@ def _worth(
 
 
 def _strains(problem: Problem, model: Model) -> Iterator[Signature]:
-    """Every constant off by more than is known of it: a misfit that it takes is one that is said.
-    None beside an effect, where explanations compete.
-    """
-    if model.names:
-        return
+    """Every constant off by more than is known of it: a misfit that it takes is said."""
     for number, constant in enumerate(problem.stack.rig.constants):
         columns = TUNING.screen.strained * model.fitted.raw[:, number : number + 1]
         if np.any(columns):

@@ -4,7 +4,7 @@ re-tested.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,14 +19,14 @@ from gritd.tools.diagnose.fit.projection import ResizedProjections
 from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.screen.screening import Screening, screen_beside
+from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
 from gritd.tools.diagnose.search.parallel import each
 from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True)
 class Search:
-    """All models that were fitted, and the screens beside some of them.
+    """All models that were fitted, and the screen beside the base model.
 
     models: the base model first, exact in its form; then the base model with the form's learnt
         discrepancy, where there is a mismatch; then those with effects.
@@ -34,7 +34,7 @@ class Search:
 
     screening: Screening
     models: tuple[Model, ...]
-    screens: Mapping[Model, Screen]
+    first: Screen
 
     @property
     def problem(self) -> Problem:
@@ -49,11 +49,6 @@ class Search:
     def bare(self) -> Model:
         """Without effects, with the discrepancy of form that the recordings ask for."""
         return self.models[1] if len(self.models) > 1 else self.models[0]
-
-    @property
-    def first(self) -> Screen:
-        """Beside the base model."""
-        return self.screens[self.base]
 
     def news(self, model: Model) -> float:
         """Log evidence beyond what a reference campaign shows of the model's effects [nats]."""
@@ -75,10 +70,6 @@ class Search:
 
     def has(self, names: Sequence[str]) -> bool:
         return any(set(m.names) == set(names) for m in self.models)
-
-    def screen_of(self, model: Model) -> Screen:
-        """The screen beside any model: one of the search, or made for the question."""
-        return self.screens.get(model) or screen_beside(self.screening, model, self.first)
 
 
 def search_models(
@@ -111,7 +102,7 @@ def search_models(
 def begin(screening: Screening) -> Search:
     """The base model and its screen."""
     base = screening.base
-    return Search(screening, (base,), {base: screen_beside(screening, base)})
+    return Search(screening, (base,), screen_of_base(screening))
 
 
 def _bare(search: Search, start: Model) -> Model:

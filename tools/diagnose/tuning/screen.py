@@ -41,7 +41,6 @@ class Screen:
     weighed: int = tuned(
         6, "candidates", "whose evidence is weighed with the noise's colour open", "run time"
     )
-    again: int = tuned(4, "signatures", "of an effect that a later screen tries", "run time")
     strained: float = tuned(3.0, "σ", "expected size of a constant's error that was not foreseen")
 
     # --- ripples.py ---

@@ -40,6 +40,10 @@ ROOMS = (
     ("tools.commands",),
     ("tools.main", "tools.dev"),
 )
+DIAGNOSIS = (
+    *("tuning", "orders", "rig", "noise", "fit"),
+    *("screen", "search", "verdict", "explain", "method"),
+)  # in the order of the method
 HEIGHT = {room: height for height, row in enumerate(ROOMS) for room in row}
 FILES = sorted(
     path.relative_to(ROOT)
@@ -85,6 +89,19 @@ def test_imports_point_down() -> None:
             for room, module in others
             if room in HEIGHT and room != here and HEIGHT[room] >= HEIGHT[here]
         ]
+
+    assert wrong == []
+
+
+def test_rooms_of_the_diagnosis_import_earlier_ones() -> None:
+    place = {f"tools.diagnose.{room}": number for number, room in enumerate(DIAGNOSIS)}
+    wrong = []
+    for path in (p for p in FILES if p.parts[:2] == ("tools", "diagnose") and len(p.parts) > 2):
+        here = ".".join(path.with_suffix("").parts[:3])
+        if here == "tools.diagnose.__init__":
+            continue
+        others = {".".join(module.split(".")[:3]) for module in imported(path)} & set(place)
+        wrong += [f"{path} imports {room}" for room in others if place[room] > place[here]]
 
     assert wrong == []
 

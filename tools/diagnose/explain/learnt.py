@@ -274,7 +274,8 @@ def _domain(stack: Stack, sources: list[FormSource]) -> Domain:
 
 def _ends(values: Array, places: int) -> tuple[float, float]:
     """The range of values, a few hundredths wider, outwards to so many decimals."""
-    low, high = (float(np.quantile(values, q)) for q in (0.005, 0.995))
+    beyond = TUNING.explain.learnt_beyond
+    low, high = (float(np.quantile(values, q)) for q in (beyond, 1.0 - beyond))
     margin, unit = TUNING.explain.learnt_margin * max(abs(low), abs(high)), 10.0**-places
     low, high = low - margin, high + margin
     ends = np.floor(low / unit) * unit, np.ceil(high / unit) * unit

@@ -26,6 +26,7 @@ class Bounds:
     high: Array
 
     def clipped(self, centre: Array) -> Array:
+        """Coordinates (n,) within the bounds."""
         return np.asarray(np.clip(centre, self.low, self.high))
 
     def reached(self, centre: Array) -> Bools:
@@ -47,13 +48,20 @@ class Place(Protocol):
     """Where a descent stands: an objective in nats, its gradient (n,), its curvature (n, n)."""
 
     @property
-    def centre(self) -> Array: ...
+    def centre(self) -> Array:
+        """Coordinates (n,)."""
+
     @property
-    def nats(self) -> float: ...
+    def nats(self) -> float:
+        """Objective."""
+
     @property
-    def gradient(self) -> Array: ...
+    def gradient(self) -> Array:
+        """(n,) in nats a unit of each coordinate."""
+
     @property
-    def curvature(self) -> Array: ...
+    def curvature(self) -> Array:
+        """(n, n)."""
 
 
 Here = TypeVar("Here", bound=Place)
@@ -68,7 +76,7 @@ class Ground(Protocol[Linearised, Tried]):
     def bounds(self) -> Bounds: ...
 
     def tried(self, centre: Array) -> tuple[Tried, float]:
-        """The function there, not linearised, and its objective [nats]."""
+        """The function at coordinates (n,), not linearised, and its objective [nats]."""
 
     def linearised(self, tried: Tried) -> Linearised: ...
 

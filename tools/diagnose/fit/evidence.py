@@ -52,8 +52,8 @@ class Signature:
 
 
 def log_sum(terms: Sequence[Array] | Sequence[float] | Array) -> Array:
-    """ln Σ exp over the first axis. As scipy's logsumexp, which takes many times as long for few
-    terms.
+    """ln Σ exp of terms (n, …) over the first axis. As scipy's logsumexp, which takes many times as
+    long for few terms.
     """
     terms = np.asarray(terms)
     top = terms.max(axis=0)

@@ -24,6 +24,7 @@ class Sizes:
 
     @property
     def log_prior(self) -> Array:
+        """Of each size (n,)."""
         return np.log(np.array(self.prior) / sum(self.prior))
 
 

@@ -30,7 +30,7 @@ class HeldOut:
 
 
 def run_folds(stack: Stack) -> list[Bools]:
-    """Each run; where there are fewer than three, the thirds of each run in time."""
+    """Marks (N,) of each run; with fewer than three, of the thirds of each run in time."""
     runs = np.unique(stack.run)
     if len(runs) >= 3:
         return [stack.run == r for r in runs]
@@ -39,7 +39,7 @@ def run_folds(stack: Stack) -> list[Bools]:
 
 
 def condition_folds(stack: Stack) -> list[Bools]:
-    """Bands of load and of slip, as far as they vary."""
+    """Marks (N,) of bands of load and of slip, as far as they vary."""
     folds = []
     for name in ("load", "slip"):
         if name in stack.rig.runs[0].covariates:
@@ -65,8 +65,8 @@ def _thirds(time: Array, run: Index) -> Index:
 
 
 def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
-    """Density and prediction of every fold by the model fitted to the others; the discrepancies
-    that it learnt are predicted too.
+    """Density and prediction of every fold, marked (N,), by the model fitted to the others; the
+    discrepancies that it learnt are predicted too.
     """
     own = fitted.allowance.carried
     j, r = fitted.jacobian, fitted.residual
@@ -103,6 +103,6 @@ def _log_density(error: Array, jacobian: Array, joint: Array, beyond: float) -> 
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:
-    """Root mean square error of each channel in its unit."""
+    """Root mean square error of a prediction (N,), of each channel in its unit."""
     error = stack.measured - predicted
     return {c: float(np.sqrt(np.mean(error[stack.of(c)] ** 2))) for c in stack.rig.channels}

@@ -129,11 +129,11 @@ class Marginal:
         return float(np.sqrt(weight @ values**2))
 
     def place_of(self, number: int) -> Index:
-        """Which of the unknowns are the weights of a freedom."""
+        """Which of the unknowns are the weights of a freedom (m,)."""
         return np.arange(self._ends[1 + number], self._ends[2 + number])
 
     def last_of_tolerance(self, count: int) -> Index:
-        """Which of the unknowns are the weights of the last columns of the tolerance."""
+        """Which of the unknowns are the weights of the last columns of the tolerance (count,)."""
         return np.arange(self._ends[1] - count, self._ends[1])
 
     def _weighed(self, chosen: Chosen) -> tuple[list[Chosen], Array]:

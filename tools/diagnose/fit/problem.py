@@ -55,6 +55,7 @@ class Allowance:
     fixed: int
 
     def with_parts(self, more: Sequence[tuple[Array, Array, float]]) -> Allowance:
+        """With more columns (N, m), the same whitened, and their size."""
         return replace(self, parts=(*self.parts, *more))
 
     def without_size(self) -> Allowance:
@@ -122,6 +123,7 @@ class Fitted:
         return np.column_stack((self.own, self.allowance.whitened))
 
     def covariance(self) -> Array:
+        """Of constants, effect parameters and what is allowed (n, n)."""
         jacobian = self.jacobian
         return np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(self.penalty**2)))
 
@@ -153,6 +155,7 @@ class Fitted:
 
 
 def build(effects: Sequence[Maker], free: Sequence[Free], x: Array) -> tuple[Effect, ...]:
+    """Effects with their free parameters x (p,)."""
     values: list[dict[str, float]] = [{} for _ in effects]
     for f, value in zip(free, x.tolist(), strict=True):
         values[effects.index(f.effect)][f.parameter.name] = f.value(value)
@@ -217,7 +220,7 @@ class Problem:
         x: Array,
         rounds: int | None = None,
     ) -> Fitted:
-        """The nearest optimum within bounds from constants u and effect parameters x."""
+        """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,)."""
         ground = self.ground(effects, free)
         start, nats = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))
         if not np.isfinite(nats):  # an effect that runs away: begin with none of it
@@ -267,6 +270,7 @@ class Ground:
         self.bounds = descent.Bounds(low, high)
 
     def tried(self, centre: Array) -> tuple[Tried, float]:
+        """See descent.Ground; constants, then effect parameters (n,)."""
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():

@@ -200,6 +200,7 @@ class _Resized:
     recorded: Array
 
     def solved(self, pulled: Array) -> Array:
+        """L⁻¹ of vectors (k, …), with the root L (k, k)."""
         return np.asarray(solve_triangular(self.root, pulled, lower=True, check_finite=False))
 
 

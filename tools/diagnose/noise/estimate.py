@@ -247,7 +247,7 @@ def _slow_power(colour: Colour, step: float) -> float:
 
 
 def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
-    """Restricted log-likelihood of each colour with the size maximised out, and the variance.
+    """Restricted log-likelihood (g,) of each colour with the size maximised out, and variance (g,).
 
     gram: (g, m + 1, m + 1) products of the whitened columns of the mean, and of the values last; of
         so many values.

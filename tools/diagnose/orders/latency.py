@@ -60,7 +60,8 @@ def changes(model: Array, step: float) -> Array:
     kernel = np.ones(count) / count
     smooth = np.convolve(np.pad(np.nan_to_num(model), count, mode="edge"), kernel, mode="same")
     rate = np.abs(np.gradient(smooth, step))[count:-count]
-    return np.asarray(rate / max(float(np.quantile(np.abs(model), 0.9)), 1e-300))
+    size = float(np.quantile(np.abs(model), TUNING.orders.usual_size))
+    return np.asarray(rate / max(size, 1e-300))
 
 
 def events(rate: Array, step: float) -> list[slice]:

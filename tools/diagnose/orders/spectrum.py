@@ -76,7 +76,11 @@ def fastest(part: Samples, axis: str) -> float:
     """The fastest ripple that is no alias, in cycles a turn or a second."""
     steps = np.abs(np.diff(part.of(axis)))
     inside = steps[(np.diff(part.stretch) == 0) & (steps > 0.0)]
-    return float(TUNING.orders.nyquist / np.quantile(inside, 0.9)) if inside.size else 0.0
+    return (
+        float(TUNING.orders.nyquist / np.quantile(inside, TUNING.orders.usual_step))
+        if inside.size
+        else 0.0
+    )
 
 
 def spectrum(part: Samples, axis: str, places: Places) -> Spectrum:

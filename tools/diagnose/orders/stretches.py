@@ -33,7 +33,7 @@ class Samples:
     stretch: Ints
 
     def of(self, axis: str) -> Array:
-        """Place of each reading along an axis: turns, or seconds."""
+        """Place (n,) of each reading along an axis: turns, or seconds."""
         return self.angle if axis == "angle" else self.time
 
     def with_values(self, values: Array) -> Samples:

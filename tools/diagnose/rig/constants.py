@@ -118,7 +118,6 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
             f" The standard deviations are taken as {least}."
         )
 
-    low = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
     return tuple(
         Constant(
             name,
@@ -127,7 +126,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
             unit,
             True,
             name in ("k", "K"),
-            low.get(name, 0.0),
+            TUNING.rig.soil_least.get(name, 0.0),
         )
         for name, (value, sigma, unit) in stated.items()
     )

@@ -107,7 +107,7 @@ class DriveRig:
 
     @property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
-        """Nothing: both sides of the comparison go through one filter."""
+        """Nothing (n,): both sides of the comparison go through one filter."""
         return [{"torque": np.zeros_like(run.time)} for run in self.runs]
 
     def predict(
@@ -161,7 +161,7 @@ class DriveRig:
         return self.unit if unit == "N·m" else 1.0
 
     def blur(self, stack: Stack, predicted: Array) -> Array:
-        """Nothing: prediction and measurement go through the same filters."""
+        """Nothing (N,): prediction and measurement go through the same filters."""
         return np.zeros(predicted.shape)
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:

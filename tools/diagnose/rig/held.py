@@ -44,7 +44,7 @@ class HeldForm:
         ]
 
     def doubts(self, stack: Stack) -> Array:
-        """See interface.Held."""
+        """(N, t): see interface.Held."""
         found = self._correction.at(
             np.vstack(self._conditions), np.vstack(self._weights)
         )  # of all values of all runs, used or not

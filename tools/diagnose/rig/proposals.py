@@ -54,7 +54,7 @@ def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
 
 
 def driving(key: str) -> NDArray[np.bool_]:
-    """Whether the wheel drives on the soil: at rest and lifted the motor current alone tells
+    """Whether the wheel drives on the soil (n,): at rest and lifted the motor current alone tells
     something.
     """
     speeds, _, loads = LEVELS[key]

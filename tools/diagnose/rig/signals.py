@@ -71,7 +71,7 @@ def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
         for name in ("wheel_encoder", "motor_shunt")
     }
     for name, (time, _) in series.items():
-        if time.size < 100:
+        if time.size < TUNING.rig.drive_readings:
             raise _too_little(
                 recording, f"{time.size or 'no'} readings of {name}", "some seconds of a run"
             )
@@ -130,7 +130,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
     missing = [
         name
         for name in ("wheel_encoder", "carriage_encoder")
-        if series.get(name, _NONE)[0].size < 10
+        if series.get(name, _NONE)[0].size < TUNING.rig.encoder_readings
     ]
     if missing:
         raise _too_little(recording, f"no readings of {missing[0]}", "both encoders")
@@ -180,7 +180,7 @@ def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tupl
             " beginning."
         )
 
-    if (end - start) * rate < 5:
+    if (end - start) * rate < TUNING.rig.grid_values:
         found = f"{max(end - start, 0.0):.2f} s of both encoders together"
         raise _too_little(recording, found, "some seconds")
     try:

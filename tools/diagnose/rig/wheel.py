@@ -155,6 +155,7 @@ class WheelRig:
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
+        """See interface.Rig; constants u (q,), channels (n,) of each run."""
         value = {
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)
@@ -244,8 +245,8 @@ class WheelRig:
 
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
-        """What one set of weights is off by for itself does to its own values what a common error
-        does to all.
+        """What one set of weights is off by for itself does to its own values, marked (n,), what
+        a common error does to all.
         """
         return {
             name: ("weights", [label == number for label in self._sets.label])
@@ -254,8 +255,8 @@ class WheelRig:
 
     @cached_property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
-        """By the encoders' counts: slip is uncertain by what a carriage would make of it that is
-        off by as much.
+        """By the encoders' counts (n,): slip is uncertain by what a carriage would make of it that
+        is off by as much.
         """
         place = next(
             i for i, constant in enumerate(self.constants) if constant.name == "carriage_scale"
@@ -271,12 +272,12 @@ class WheelRig:
         ]
 
     def blur(self, stack: Stack, predicted: Array) -> Array:
-        """By slopes over three intervals, and by an axle that lags."""
+        """(N,) by slopes over three intervals, and by an axle that lags."""
         return blur_of(stack, predicted)
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
-        """Channels under a proposed experiment (see proposals.py), for constants and effects as
-        fitted.
+        """Channels under a proposed experiment (see proposals.py), for constants u (q,) and
+        effects as fitted.
         """
         value = {
             constant.name: constant.of(float(x))

@@ -23,7 +23,8 @@ def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list
     if jobs < 2 or len(items) < 2:
         return [work(item) for item in items]
     global _work
-    _work = lambda place: work(items[place])  # noqa: E731  (a closure is the point: it is inherited, never pickled)
+    # a closure is the point: it is inherited, never pickled
+    _work = lambda place: work(items[place])  # noqa: E731
     try:
         fork = multiprocessing.get_context("fork")
         with fork.Pool(min(jobs, len(items)), initializer=ends_with_us()) as pool:

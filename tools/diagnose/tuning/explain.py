@@ -123,6 +123,9 @@ class Explain:
     )
     learnt_ridge: float = tuned(1e-4, "-", "of the features' squares, against rounding")
     learnt_shrunk: float = tuned(0.999, "-", "factor on correlations that are rounded", "rounding")
+    learnt_beyond: float = tuned(
+        0.005, "quantile", "of slip, load and speed that may lie beyond either end of the domain"
+    )
     learnt_margin: float = tuned(
         0.02, "-", "of the ends of the domain: slip, load and speed scatter about what was held"
     )

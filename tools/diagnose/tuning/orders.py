@@ -31,6 +31,7 @@ class Orders:
     cycles: float = tuned(2.0, "cycles", "at least in the longest stretch")
     density: float = tuned(4.0, "-", "places tried in each that the longest run resolves")
     nyquist: float = tuned(0.45, "-", "of the samples: a faster ripple is an alias")
+    usual_step: float = tuned(0.9, "quantile", "of the steps between samples: few are longer")
     highest_order: float = tuned(400.0, "1/turn", "tried: the library's 200 and a harmonic of it")
     highest_frequency: float = tuned(
         60.0, "Hz", "tried in time: the grid damps what is faster twentyfold", "run time"
@@ -70,6 +71,7 @@ class Orders:
     lag_longest: float = tuned(900.0, "s", "of a run that is looked at", "run time, memory")
     event_reach: float = tuned(0.8, "s", "before and after a change")
     event_change: float = tuned(0.06, "1/s", "of a channel's size: a change")
+    usual_size: float = tuned(0.9, "quantile", "of a channel's values: its size")
     event_smooth: float = tuned(0.2, "s", "over which the rate of a change is told")
     event_values: int = tuned(30, "values", "of an event at least")
     farthest_lag: float = tuned(0.6, "s", "of an event: a later channel follows something else")

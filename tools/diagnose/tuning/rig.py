@@ -11,6 +11,7 @@ from gritd.tools.diagnose.tuning.field import tuned
 DESIGN = "order of magnitude of common instruments"
 PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
 FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}
+LEAST = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
 
 
@@ -48,6 +49,9 @@ class Rig:
     )
     soil_floors: Mapping[str, float] = tuned(
         FLOORS, "-", "least relative sigma: no soil is known better"
+    )
+    soil_least: Mapping[str, float] = tuned(
+        LEAST, "-", "c in Pa, the others without a unit: no soil has less"
     )
     scale_floor: float = tuned(1e-3, "-", "relative: no sensor's scale is known better", DESIGN)
     least_weights: float = tuned(2e-3, "-", "relative: no weights are known better", DESIGN)
@@ -91,6 +95,9 @@ class Rig:
     longest: float = tuned(
         86_400.0, "s", "of a recording: what is sought over its time grows with this", "memory"
     )
+    encoder_readings: int = tuned(10, "readings", "of each encoder at least")
+    drive_readings: int = tuned(100, "readings", "of each channel of a drive's log at least")
+    grid_values: int = tuned(5, "values", "of a recording on its grid at least")
 
     # --- states.py, drive.py, proposals.py ---
     moving: float = tuned(0.05, "-", "of the largest value: below it a speed or load is at rest")

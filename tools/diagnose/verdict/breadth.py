@@ -72,7 +72,7 @@ class Breadth:
 
 
 def stretches(stack: Stack) -> list[Bools]:
-    """Equal parts of the runs in which candidates act, in time."""
+    """Marks (N,) of equal parts of the runs in which candidates act, in time."""
     runs = np.flatnonzero(stack.rig.new)
     count = max(-(-TUNING.verdict.stretches // len(runs)), TUNING.verdict.stretches_of_a_run)
     found = []

@@ -45,12 +45,14 @@ def _reason(settings: Settings, recording: Recording, name: str) -> str:
     if not rows.size:
         return f"{name} has no readings"
 
+    window = f"{1e3 / settings.rates.update:g} ms"
     if name in ENCODERS:
-        window = f"{1e3 / settings.rates.update:g} ms"
         return f"{name} has {rows.size} readings, never three over half a window of {window}"
 
     raw = rows[CHANNELS[name][0]]
     invalid = int(np.count_nonzero(~((channel.low <= raw) & (raw <= channel.high))))
+    if not invalid:
+        return f"{name} has {rows.size} readings, too few for a window of {window}"
     return (
         f"{invalid} of {rows.size} readings of {name} are invalid, "
         f"outside {channel.low:g} … {channel.high:g} V"

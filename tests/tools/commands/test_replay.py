@@ -307,6 +307,18 @@ def test_a_channel_of_invalid_readings_is_named(recorded, tmp_path, capsys, conf
         assert said.err == f"{recorded}: never ready: {reason}\n"
 
 
+def test_a_recording_of_a_moment_is_said_to_be_too_short(tmp_path, capsys, configuration):
+    writer = RunWriter(tmp_path / "moment.mcap", (), configuration.text, RunInfo())
+    for n in range(4):
+        stamp = 1_700_000_000_000_000_000 + n * 4_000_000
+        writer.reading(Reading(stamp, "sinkage_pot", 1.0, stamp))
+    writer.close()
+    assert cli.main(["replay", str(tmp_path / "moment.mcap")]) == 0
+    said = capsys.readouterr().err
+    assert "sinkage_pot has 4 readings, too few for a window of 100 ms" in said
+    assert "invalid" not in said
+
+
 def test_channels_too_slow_or_absent_are_named(recorded, tmp_path, capsys, configuration):
     writer = RunWriter(tmp_path / "slow.mcap", (), configuration.text, RunInfo())
     recording, kept = read(recorded), {"wheel_encoder": 25, "carriage_encoder": 1, "sinkage_pot": 1}

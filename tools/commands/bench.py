@@ -162,8 +162,9 @@ def _live(title: str, figures: Figures) -> list[str]:
         f"{figures['first_estimate']:.2f} s after the command; "
         f"{figures['share_of_a_core']:.0%} of a core, {figures['share_at_work']:.0%} once started, "
         f"{figures['memory'] / 1e6:.0f} MB",
-        f"           a tick's {'; '.join(spans)}; "
-        f"{figures['missed']:.0f} missed of {figures['ticks'] + figures['missed']:.0f}, "
+        f"           a tick's {'; '.join(spans)}",
+        f"           {figures['missed']:.0f} missed of "
+        f"{figures['ticks'] + figures['missed']:.0f}, "
         f"{figures['missed_at_work']:.0f} of them once started",
     ]
 

@@ -6,7 +6,8 @@
 CAMPAIGNS is a folder of campaigns, each of recordings and one configuration (`twenty make` makes
 some). Each is diagnosed twice as it is, to see what it reads and to fork from. RESULTS is a file
 that keeps what has been diagnosed: the same command goes on where it was stopped. The table is
-written after every campaign. `--minutes 0` only writes it.
+written after every campaign; what stands in it under "What it shows" stays. `--minutes 0` only
+writes it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pathlib import Path
 
 from gritd.tools.cli.command import Parser
 from gritd.tools.dev.sensitivity.numbers import named
-from gritd.tools.dev.sensitivity.page import page
+from gritd.tools.dev.sensitivity.page import by_hand, page
 from gritd.tools.dev.sensitivity.runs import Kept, Runs, run
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -35,7 +36,8 @@ def main(argv: Sequence[str]) -> int:
 
     def write(runs: Runs) -> None:
         of = f"It was begun on {Kept(given.results).begun}."
-        given.out.write_text(page(runs, given.fields, folders, of), encoding="utf-8")
+        said = by_hand(given.out.read_text(encoding="utf-8")) if given.out.exists() else ""
+        given.out.write_text(page(runs, given.fields, folders, of, said), encoding="utf-8")
         print(f"{given.out}: {len(runs.moved)} diagnoses of {len(runs.cases(given.fields))}")
 
     for runs in run(chosen, given.results, given.fields, given.jobs, given.minutes):

@@ -27,19 +27,37 @@ forked from the one with the numbers as they are, where the number is first read
 a room hands on what it does anyway, bit for bit, if the number is not read after that.
 """
 DECISIVE = 3  # diagnoses with another verdict or other names, from which a number decides much
+BY_HAND, TABLE = "## What it shows", "## The table"  # headings
+
+
+def by_hand(text: str) -> str:
+    """The part of a page that a person wrote: it stays when the page is made anew."""
+    _, heading, rest = text.partition(BY_HAND)
+    return heading + rest.partition(TABLE)[0] if heading else ""
 
 
 def page(
-    runs: Runs, only: Collection[str] = (), campaigns: Collection[str] = (), of: str = ""
+    runs: Runs,
+    only: Collection[str] = (),
+    campaigns: Collection[str] = (),
+    of: str = "",
+    said: str = "",
 ) -> str:
-    """campaigns: all of the folder; of: what the table was made of."""
+    """campaigns: all of the folder; of: what the table was made of; said: the part by hand."""
     asked = [f for f in every_field() if any(c.field == f for c in runs.moved)]
     table = [
         "| number | value | runs | verdicts | names | Δp | Δtan φ |",
         "|---|---|--:|---|---|--:|--:|",
         *(_row(f, runs) for f in asked),
     ]
-    parts = [HEAD, _extent(runs, only, campaigns, of), _summary(runs), "\n".join(table)]
+    parts = [
+        HEAD,
+        _extent(runs, only, campaigns, of),
+        said,
+        TABLE,
+        _summary(runs),
+        "\n".join(table),
+    ]
     return "\n\n".join([*(part.strip() for part in parts if part), _rest(runs)]).strip() + "\n"
 
 

@@ -9,7 +9,7 @@ import pytest
 from gritd.tools.dev.sensitivity import runs as kept
 from gritd.tools.dev.sensitivity.numbers import Field, changed
 from gritd.tools.dev.sensitivity.outcome import Handed, Outcome
-from gritd.tools.dev.sensitivity.page import page
+from gritd.tools.dev.sensitivity.page import by_hand, page
 from gritd.tools.dev.sensitivity.runs import Runs, run
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -55,6 +55,13 @@ def test_a_table_that_is_not_finished_says_so(tmp_path: Path) -> None:
     assert "partial: 2 of 6 diagnoses" in text
     assert "Not begun: `b`." in text
     assert "Not run yet: `screen.kinds`, `search.odds`." in text
+
+
+def test_what_a_person_wrote_stays(tmp_path: Path) -> None:
+    runs = finished(tmp_path)
+    written = page(runs).replace("## The table", "## What it shows\n\nMuch.\n\n## The table")
+    assert by_hand(page(runs)) == ""
+    assert page(runs, said=by_hand(written)) == written
 
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:

@@ -123,9 +123,9 @@ DISCREPANCY = {
         Rows(POINT, 1, MOST_POINTS, "points"),
         "inducing points: conditions, in the lengths over which it changes",
     ),
-    "torque": Key(_channel("N*m"), "of the torque at the axle"),
+    "torque": Key(_channel("N*m"), "of the torque at the axle", ABSENT),
     "drawbar_pull": Key(_channel("N"), "of the drawbar pull", ABSENT),
-    "sinkage": Key(_channel("m"), "of the sinkage"),
+    "sinkage": Key(_channel("m"), "of the sinkage", ABSENT),
     "soil": Key(
         Section(SOIL, LearntSoil),
         "the soil it was learnt with, and its correlation with it",
@@ -140,8 +140,10 @@ def discrepancy() -> Section:
 
 
 def _form(**values: Any) -> LearntForm:
-    """Raises Impossible where lists do not fit together, or points coincide."""
+    """Raises Impossible where no channel has any, lists do not fit together, or points coincide."""
     form = LearntForm(**values)
+    if not any(form.channels):
+        raise Impossible("points", f"one at least of {', '.join(CHANNELS)} beside them")
     for name, channel in zip(CHANNELS, form.channels, strict=True):
         if channel is not None:
             _check_channel(name, channel, form)
@@ -159,7 +161,7 @@ def _check_channel(name: str, channel: ChannelForm, form: LearntForm) -> None:
     if len(channel.mean) != points:
         raise Impossible(f"{name}.mean", f"{points} numbers, one a point")
     if len(channel.spread) != form.directions:
-        raise Impossible(f"{name}.spread", f"{form.directions} directions, as many as of torque")
+        raise Impossible(f"{name}.spread", f"{form.directions} directions, the same for all")
     for row in channel.spread:
         if len(row) != points:
             raise Impossible(

@@ -31,11 +31,23 @@ SPEED = 1.0  # ln(rω / usual rω)
 DIRECTION = 0.7  # forward 1, backward −1
 LAG = 0.15  # slip less the slip a while ago [-]
 LOAD_LAG = 0.3  # ln W less ln W a while ago
-TRAVELS = (0.003, 0.01, 0.03)  # [m] of rim over which "a while ago" is forgotten
+# [m] of rim over which "a while ago" is forgotten: a rim's compliance, a contact, a rut dug anew
+TRAVELS = (0.003, 0.01, 0.03, 0.1)
+LOAD_TRAVEL = 0.03  # [m] the same for the load
 
 CARRYING = 0.2  # of the usual load: below it the wheel hardly touches soil, and δ is zero
 
-CONDITIONS = ("slip", "load", "speed", "direction", "short_lag", "lag", "long_lag", "load_lag")
+CONDITIONS = (
+    "slip",
+    "load",
+    "speed",
+    "direction",
+    "short_lag",
+    "lag",
+    "long_lag",
+    "longest_lag",
+    "load_lag",
+)
 
 
 def covariance(x: Array, y: Array) -> Array:
@@ -127,8 +139,8 @@ def conditions_of(
     slip, weight = np.clip(slip, -1.0, 1.0), np.log(np.maximum(load, 1e-3) / usual.load)
     speed = np.log(np.maximum(rim_speed, 1e-6) / usual.rim_speed)
     lags = [trailing(slip, travel, length) - slip for length in TRAVELS]
-    load_lag = trailing(weight, travel, TRAVELS[-1]) - weight
+    load_lag = trailing(weight, travel, LOAD_TRAVEL) - weight
 
-    lengths = (SLIP, LOAD, SPEED, DIRECTION, LAG, LAG, LAG, LOAD_LAG)
+    lengths = (SLIP, LOAD, SPEED, DIRECTION, *(LAG,) * len(TRAVELS), LOAD_LAG)
     parts = (slip, weight, speed, direction, *lags, load_lag)
     return np.column_stack([part / length for part, length in zip(parts, lengths, strict=True)])

@@ -70,14 +70,17 @@ class LearntSoil:
 
 @dataclass(frozen=True)
 class LearntForm:
-    """δ of all channels. points: conditions (m, d), in units of the lengths of discrepancy.py."""
+    """δ of the channels of which it was learnt, one at least; of the others nothing is known.
+
+    points: conditions (m, d), in units of the lengths of discrepancy.py.
+    """
 
     load: float  # usual load, from which conditions count [N]
     speed: float  # usual rim speed [m/s]
     domain: Domain
     points: tuple[Vector, ...]
-    torque: ChannelForm
-    sinkage: ChannelForm
+    torque: ChannelForm | None = None
+    sinkage: ChannelForm | None = None
     drawbar_pull: ChannelForm | None = None
     soil: LearntSoil | None = None
 
@@ -89,4 +92,4 @@ class LearntForm:
     @property
     def directions(self) -> int:
         """r."""
-        return len(self.torque.spread)
+        return next((len(c.spread) for c in self.channels if c is not None), 0)

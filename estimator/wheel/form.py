@@ -13,6 +13,7 @@ from gritd.estimator.model.discrepancy import (
     LAG,
     LOAD,
     LOAD_LAG,
+    LOAD_TRAVEL,
     SLIP,
     SPEED,
     TRAVELS,
@@ -98,15 +99,15 @@ class FormOnLine:
         return (*self._lagging(now, memory), now.wheel_angle)
 
     def _lagging(self, now: Wheeling, memory: Recall) -> Vector:
-        """Low-passes along the travel of the rim: of the slip over TRAVELS, of ln load over the
-        last of them.
+        """Low-passes along the travel of the rim: of the slip over TRAVELS, of ln load over
+        LOAD_TRAVEL.
         """
         present = (*(_short(now.slip),) * len(TRAVELS), self._log_load(now))
         if not memory:
             return present
         *before, angle = memory
         travel = self._radius * abs(now.wheel_angle - angle)
-        kept = [exp(-travel / length) for length in (*TRAVELS, TRAVELS[-1])]
+        kept = [exp(-travel / length) for length in (*TRAVELS, LOAD_TRAVEL)]
         return tuple([k * b + (1.0 - k) * p for k, b, p in zip(kept, before, present, strict=True)])
 
     def _log_load(self, now: Wheeling) -> float:

@@ -301,7 +301,7 @@ def test_little_address_space(tmp_path, size, figure):
     arguments = {
         "replay": (path,), "recover": (path,), "compare": (path, *CONFIG),
         "diagnose": (path, *CONFIG, "--jobs", "2"), "simulate": ("-o", tmp_path / "x.mcap"),
-        "check-config": (), "reproduce": (), "status": (),
+        "check-config": (), "reproduce": (), "status": ("--socket", tmp_path / "none"),
         "import": ("table", tmp_path, "-o", tmp_path),
     }  # fmt: skip
     faults, worked = [], 0

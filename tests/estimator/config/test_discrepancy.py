@@ -70,7 +70,7 @@ def test_it_takes_the_place_of_an_earlier_one():
         (r"  speed: 0\.025 m/s\n", "", "discrepancy.speed", "a quantity in m/s"),
         (r"slip: \[0\.02, 0\.65\]", "slip: [0.7, 0.65]", "domain.slip", "the low end below"),
         (r"travel: forward", "travel: sideways", "domain.travel", "one of forward, backward, both"),
-        (r"points: \[\[", "points: [[1.0, ", "discrepancy.points.0", "a list of 8 numbers (slip"),
+        (r"points: \[\[", "points: [[1.0, ", "discrepancy.points.0", "a list of 9 numbers (slip"),
         (r"points: .*\n", "points: []\n", "discrepancy.points", "a list of 1 to 64 points"),
         (r"points: .*\n", "points: 3\n", "discrepancy.points", "a list of 1 to 64 points"),
         (r"mean: \[", "mean: [0.5, ", "discrepancy.torque.mean", "4 numbers, one a point"),
@@ -92,11 +92,22 @@ def test_a_mistake_is_one_line(pattern, new, key, expected):
     assert line.startswith("rig.yaml:") and key in line and "found" in line and expected in line
 
 
+def test_of_sinkage_and_pull_alone():
+    """A table without torque teaches a discrepancy too."""
+    given = forms.form(2, torque=False)
+    assert config.loads(written(given), "rig.yaml").settings.discrepancy == given
+
+
+def test_of_no_channel_at_all():
+    line = message(re.sub(r"  (torque|sinkage|drawbar_pull): \{.*\n", "", TEXT))
+    assert "discrepancy.points" in line and "one at least of torque, drawbar_pull, sinkage" in line
+
+
 def test_channels_have_the_same_directions():
     found = forms.form(3, directions=2)
     more = forms.form(3, directions=3)
     line = message(written(type(found)(**{**vars(found), "sinkage": more.sinkage})))
-    assert "discrepancy.sinkage.spread" in line and "2 directions, as many as of torque" in line
+    assert "discrepancy.sinkage.spread" in line and "2 directions, the same for all" in line
 
 
 def test_points_that_differ_by_nothing_still_have_a_root():

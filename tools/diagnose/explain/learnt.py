@@ -55,7 +55,7 @@ def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) ->
     stack, marginal = problem.stack, model.marginal
     sources = [s for s in stack.rig.forms if not s.drive]
     usual = usual_of(stack.rig.runs)
-    if marginal is None or usual is None or not {"torque", "sinkage"} <= {s.name for s in sources}:
+    if marginal is None or usual is None or not sources:
         return None
 
     unknowns = _Unknowns(problem, model, sources, soil)
@@ -194,17 +194,13 @@ class _Reduced:
         for number, (name, part) in enumerate(self._parts.items()):
             place = slice(number * size, (number + 1) * size)
             channels[name] = self._channel(part, place)
-        torque, pull, sinkage = (channels[name] for name in CHANNELS)
-        assert torque is not None and sinkage is not None
         return LearntForm(
             float(f"{usual.load:.4g}"),
             float(f"{usual.rim_speed:.4g}"),
             domain,
             tuple(tuple(row) for row in self._points.tolist()),
-            torque,
-            sinkage,
-            pull,
-            self._soil(),
+            **channels,
+            soil=self._soil(),
         )
 
     def _channel(self, part: _Source, place: slice) -> ChannelForm:

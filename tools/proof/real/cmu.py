@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.proof.real.bench import Bench, DiagnosisRun
@@ -38,12 +37,6 @@ def _run(bench: Bench) -> Finding:
     of_smooth = list((smooth / "smooth-table").glob("*.mcap"))
     first = bench.diagnosis(of_smooth, smooth / "cmu.yaml", "cmu-smooth")
 
-    learnt = bench.folder / "cmu-learnt.yaml"
-    learnt.write_text(
-        with_soil((bench.folder / "cmu-smooth.yaml").read_text(encoding="utf-8"), first.result),
-        encoding="utf-8",
-    )
-
     fit, held = (
         bench.imported("cmu", name, "--wheel", "grouser", *_speeds(speeds), files=TABLES)
         / "grouser-table"
@@ -52,8 +45,9 @@ def _run(bench: Bench) -> Finding:
     of_fit = list(fit.glob("*.mcap"))
     second = bench.diagnosis(of_fit, smooth / "cmu.yaml", "cmu-grouser", of_smooth)
 
+    learnt = [bench.folder / f"cmu-{name}.yaml" for name in ("smooth", "grouser")]
     seen, unseen = (
-        _conditions(Judge(sorted(f.glob("*.mcap")), learnt), second.result) for f in (fit, held)
+        _conditions([Judge(sorted(f.glob("*.mcap")), path) for path in learnt]) for f in (fit, held)
     )
 
     rows = [
@@ -83,51 +77,13 @@ def _speeds(speeds: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(a for speed in speeds for a in ("--rim-speed", speed))
 
 
-def with_soil(text: str, diagnosis: dict[str, Any]) -> str:
-    """A configuration with the soil that a diagnosis fitted, values and sigmas."""
-    document = yaml.safe_load(text)
-    after = diagnosis["soil"]["after"]
-
-    units = {
-        "cohesion": ("c", "Pa"),
-        "tan_phi": ("tan_phi", ""),
-        "shear_modulus": ("k", "m"),
-        "exponent": ("n", ""),
-    }
-
-    for name, (symbol, unit) in units.items():
-        document["soil"][name] = {
-            key: _written(after[symbol][key], unit) for key in ("value", "sigma")
-        }
-
-    modulus = after["K"]
-    document["soil"]["k_c"] = "0 kN/m^(n+1)"
-    document["soil"]["k_phi"] = f"{modulus['value'] / 1e3:.6g} kN/m^(n+2)"
-    document["soil"]["modulus_sigma"] = f"{100.0 * modulus['sigma'] / modulus['value']:.4g} %"
-
-    return yaml.safe_dump(
-        document,
-        sort_keys=False,
-        allow_unicode=True,
-        width=120,
-        explicit_start=True,
-        explicit_end=True,
-    )
-
-
-def _written(value: float, unit: str) -> Any:
-    return f"{value:.6g} {unit}" if unit else float(f"{value:.6g}")
-
-
-def _conditions(judge: Judge, diagnosis: dict[str, Any]) -> dict[str, Array]:
+def _conditions(judges: Sequence[Judge]) -> dict[str, Array]:
     """Slip, measured, predicted as if smooth, predicted with what was found: (4, conditions) of
-    each channel.
+    each channel. judges: with the configuration that `--apply` wrote of the smooth wheel, and with
+    that of the other.
     """
-    models = (
-        [run.measured for run in judge.rig.runs],
-        judge.predicted(None),
-        judge.predicted(diagnosis),
-    )
+    judge = judges[0]
+    models = ([run.measured for run in judge.rig.runs], *(j.predicted(None) for j in judges))
 
     out = {}
     for channel, (_, factor) in CHANNELS.items():

@@ -9,7 +9,7 @@ import pytest
 
 from gritd.tools.proof.real.__main__ import main
 from gritd.tools.proof.real.bench import DiagnosisRun
-from gritd.tools.proof.real.cmu import moduli, with_soil
+from gritd.tools.proof.real.cmu import moduli
 from gritd.tools.proof.real.figure import draw
 from gritd.tools.proof.real.page import page, section
 from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table
@@ -72,19 +72,6 @@ def test_a_group_is_what_was_accepted_and_what_cannot_be_told_from_it() -> None:
     assert one.group == {"coulomb_friction", "current_offset"}
     assert one.values("coulomb_friction") == {"loss": 1.8}
     assert one.values("grousers") == {}
-
-
-def test_the_soil_that_was_fitted_becomes_the_configuration() -> None:
-    after = {
-        "c": {"value": 300.0, "sigma": 50.0},
-        "tan_phi": {"value": 0.6, "sigma": 0.02},
-        "k": {"value": 0.012, "sigma": 0.001},
-        "n": {"value": 1.1, "sigma": 0.05},
-        "K": {"value": 2.0e6, "sigma": 1.0e5},
-    }
-    text = with_soil("soil:\n  cohesion: 1 kPa\n  k_c: 3 kN/m^(n+1)\n", {"soil": {"after": after}})
-    assert "value: 300 Pa" in text and "value: 0.012 m" in text
-    assert "k_phi: 2000 kN/m^(n+2)" in text and "modulus_sigma: 5 %" in text
 
 
 def test_moduli_of_a_plate_pressed_into_a_known_soil(tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ LONG = ("position", "time", "heat")  # covariates along which waves stand for an
 
 
 def smooth_signatures(stack: Stack, everywhere: bool = False) -> tuple[Signature, ...]:
-    """One for each channel and covariate (or product of two) that varies; everywhere: in the
-    reference campaign too.
+    """One for each channel and covariate (or product of two) that varies, heat for what the motor
+    tells alone; everywhere: in the reference campaign too.
     """
     signatures = []
     for channel in stack.rig.channels:
@@ -31,6 +31,8 @@ def smooth_signatures(stack: Stack, everywhere: bool = False) -> tuple[Signature
         size = size_of(stack, channel)
 
         for along, columns in _families(stack):
+            if along == ("heat",) and channel not in stack.rig.heated:
+                continue
             acting = (own if everywhere else own & stack.new)[:, None]
             kept = _scaled(np.where(acting, columns, 0.0), own, size)
             if kept.shape[1]:

@@ -55,6 +55,7 @@ class DriveRig:
     held: Held | None = None
     lines = NO_LINES
     latencies: Sequence[Latency] = ()
+    heated = channels
     smooth = (
         ("speed",),
         ("velocity",),

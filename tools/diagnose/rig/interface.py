@@ -189,6 +189,10 @@ class Rig(Protocol):
         """Covariates, alone or multiplied, on which a smooth misfit may depend."""
 
     @property
+    def heated(self) -> tuple[str, ...]:
+        """Channels that are read through the motor: only these may change as it warms up."""
+
+    @property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
         """Per run, standard deviation (n,) of every channel's prediction by what is left open of
         the motion, in the channel's unit.

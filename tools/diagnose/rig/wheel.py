@@ -60,6 +60,7 @@ class WheelRig:
     """See interface.Rig."""
 
     units: Mapping[str, str] = UNITS
+    heated = ("torque",)
     smooth = (
         ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"),
         ("slip", "sinkage"), ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),

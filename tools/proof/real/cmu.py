@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,8 @@ def _conditions(judges: Sequence[Judge]) -> dict[str, Array]:
     that of the other.
     """
     judge = judges[0]
-    models = ([run.measured for run in judge.rig.runs], *(j.predicted(None) for j in judges))
+    models: list[Sequence[Mapping[str, Array]]] = [[run.measured for run in judge.rig.runs]]
+    models += [j.predicted(None) for j in judges]
 
     out = {}
     for channel, (_, factor) in CHANNELS.items():

@@ -34,6 +34,8 @@ LOAD_LAG = 0.3  # ln W less ln W a while ago
 # [m] of rim over which "a while ago" is forgotten: a rim's compliance, a contact, a rut dug anew
 TRAVELS = (0.003, 0.01, 0.03, 0.1)
 LOAD_TRAVEL = 0.03  # [m] the same for the load
+START = 0.5  # what is left of a start: 1 where a run begins, forgotten over START_TRAVEL
+START_TRAVEL = 0.05  # [m] of rim: soil under a wheel that was set down is not yet sheared or pushed
 
 CARRYING = 0.2  # of the usual load: below it the wheel hardly touches soil, and δ is zero
 
@@ -47,6 +49,7 @@ CONDITIONS = (
     "long_lag",
     "longest_lag",
     "load_lag",
+    "start",
 )
 
 
@@ -141,6 +144,8 @@ def conditions_of(
     lags = [trailing(slip, travel, length) - slip for length in TRAVELS]
     load_lag = trailing(weight, travel, LOAD_TRAVEL) - weight
 
-    lengths = (SLIP, LOAD, SPEED, DIRECTION, *(LAG,) * len(TRAVELS), LOAD_LAG)
-    parts = (slip, weight, speed, direction, *lags, load_lag)
+    start = np.exp(-np.abs(travel - travel[:1]) / START_TRAVEL)
+
+    lengths = (SLIP, LOAD, SPEED, DIRECTION, *(LAG,) * len(TRAVELS), LOAD_LAG, START)
+    parts = (slip, weight, speed, direction, *lags, load_lag, start)
     return np.column_stack([part / length for part, length in zip(parts, lengths, strict=True)])

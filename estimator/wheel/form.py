@@ -16,6 +16,8 @@ from gritd.estimator.model.discrepancy import (
     LOAD_TRAVEL,
     SLIP,
     SPEED,
+    START,
+    START_TRAVEL,
     TRAVELS,
 )
 from gritd.estimator.model.learnt import LearntForm, Vector
@@ -78,8 +80,9 @@ class FormOnLine:
             load / LOAD,
             speed / SPEED,
             direction / DIRECTION,
-            *[(lag - slip) / LAG for lag in lags[:-1]],
-            (lags[-1] - load) / LOAD_LAG,
+            *[(lag - slip) / LAG for lag in lags[:-2]],
+            (lags[-2] - load) / LOAD_LAG,
+            lags[-1] / START,
         )
         touched = weights_of(
             np.array([now.load]),
@@ -95,20 +98,23 @@ class FormOnLine:
         return self._evaluated(steady, here.weight)
 
     def remember(self, now: Wheeling, memory: Recall) -> Recall:
-        """Slips and ln load a while ago, after a window, and the wheel angle there."""
+        """Slips and ln load a while ago and what is left of the start, after a window, and the
+        wheel angle there.
+        """
         return (*self._lagging(now, memory), now.wheel_angle)
 
     def _lagging(self, now: Wheeling, memory: Recall) -> Vector:
         """Low-passes along the travel of the rim: of the slip over TRAVELS, of ln load over
-        LOAD_TRAVEL.
+        LOAD_TRAVEL, and of a start over START_TRAVEL.
         """
         present = (*(_short(now.slip),) * len(TRAVELS), self._log_load(now))
         if not memory:
-            return present
+            return (*present, 1.0)
         *before, angle = memory
         travel = self._radius * abs(now.wheel_angle - angle)
-        kept = [exp(-travel / length) for length in (*TRAVELS, LOAD_TRAVEL)]
-        return tuple([k * b + (1.0 - k) * p for k, b, p in zip(kept, before, present, strict=True)])
+        kept = [exp(-travel / length) for length in (*TRAVELS, LOAD_TRAVEL, START_TRAVEL)]
+        every = zip(kept, before, (*present, 0.0), strict=True)
+        return tuple([k * b + (1.0 - k) * p for k, b, p in every])
 
     def _log_load(self, now: Wheeling) -> float:
         return log(max(now.load, 1e-3) / self._load)

@@ -70,7 +70,7 @@ def test_it_takes_the_place_of_an_earlier_one():
         (r"  speed: 0\.025 m/s\n", "", "discrepancy.speed", "a quantity in m/s"),
         (r"slip: \[0\.02, 0\.65\]", "slip: [0.7, 0.65]", "domain.slip", "the low end below"),
         (r"travel: forward", "travel: sideways", "domain.travel", "one of forward, backward, both"),
-        (r"points: \[\[", "points: [[1.0, ", "discrepancy.points.0", "a list of 9 numbers (slip"),
+        (r"points: \[\[", "points: [[1.0, ", "discrepancy.points.0", "a list of 10 numbers (slip"),
         (r"points: .*\n", "points: []\n", "discrepancy.points", "a list of 1 to 64 points"),
         (r"points: .*\n", "points: 3\n", "discrepancy.points", "a list of 1 to 64 points"),
         (r"mean: \[", "mean: [0.5, ", "discrepancy.torque.mean", "4 numbers, one a point"),

@@ -61,9 +61,9 @@ class Fit:
         DRIVE_SIZES, "-", "of a channel's size: what a model of a drive misses"
     )
     drive_prior: tuple[float, ...] = tuned(DRIVE_PRIOR, "prior", "probability of each of the sizes")
-    form_features: int = tuned(36, "features", "of a source at most", "run time")
+    form_features: int = tuned(72, "features", "of a source at most", "run time")
     form_features_shared: int = tuned(
-        90,
+        180,
         "features",
         "of a source at most, with a reference campaign: it follows every transient that both have",
         "judgement",

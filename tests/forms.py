@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gritd.estimator.model.discrepancy import CONDITIONS
+from gritd.estimator.model.discrepancy import CONDITIONS, Usual, conditions_of, features_of
 from gritd.estimator.model.learnt import ChannelForm, Domain, LearntForm, LearntSoil
+from gritd.estimator.stages.situation import signed_slip
 
 DOMAIN = Domain((0.02, 0.65), (28.0, 110.0), (0.015, 0.04))
 
@@ -21,13 +22,32 @@ def channel(rng, size, points, directions, rest=0.02, scale=0.3):
     )
 
 
-def form(seed=0, points=6, directions=3, soil=None, pull=True, size=0.05, torque=True):
-    """A δ whose sizes are that share of usual torque, pull and sinkage at 60 N."""
-    rng = np.random.default_rng(seed)
+def held(points, rng):
+    """Conditions (points, d) that are held."""
     where = np.zeros((points, len(CONDITIONS)))
     where[:, 0] = np.linspace(0.3, 2.4, points)  # slip 0.075 to 0.6
     where[:, 1] = rng.permutation(np.linspace(-1.2, 1.0, points))  # 33 to 99 N
     where[:, 3] = 1.43  # forward
+    return where
+
+
+def driven(motion, radius, points):
+    """Conditions (points, d) of a run, spread as those of a learnt δ are."""
+    rim = radius * motion.wheel_speed
+    slip, direction = signed_slip(rim, motion.carriage_speed)
+    travel = radius * np.abs(motion.wheel_angle)
+    given = slip, motion.load, np.abs(rim), direction, travel
+    conditions = conditions_of(*given, Usual(60.0, 0.025))
+    return features_of(conditions[np.abs(rim) > 0.0], points, 1e-3).points
+
+
+def form(seed=0, points=6, directions=3, soil=None, pull=True, size=0.05, torque=True, where=None):
+    """A δ whose sizes are that share of usual torque, pull and sinkage at 60 N; where: conditions
+    (points, d), else some that are held.
+    """
+    rng = np.random.default_rng(seed)
+    where = held(points, rng) if where is None else where
+    points = len(where)
     return LearntForm(
         60.0,
         0.025,

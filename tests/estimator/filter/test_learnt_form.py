@@ -26,7 +26,8 @@ from tests.estimator.online.rig import SETTINGS
 TRUE = {"cohesion": 750.0, "tan_phi": 0.62, "shear_modulus": 0.0225}
 SOIL = soil_of(SETTINGS, TRUE)
 MOTION = motion_of(schedule(45.0), SETTINGS.wheel.radius, 50.0)
-KNOWN = forms.form(1)
+DRIVEN = forms.driven(MOTION, SETTINGS.wheel.radius, 24)
+KNOWN = forms.form(1, where=DRIVEN)
 KEPT = ("torque", "drawbar_pull", "sinkage")
 
 
@@ -94,7 +95,7 @@ def test_the_mean_of_delta_brings_c_and_tan_phi_back():
 
 def test_what_delta_leaves_open_is_not_averaged_away():
     """δ drawn anew for every rig from what is left open: σ is true of the errors."""
-    wide = forms.form(1, size=0.15)
+    wide = forms.form(1, size=0.15, where=DRIVEN)
     form = replace(wide, **{n: replace(getattr(wide, n), rest=0.0) for n in KEPT})
     rng, errors = np.random.default_rng(5), []
     narrow = []

@@ -8,12 +8,12 @@ smooth share of what the effect does. An effect that adds S(x) to all channels m
 with one h for all channels: the strength itself varies smoothly with the conditions, with time and
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
 own, since another formula shares the effect out among the channels in another way. What an effect
-does may follow slip and load over an arc of rolling, and build up where each run begins: soil has
-to move first. A ripple may also have other harmonics. What the parameters of the model's effects
-can do is taken out of all this, so that a strength is what its effect does on the whole. ρ is how
-far published forms differ; its prior is over 0 to 40 %. Our own form may be the best one to name an
-effect by, but the soil is never told as if it were exact: where the soil can absorb most of an
-effect, another form of it changes the soil and hardly the fit.
+of the soil does may follow slip and load over an arc of rolling, and build up where each run
+begins: soil has to move first. A ripple may also have other harmonics. What the parameters of the
+model's effects can do is taken out of all this, so that a strength is what its effect does on the
+whole. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the
+best one to name an effect by, but the soil is never told as if it were exact: where the soil can
+absorb most of an effect, another form of it changes the soil and hardly the fit.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
+OF_SOIL = ("soil", "contact", "wheel")  # stages whose effects follow: soil has to move first
 
 
 def bending_sizes() -> Sizes:
@@ -48,7 +49,8 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
-            columns = np.column_stack((columns, _following(stack, added)))
+            if effect.stage in OF_SOIL:
+                columns = np.column_stack((columns, _following(stack, added)))
             columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
             found.append(freedom(effect.name, columns, noise, bending_sizes(), least))

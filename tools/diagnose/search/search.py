@@ -174,7 +174,7 @@ def promises(search: Search, model: Model) -> list[Promise]:
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
         tried = list(_tried(search, model, effects[name], settings))
         if tried:
-            best = max(tried, key=lambda promise: promise.gain)
+            best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
             usual = TUNING.screen.habit * habit.get(name, 0.0)
             found.append(replace(best, gain=best.gain - usual))
     return sorted(found, key=lambda promise: -promise.gain)

@@ -25,6 +25,9 @@ class Search:
         0.1, "share", "of an effect's linear evidence by which its fit may do better"
     )
     behind: float = tuned(12.0, "nats", "a model so far behind the best starts nothing")
+    same: float = tuned(
+        1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
+    )
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
     least_start: float = tuned(

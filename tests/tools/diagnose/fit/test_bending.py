@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from gritd.estimator.effects import make
+from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.stages.history import followed, run_begins
-from gritd.tools.diagnose.fit.bending import _following
+from gritd.tools.diagnose.fit.bending import _following, bending_freedoms
+from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.tuning import TUNING
@@ -36,6 +39,36 @@ def test_an_effect_that_follows_is_within_its_freedom() -> None:
     left = behind - columns @ np.linalg.lstsq(columns, behind, rcond=None)[0]
     assert np.max(np.abs(left)) < 1e-9
     assert np.max(np.abs(behind)) > 0.2
+
+
+@pytest.mark.parametrize(("name", "follows"), [("bulldozing", True), ("coulomb_friction", False)])
+def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
+    name: str, follows: bool
+) -> None:
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, effect = problem.stack, EFFECTS[name]
+    free = free_of((effect,))
+    fitted = problem.descend(
+        (effect,), free, np.zeros(len(stack.rig.constants)), np.ones(len(free)), rounds=0
+    )
+    (freedom,) = bending_freedoms(stack, problem.noise, fitted)
+
+    plain = stack.predict(np.zeros(len(stack.rig.constants)), ())
+    added = fitted.predicted - plain
+    building = added * np.exp(-_rolled(stack) / 1.0)
+    every = np.column_stack((freedom.columns, fitted.raw[:, len(fitted.u) :]))
+    left = building - every @ np.linalg.lstsq(every, building, rcond=None)[0]
+    assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(building)) == follows
+
+
+def _rolled(stack: Stack) -> np.ndarray:
+    """Angle [rad] that the wheel has turned since each run began (N,)."""
+    out = np.zeros(stack.size)
+    for channel, number in stack.parts:
+        own = np.flatnonzero(stack.of(channel) & (stack.run == number))
+        angle = stack.covariate("wheel_angle")[own]
+        out[own] = np.cumsum(np.abs(np.diff(angle, prepend=angle[0])))
+    return out
 
 
 def test_every_run_and_channel_begins_anew() -> None:

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit, logsumexp
 
+from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.verdict.calibration import Calibration
 from gritd.tools.proof.blind.groups import alike
@@ -131,8 +132,8 @@ def _batch(folder: Path) -> list[Case]:
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
-        if diagnosis["explanations"] and answers["effects"] and not answers.get("bed"):
-            stranger = answers["stratum"] == "unlisted"
+        if diagnosis["explanations"] and answers["effects"]:
+            stranger = not set(answers["effects"]) & EFFECTS.keys()
             held = () if answers.get("bed") else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]
             cases.append(

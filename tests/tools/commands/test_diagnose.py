@@ -109,6 +109,20 @@ def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: 
         signals(read_all([empty])[0], settings, 10.0)
 
 
+def test_a_run_that_ends_before_the_wheel_has_settled_says_so(tmp_path: Path) -> None:
+    schedule, path = tmp_path / "schedule.yaml", tmp_path / "short.mcap"
+    schedule.write_text(
+        "ramp: 500 ms\nsegments:\n"
+        "  - {duration: 5 s, load: 60 N, slip: 0.2, speed: 0 mm/s}\n"
+        "  - {duration: 2 s, load: 60 N, slip: 0.2, speed: 5 mm/s}\n"
+        "  - {duration: 2 s, load: 60 N, slip: 0.2, speed: 0 mm/s}\n"
+    )
+    assert simulate.main(["--schedule", str(schedule), "-o", str(path)]) == 0
+    line, code = said(path, "--config", packaged())
+    assert line.startswith(f"{path}: found no value of ") and code == DAMAGED
+    assert line.endswith("expected a run that goes on for longer after the wheel has started")
+
+
 def test_another_testbed_than_the_recorded_one_is_reported(run: Path) -> None:
     """The wrong file after --config makes a mismatch that no physics explains."""
     text = packaged().read_text(encoding="utf-8")

@@ -105,9 +105,12 @@ def steady_samples(
     """What each channel read in the steady stretches of a run.
 
     angle: the wheel's [rad] as its encoder told it; most: readings of a channel that are kept.
+    Channels without a reading there are left out.
     """
     begins, ends = stretches(motion)
-    out = {}
+    out: dict[str, Samples] = {}
+    if not begins.size:
+        return out
     for name, (time, values) in channels.items():
         number = np.searchsorted(begins, time, side="right") - 1
         inside = (number >= 0) & (time < ends[np.maximum(number, 0)]) & np.isfinite(values)

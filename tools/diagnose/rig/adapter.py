@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
-from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.rig.full_rate import with_lines
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.latencies import latencies_in
@@ -52,4 +52,23 @@ def rig_of(
     means = [signals(r, settings, rate) for r in ordered]
     beside, lines = with_lines(ordered, means, settings, len(reference))
     late = latencies_in(ordered[len(reference) :], means[len(reference) :], settings)
-    return WheelRig(beside, settings, len(reference), bed, lines=lines, latencies=late), rate
+    rig = WheelRig(beside, settings, len(reference), bed, lines=lines, latencies=late)
+    for new, each in ((False, reference), (True, recordings)):
+        _check_drives(rig, new, each)
+    return rig, rate
+
+
+def _check_drives(rig: WheelRig, new: bool, recordings: Sequence[Recording]) -> None:
+    """Raises CommandError where the runs of a campaign are too short for a channel to tell
+    anything: values count from some time after the wheel has started.
+    """
+    runs = [run for run, acting in zip(rig.runs, rig.new, strict=True) if acting == new]
+    counts = {c: sum(int(run.used[c].sum()) for run in runs) for c in rig.channels}
+    channel, least = min(counts.items(), key=lambda item: item[1])
+    if runs and not least:
+        names = ", ".join(str(recording.path) for recording in recordings)
+        raise CommandError(
+            f"{names}: found no value of {channel} while the wheel drives steadily;"
+            " expected a run that goes on for longer after the wheel has started",
+            DAMAGED,
+        )

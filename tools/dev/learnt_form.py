@@ -5,7 +5,8 @@ campaign taught of them.
 
 For every seed the plant of `gritd prove` draws a rig, a soil and a pair of campaigns in a world
 whose physics is not the paper's, nothing new in the second one, the bed left as it was. The first
-is diagnosed, and applied. The filter goes over the second, from run to run, three times: with the
+is diagnosed, and applied. The second is diagnosed with what was applied: nothing is new in it, so
+`consistent` is right. The filter goes over the second, from run to run, three times: with the
 stated configuration; with what was applied but its discrepancy, so with effects and soil alone; and
 with all of it.
 A line a seed says how far c and tan φ lie from the truth at the end, in σ.
@@ -25,13 +26,13 @@ from typing import Any
 import numpy as np
 
 from gritd.estimator.config import configuration as config
-from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Repeatability, Settings, settings_of_run
 from gritd.estimator.filter.estimate import KPA, Estimate
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.tools.cli.command import Parser
 from gritd.tools.diagnose.explain.apply import rewritten
+from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import read_all
@@ -77,18 +78,21 @@ def trial(seed: int, world: str) -> dict[str, Any]:
         given = Path(folder) / "given"
         handover.write(case, handover.driven(case), given)
         stated = config.load(given / handover.CONFIGURATION)
-        verdict, names, whole = _applied(stated, _files(given / handover.REFERENCE), seed)
+        first = _diagnosed(stated.settings, _files(given / handover.REFERENCE), seed)
+        whole = config.loads(rewritten(stated.text, stated, first), "applied")
         ground = case.trial.world.ground
         truth = {"c": float(ground.cohesion), "tan_phi": float(ground.tan_phi)}
         ways = (stated.settings, replace(whole.settings, discrepancy=None), whole.settings)
         files = _files(given / handover.NEW)
+        then = _diagnosed(whole.settings, files, seed)
         ends = {name: _end(way, files) for name, way in zip(KINDS, ways, strict=True)}
         began = Tracker(whole.settings, "plain").prior
     return {
         "seed": seed,
         "world": world,
-        "verdict": verdict,
-        "names": names,
+        "verdict": first.verdict,
+        "names": [h.effect for h in first.accepted],
+        "then": {"verdict": then.verdict, "names": [h.effect for h in then.accepted]},
         "truth": truth,
         "applied": _beside(began, truth),
         "ends": {name: _beside(end, truth) for name, end in ends.items()},
@@ -99,16 +103,11 @@ def _files(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.mcap"))
 
 
-def _applied(
-    stated: Configuration, files: Sequence[Path], seed: int
-) -> tuple[str, list[str], Configuration]:
-    """The verdict of a diagnosis, the names it accepts, and what --apply writes."""
-    rig, _ = rig_of(read_all(files), stated.settings)
+def _diagnosed(settings: Settings, files: Sequence[Path], seed: int) -> Diagnosis:
+    rig, _ = rig_of(read_all(files), settings)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        found = diagnose(rig, seed)
-    names = [h.effect for h in found.accepted]
-    return found.verdict, names, config.loads(rewritten(stated.text, stated, found), "applied")
+        return diagnose(rig, seed)
 
 
 def _end(settings: Settings, files: Sequence[Path]) -> Estimate:
@@ -133,12 +132,19 @@ def _line(one: Mapping[str, Any]) -> str:
         f"{kind}: c {end['c']['off']:+.1f}, tan φ {end['tan_phi']['off']:+.1f} σ"
         for kind, end in every.items()
     ]
-    names = ", ".join(one["names"]) or "no name"
-    return f"{one['world']} {one['seed']} {one['verdict']} ({names}); {'; '.join(parts)}"
+    said = " then ".join(
+        f"{found['verdict']} ({', '.join(found['names']) or 'no name'})"
+        for found in (one, one["then"])
+    )
+    return f"{one['world']} {one['seed']} {said}; {'; '.join(parts)}"
 
 
 def summary(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Of each way: how often within 2σ, rms of the errors over σ, and the median σ over truth."""
+    """How often the second campaign is consistent; of each way: how often within 2σ, rms of the
+    errors over σ, and the median σ over truth.
+    """
+    quiet = [one["then"]["verdict"] for one in told].count("consistent")
+    yield f"second campaign, nothing new, consistent: {quiet} of {len(told)}"
     for kind in KINDS:
         words = []
         for name in NAMES:

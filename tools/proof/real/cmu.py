@@ -213,9 +213,10 @@ GROUSERS = Proof(
     saw="""
         First the smooth wheel's steady states at 0 to 90 % slip, three repeats: motion, sinkage,
         load, drawbar pull, no torque. The configuration has the moduli of the plates pressed into
-        the sand, as uncertain as plates of three sizes disagree. What is found there, soil and
-        effects, becomes the configuration (`--apply`, and the fitted soil with its sigmas). Then
-        the other wheel's states, as if they were of the same wheel.
+        the sand, as uncertain as plates of three sizes disagree. Then
+        the other wheel's states, as if they were of the same wheel, with the smooth wheel's as
+        reference. The judge predicts with what `--apply` wrote of each: effects, soil and
+        discrepancy of form.
     """,
     run=_run,
 )

@@ -4,6 +4,8 @@ reference.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
@@ -52,7 +54,22 @@ def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
             share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
         )
         out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
-    return out
+    return {k.name: _beside_prior(k, out[k.name]) for k in rig.constants if k.name in out}
+
+
+def _beside_prior(known: Constant, found: Quantity) -> Quantity:
+    """What was found, with a σ that what was known before is within reach of.
+
+    Two determinations that contradict each other are off by more than their σ say, both of them
+    (Birge 1932, Phys. Rev. 40, 207-227): the form of the model may have moved the soil, or the
+    earlier measurement was wrong, and the recordings do not tell which.
+    """
+    reach = TUNING.explain.contradicts
+    moved = np.log(found.value / known.value) if known.log else found.value / known.value - 1.0
+    strain = float(moved * known.value / known.sigma)
+    if abs(strain) <= reach:
+        return found
+    return replace(found, sigma=max(found.sigma, known.spread(strain, abs(strain) / reach)))
 
 
 def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:

@@ -66,6 +66,9 @@ class Explain:
     slight_explanation: float = tuned(
         1e-3, "probability", "below which an explanation does not count for the soil"
     )
+    contradicts: float = tuned(
+        2.0, "σ", "of what was known: soil further away contradicts it, and its σ reaches back"
+    )
 
     # --- law.py ---
     term_pays: float = tuned(3.0, "nats", "a term of a law must gain")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gritd.tools.diagnose.explain.soil import _told
+from gritd.tools.diagnose.explain.result import Quantity
+from gritd.tools.diagnose.explain.soil import _beside_prior, _told
 from gritd.tools.diagnose.rig.interface import Constant
 
 C = Constant("c", 1000.0, 200.0, "Pa", soil=True, log=True)
@@ -28,6 +29,21 @@ def test_a_bed_prepared_anew_has_its_own_soil() -> None:
     relative = np.sqrt(0.2**2 * 0.04 + 0.1**2 * 0.25 - 2.0 * 0.2 * 0.1 * 0.01)
     assert told.value == pytest.approx(value)
     assert told.sigma == pytest.approx(value * relative)
+
+
+@pytest.mark.parametrize("known", [C, Constant("tan_phi", 0.6, 0.06, "", soil=True)])
+@pytest.mark.parametrize("strain", [-5.0, -1.9, 0.0, 1.9, 4.0])
+def test_a_soil_that_contradicts_what_was_known_is_as_uncertain_as_that(
+    known: Constant, strain: float
+) -> None:
+    """What was known lies within two of its σ; a soil that agrees stays as it was found."""
+    found = Quantity(known.of(strain), known.spread(strain, 0.1), known.unit)
+    told = _beside_prior(known, found)
+    assert told.value == found.value
+    if abs(strain) <= 2.0:
+        assert told == found
+    else:
+        assert told.sigma == pytest.approx(known.spread(strain, abs(strain) / 2.0))
 
 
 def test_one_bed_has_one_soil() -> None:

@@ -64,9 +64,7 @@ def _beside_prior(known: Constant, found: Quantity) -> Quantity:
     (Birge 1932, Phys. Rev. 40, 207-227): the form of the model may have moved the soil, or the
     earlier measurement was wrong, and the recordings do not tell which.
     """
-    reach = TUNING.explain.contradicts
-    moved = np.log(found.value / known.value) if known.log else found.value / known.value - 1.0
-    strain = float(moved * known.value / known.sigma)
+    reach, strain = TUNING.explain.contradicts, known.strain(found.value)
     if abs(strain) <= reach:
         return found
     return replace(found, sigma=max(found.sigma, known.spread(strain, abs(strain) / reach)))

@@ -49,6 +49,12 @@ class Constant:
             return float(self.value * np.exp(u * self.sigma / self.value))
         return float(np.clip(self.value + u * self.sigma, self.low, self.high))
 
+    def strain(self, value: float) -> float:
+        """u of a value: the inverse of `of`."""
+        if self.log:
+            return float(np.log(value / self.value) * self.value / self.sigma)
+        return (value - self.value) / self.sigma
+
     def spread(self, u: float, sigma_u: float) -> float:
         """Standard deviation of the value for one of u."""
         return float(sigma_u * self.sigma * (self.of(u) / self.value if self.log else 1.0))

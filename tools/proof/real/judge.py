@@ -17,7 +17,6 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.signals import read_all, signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.importers.segments import DURATION, PAUSE
@@ -99,7 +98,7 @@ class Judge:
         stated = {**(diagnosis["nuisance"] if when == "after" else {}), **soil}
         return np.array(
             [
-                _strain(k, stated[k.name]["value"]) if k.name in stated else 0.0
+                k.strain(stated[k.name]["value"]) if k.name in stated else 0.0
                 for k in self.rig.constants
             ]
         )
@@ -112,12 +111,6 @@ def effects(diagnosis: dict[str, Any]) -> tuple[Effect, ...]:
         for h in diagnosis["hypotheses"]
         if h["accepted"]
     )
-
-
-def _strain(known: Constant, value: float) -> float:
-    if known.log:
-        return float(np.log(value / known.value) * known.value / known.sigma)
-    return (value - known.value) / known.sigma
 
 
 def rms(values: Array) -> float:

@@ -179,20 +179,24 @@ def test_a_wall_clock_in_another_year(tmp_path, year, seed, figure):
 UNFIT = """
 import atexit, sys
 from gritd.estimator.daemon.log_sink import LogSink
-atexit.register(lambda: print("spoilt", number // 250, file=sys.stderr, flush=True))
-put, number = LogSink.put, 0
+from gritd.estimator.recording.topics import messages_of
+atexit.register(lambda: print("spoilt", made, file=sys.stderr, flush=True))
+put, number, made = LogSink.put, 0, 0
 def spoilt(self, readings, tick, loop):
-    global number
+    global number, made
     number += 1
     if number % 250 == 0:
         tick = (2**63, *tick[1:])
+        made += len(list(messages_of(tick)))
     put(self, readings, tick, loop)
 LogSink.put = spoilt
 """
 
 
 def test_a_message_that_cannot_be_written(tmp_path, seed, figure):
-    """One tick in 250 does not fit its fields: it alone is lost, counted and said."""
+    """One tick in 250 does not fit its fields: what is made of it, a tick and now and then an
+    estimate, alone is lost, counted and said.
+    """
     with service(tmp_path, driven(8.0, seed, skip=1.0), prelude=UNFIT) as (wires, daemon):
         wires.finish()
         daemon.heard("messages could not be written")

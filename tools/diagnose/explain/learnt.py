@@ -101,14 +101,24 @@ class _Unknowns:
         self.soil = np.zeros((len(told), len(self.mean)))
         self.soil[:, :count] = np.array([slope for _, slope in at])
         own = self.soil @ self.spread @ self.soil.T
-        sigma = np.sqrt(np.diag(own))
-        self.among = own / np.outer(sigma, sigma)
+        sigma, self.among = _parted(own)
         # correlation, times its own σ, of every unknown with the soil
         self.beside = self.spread @ self.soil.T / sigma
         # as it is once the soil is the one that is written
         written = [soil[k.name].value - value for k, (value, _) in zip(told, at, strict=True)]
         apart = np.linalg.lstsq(self.among, np.array(written) / sigma, rcond=None)[0]
         self.told = self.mean + self.beside @ apart
+
+
+def _parted(covariance: Array) -> tuple[Array, Array]:
+    """Standard deviations (n,) and correlations (n, n). What stands at its bound varies with
+    nothing: it counts as one of its unit, correlated with itself alone.
+    """
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    sigma = np.where(sigma > 0.0, sigma, 1.0)
+    correlation = covariance / np.outer(sigma, sigma)
+    np.fill_diagonal(correlation, 1.0)
+    return sigma, np.asarray(correlation)
 
 
 def _points(stack: Stack, sources: list[FormSource]) -> Array:

@@ -41,8 +41,9 @@ def bending_sizes() -> Sizes:
 
 def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
     """One for each effect of a fit that changes anything."""
-    found = []
+    freedoms = []
     functions = shares(stack, np.ones(stack.size, bool))
+
     for number, effect in enumerate(fitted.acting):
         added = _added(stack, fitted, number)
         if np.any(added):
@@ -51,10 +52,11 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             columns = added[:, None] * every / np.sqrt(every.shape[1])
             if effect.stage in OF_SOIL:
                 columns = np.column_stack((columns, _following(stack, added)))
+
             columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
-            found.append(freedom(effect.name, columns, noise, bending_sizes(), least))
-    return tuple(found)
+            freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
+    return tuple(freedoms)
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
@@ -85,7 +87,9 @@ def _following(stack: Stack, added: Array) -> Array:
 def _beside(noise: Noise, columns: Array, fitted: Fitted) -> Array:
     """Columns (N, m) without what the parameters of a fit's effects can do."""
     first = len(fitted.u)
-    share = np.linalg.lstsq(fitted.own[:, first:], whiten(noise, columns), rcond=1e-6)[0]
+    whitened = whiten(noise, columns)
+
+    share = np.linalg.lstsq(fitted.own[:, first:], whitened, rcond=TUNING.fit.dependent)[0]
     return np.asarray(columns - fitted.raw[:, first:] @ share)
 
 

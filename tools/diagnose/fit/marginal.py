@@ -117,6 +117,7 @@ class Marginal:
             for w, c in zip(weight, ordered, strict=True)
             if w > TUNING.fit.slight_size
         ]
+
         total = sum(w for w, _, _ in told)
         mean = sum(w * m for w, m, _ in told) / total
         spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in told) / total
@@ -268,15 +269,17 @@ def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) 
     """
     if not at.size:
         return 0.0
+
     sign = [int(f.parameter.low >= f.parameter.off) for f in strengths]
     names = [f.name for f in strengths]
     groups = [[i for i, n in enumerate(names) if n == name] for name in dict.fromkeys(names)]
     chosen = [
         sorted(i for part in parts for i in part) for parts in product(*map(_choices, groups))
     ]
+
     pull = b + a @ at  # seen from strengths of nought
-    found = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
-    return float(log_sum(found) - np.log(len(found)) - b @ at - 0.5 * at @ a @ at)
+    factors = [log_bayes(a[np.ix_(s, s)], pull[s], tuple(sign[i] for i in s)) for s in chosen]
+    return float(log_sum(factors) - np.log(len(factors)) - b @ at - 0.5 * at @ a @ at)
 
 
 def _choices(strengths: list[int]) -> list[list[int]]:

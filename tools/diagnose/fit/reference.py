@@ -37,8 +37,8 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
-    found = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
-    noise = restless(louder(noise, found), stack.measured - predicted)
+    estimated = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
+    noise = restless(louder(noise, estimated), stack.measured - predicted)
     return refit_beside(again, noise, shared_freedoms(noise, shared, ripples))
 
 

@@ -28,6 +28,7 @@ from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 
 def shared_columns(stack: Stack, u: Array, predicted: Array) -> Array:
@@ -52,11 +53,11 @@ def shared_freedoms(noise: Noise, columns: Array, ripples: Array) -> tuple[Freed
     """Freedoms of the columns (N, m) and the ripples (N, r)."""
     reduced = _reduced(columns, whiten(noise, columns))
     sizes = Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
-    found = [Freedom("effects in both", *reduced, sizes)]
+    freedoms = [Freedom("effects in both", *reduced, sizes)]
     if ripples.shape[1]:
         once = Sizes((1.0,), (1.0,))
-        found.append(Freedom("ripples in both", ripples, whiten(noise, ripples), once))
-    return tuple(f for f in found if f.columns.shape[1])
+        freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), once))
+    return tuple(f for f in freedoms if f.columns.shape[1])
 
 
 def _reduced(columns: Array, whitened: Array) -> tuple[Array, Array]:
@@ -102,6 +103,7 @@ def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
     """Pairs (N, 2) of all channels, orders and runs."""
     usual_orders = _orders(stack)
     moving = stack.covariate("speed") > 0.0
+
     for channel in stack.rig.channels if usual_orders.size else ():
         own = stack.of(channel) & moving
         shown = [line.at for line in restored(stack.rig, channel)]
@@ -110,9 +112,10 @@ def _ripples(stack: Stack, residual: Array) -> Iterator[Array]:
         waves = {n: _waves(stack, own, n, orders, whole) for n in np.unique(stack.run[own])}
         of_reference = [w for n, w in waves.items() if not stack.rig.new[n]]
         usual = _level(stack, [w.index for w in of_reference])
+
         for order, amplitude in _standing(of_reference, residual):
             for wave in (w for w in waves.values() if w.shown[order] > 0.0):
-                size = amplitude * max(_level(stack, [wave.index]) / max(usual, 1e-300), 1.0)
+                size = amplitude * max(_level(stack, [wave.index]) / max(usual, SQUARE), 1.0)
                 pair = np.zeros((stack.size, 2))
                 pair[wave.index, 0] = size * wave.wave[:, order].real
                 pair[wave.index, 1] = size * wave.wave[:, order].imag
@@ -131,7 +134,7 @@ def _orders(stack: Stack) -> Array:
     """
     fit = TUNING.fit
     turns = max(float(np.ptp(r.covariates["wheel_angle"])) for r in stack.rig.runs) / (2.0 * np.pi)
-    lowest = max(fit.lowest_ripple, TUNING.noise.cycles / max(turns, 1e-9))
+    lowest = max(fit.lowest_ripple, TUNING.noise.cycles / max(turns, SPAN))
     return np.arange(lowest, fit.highest_order + fit.ripple_spacing, fit.ripple_spacing)
 
 
@@ -152,10 +155,12 @@ def _waves(stack: Stack, own: Bools, number: int, orders: Array, whole: Bools) -
     run = stack.rig.runs[number]
     angle = run.covariates["wheel_angle"]
     turned = np.gradient(angle) / (2.0 * np.pi)  # in one interval
+
     index = np.flatnonzero(own & (stack.run == number))
     time = stack.time[index]
     damping = np.sinc(np.outer(np.interp(time, run.time, turned), orders))
     damping[:, whole] = 1.0
+
     wave = np.exp(1j * np.outer(np.interp(time, run.time, angle), orders)) * damping
     seen = np.mean(damping**2, axis=0) > TUNING.fit.ripple_shown**2
     return _Waves(index, wave, np.where(seen, 0.5 * np.sum(damping**2, axis=0), 0.0))
@@ -167,13 +172,15 @@ def _standing(runs: Sequence[_Waves], residual: Array) -> Iterator[tuple[int, fl
     """
     count = sum(w.index.size for w in runs)
     left = residual
+
     for _ in range(TUNING.fit.standing_orders if count >= TUNING.fit.ripple_values else 0):
         squares = np.sum([w.squares(left) for w in runs], axis=0)
         best = int(np.argmax(squares))
         whole = sum(float(np.sum(left[w.index] ** 2)) for w in runs)
-        gain = 0.5 * count * np.log1p(squares[best] / max(whole - squares[best], 1e-300))
+        gain = 0.5 * count * np.log1p(squares[best] / max(whole - squares[best], SQUARE))
         if gain < TUNING.fit.standing_ripple:
             return
+
         shown = sum(float(w.shown[best]) for w in runs)
         yield best, float(np.sqrt(squares[best] / shown))
         for w in runs:

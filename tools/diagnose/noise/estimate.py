@@ -24,6 +24,7 @@ from gritd.tools.diagnose.noise.lines import standing
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE, SQUARE
 
 
 def spikes(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Array:
@@ -50,11 +51,13 @@ def first_guess(stack: Stack, predicted: Array) -> Noise:
     misfit hardly touches them.
     """
     residual, colours = stack.measured - predicted, []
+
     for channel in stack.rig.channels:
         inside = stack.of(channel) & np.isfinite(stack.gaps)
         step = np.diff(residual, prepend=0.0)[inside]
         sigma = NORMAL * float(np.median(np.abs(step))) / np.sqrt(2.0) if step.size else 1.0
         colours.append(Colour(max(sigma, _least(stack, channel)), TUNING.noise.slow_times[0], 0.0))
+
     draws = tuple((c,) for c in colours)
     nothing = np.zeros((stack.size, 0))
     return Noise(
@@ -110,6 +113,7 @@ def estimate_of_reference(
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
+
     colours = tuple(f[0] for f in estimates)
     return Noise(
         stack,
@@ -261,7 +265,7 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
     taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
     free = max(count - size, 3)
 
-    variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), 1e-300) / free
+    variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), SQUARE) / free
     spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return -0.5 * (free * np.log(variance) + log_det + spread), variance
 
@@ -269,4 +273,4 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 def _least(stack: Stack, channel: str) -> float:
     """A noise no channel is below. Noise-free simulations still need a scale."""
     values = stack.measured[stack.of(channel)]
-    return TUNING.noise.floor * float(np.sqrt(np.mean(values**2))) + 1e-12 if values.size else 1.0
+    return TUNING.noise.floor * float(np.sqrt(np.mean(values**2))) + SIZE if values.size else 1.0

@@ -24,6 +24,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, covariance
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 
 def cells(stack: Stack) -> Index:
@@ -55,7 +56,7 @@ def _conditions(stack: Stack) -> Array:
             values = stack.covariate(name)
             columns.append(
                 values
-                / (width * (1.0 if name == "slip" else max(float(np.abs(values).max()), 1e-9)))
+                / (width * (1.0 if name == "slip" else max(float(np.abs(values).max()), SPAN)))
             )
     return np.column_stack(columns)
 
@@ -199,7 +200,7 @@ def _shapes(time: Array, waves: Array) -> Array:
 
     Of waves what is no drift; nothing where that is little.
     """
-    along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), 1e-9) - 1.0
+    along = 2.0 * (time - time.min()) / max(float(np.ptp(time)), SPAN) - 1.0
     drifts = legendre.legvander(along, TUNING.noise.drift_shapes - 1)
     left = waves - drifts @ np.linalg.lstsq(drifts, waves, rcond=None)[0]
     kept = np.sum(left**2, axis=0) > TUNING.noise.mostly_wave * np.sum(waves**2, axis=0)

@@ -33,9 +33,11 @@ def habits(
     """
     columns = np.column_stack([s.columns for s in everywhere])
     ends = np.cumsum([s.columns.shape[1] for s in everywhere])
-    found: dict[Candidate, float] = {}
+
+    largest: dict[Candidate, float] = {}
     effects = stack.rig.effects
     single = [stack.run == number for number in np.flatnonzero(~np.array(stack.rig.new))]
+
     for number, rows in enumerate([~stack.new, *single]):
         a, b = _in_run(projection, columns, rows)
         weighed: dict[Candidate, list[float]] = {}
@@ -46,9 +48,10 @@ def habits(
             own = slice(end - s.columns.shape[1], end)
             value = float(log_evidence(a[own, own], b[own], s.signature.sign))
             weighed.setdefault(of, []).append(value + s.signature.prior)
+
         for of, values in weighed.items():
-            found[of] = max(found.get(of, 0.0), float(logsumexp(values)))
-    return found
+            largest[of] = max(largest.get(of, 0.0), float(logsumexp(values)))
+    return largest
 
 
 def _in_run(projection: Projection, columns: Array, rows: Bools) -> tuple[Array, Array]:

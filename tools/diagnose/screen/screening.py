@@ -139,6 +139,7 @@ def chance_of(
 def _signatures(problem: Problem, model: Model, everywhere: bool = False) -> Iterator[Signature]:
     """Signatures about the model's fit; everywhere: in the reference campaign too."""
     stack, fitted = problem.stack, model.fitted
+
     for effect in stack.rig.effects.values():
         tried = list(shape_grid(stack.rig, effect))
         prior = -np.log(max(len(tried), 1))
@@ -159,6 +160,7 @@ def _worth(
     order = order_of(effect)
     if order is None or len(tried) <= TUNING.screen.loudest:
         return tried
+
     orders = sorted({fixed[order] for fixed in tried})
     loud = loudest(problem.stack, problem.noise, model.fitted.residual, orders)
     return [fixed for fixed in tried if fixed[order] in loud]

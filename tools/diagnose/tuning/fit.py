@@ -36,6 +36,9 @@ class Fit:
     following_arcs: tuple[float, ...] = tuned(
         (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
     )
+    dependent: float = tuned(
+        1e-6, "-", "of the largest singular value: parameters that do the same", "rounding"
+    )
 
     # --- descent.py ---
     gain: float = tuned(0.005, "nats", "a step that would gain less ends the descent")

@@ -1,0 +1,9 @@
+"""Least divisors and least sizes: they keep a quotient finite where a recording holds nothing.
+
+They are no tuned numbers: whatever is measured lies orders of magnitude above them, so no result
+follows their value.
+"""
+
+SPAN = 1e-9  # of a length of time [s], a way [m], an angle [rad], a load [N] or a share
+SQUARE = 1e-300  # of a sum of squares or a variance: just above what a float can hold
+SIZE = 1e-12  # of a value's size, in the value's unit

@@ -60,11 +60,11 @@ def _without_header(text: str) -> str:
 
 
 def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
-    found = {h.effect: h.parameters for h in diagnosis.accepted}
+    parameters_of = {h.effect: h.parameters for h in diagnosis.accepted}
     if diagnosis.law is not None and diagnosis.law.parameters:
-        found["empirical_law"] = diagnosis.law.parameters
+        parameters_of["empirical_law"] = diagnosis.law.parameters
 
-    for effect, parameters in found.items():
+    for effect, parameters in parameters_of.items():
         document.remove("effects", effect)
         for name, fragment in _fragments(effect, parameters).items():
             document.set(("effects", effect, name), fragment)
@@ -73,8 +73,8 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
 def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str]:
     units = {p.name: p.unit for p in EFFECTS[effect].parameters()}
     return {
-        name: quantity(found.value, found.sigma, units[name])
-        for name, found in parameters.items()
+        name: quantity(stated.value, stated.sigma, units[name])
+        for name, stated in parameters.items()
         if name in units
     }
 
@@ -82,13 +82,13 @@ def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str
 def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:
     """The fitted soil as what is known before the next run, inside the filter's bounds."""
     for name, key in SOIL_KEYS.items():
-        found, before = soil.after[name], document.written("soil", key)
+        fitted, before = soil.after[name], document.written("soil", key)
         low, high = getattr(settings.filter, f"{key}_bounds", (0.0, inf))
-        value = min(max(found.value, low), high)
+        value = min(max(fitted.value, low), high)
         if name == "tan_phi" and document.has("soil", "phi"):
-            _set_phi(document, value, found.sigma)
+            _set_phi(document, value, fitted.sigma)
         else:
-            document.set(("soil", key), quantity(value, found.sigma, SOIL_UNITS[name], before))
+            document.set(("soil", key), quantity(value, fitted.sigma, SOIL_UNITS[name], before))
 
     _set_moduli(document, settings, soil.after["n"].value, soil.after["K"])
 

@@ -111,8 +111,10 @@ def values(stack: Stack, name: str) -> Array | None:
         number = np.empty(len(began))
         number[np.argsort(began, kind="stable")] = np.arange(1, len(began) + 1)
         return np.asarray(number[stack.run])
+
     if name == "elapsed":
         return np.asarray(stack.time - np.array([run.time[0] for run in stack.rig.runs])[stack.run])
+
     return stack.covariate(name) if name in stack.rig.runs[0].covariates else None
 
 
@@ -182,6 +184,7 @@ def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array
             places = np.arange(along.min(), along.max()) + 0.5
             yield name, places, (along[:, None] > places).astype(float)
             continue
+
         if _swept(along[moving]):
             low, high = np.quantile(along[moving], TUNING.explain.change_range)
             places = _distinct(
@@ -190,6 +193,7 @@ def _steps(stack: Stack, own: Bools, moving: Bools) -> Iterator[tuple[str, Array
             if name == "time":
                 inside = [(r.time[0] < places) & (places < r.time[-1]) for r in stack.rig.runs]
                 places = places[np.any(inside, axis=0)]
+
             if places.size:
                 span = float(np.ptp(along[moving]))
                 yield from (
@@ -256,8 +260,8 @@ def _weighed(
     """Evidence (candidates, draws) of all steps, then of all windows, and their places."""
     a, b = of.a[steps.own, steps.own], of.b[steps.own, which]
     count = len(a)
-    # of the choice of step or window, form, covariate and width
-    price = np.log(4.0 * len(ALONG) * len(TUNING.explain.change_widths))
+    # of the choice of step or window (2), form (2), covariate and width
+    price = np.log(2.0 * 2.0 * len(ALONG) * len(TUNING.explain.change_widths))
 
     single = log_evidence_singly(np.diag(a), b)
     yield single - np.log(count) - price, [(i,) for i in range(count)]

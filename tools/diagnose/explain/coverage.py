@@ -33,16 +33,19 @@ def _outside(stack: Stack) -> str:
     """Covariates in which the new campaign goes beyond its reference."""
     driving = stack.covariate("speed") > 0.0
     parts = []
+
     for name in NAMED:
         values = stack.covariate(name)
         known, asked = values[driving & ~stack.new], values[driving & stack.new]
         room = TUNING.explain.beyond * max(
             float(np.ptp(known)), TUNING.explain.beyond_floor * abs(float(np.mean(known)))
         )
+
         for beyond, end, word in (
             (asked > known.max() + room, float(known.max()), "above"),
             (asked < known.min() - room, float(known.min()), "below"),
         ):
             if np.mean(beyond) > TUNING.explain.beyond_share:
                 parts.append(f"{np.mean(beyond):.0%} {word} {value_of(stack, name, end)}")
+
     return "; ".join(parts) or "nothing"

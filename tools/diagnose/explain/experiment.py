@@ -69,15 +69,18 @@ def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
     settled = {
         key: sum(gain >= TUNING.explain.gain_enough for gain in each) for key, each in gains.items()
     }
+
     key = max(gains, key=lambda k: (settled[k], 0.0 if settled[k] else sum(gains[k])))
     told = [
         m
         for m, gain in zip(rivals[1:], gains[key], strict=True)
         if gain >= TUNING.explain.gain_worth
     ]
+
     names = tuple(
         dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
     )
+
     return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(names)
 
 
@@ -145,6 +148,7 @@ def _measured(rivals: list[Model]) -> dict[str, list[float]]:
         for k in EFFECTS[n].confusable_with.values()
         if k not in DRIVEN
     }
+
     return {key: [_read(first, other, key) for other in others] for key in sorted(keys)}
 
 
@@ -161,6 +165,7 @@ def _read(one: Model, other: Model, key: str) -> float:
                     gain,
                     min(0.5 * float(x / TUNING.explain.instrument) ** 2, TUNING.explain.gain_most),
                 )
+
     return gain
 
 
@@ -216,6 +221,7 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     evidence = search.first.nameless
     if not evidence:
         return None
+
     shape = max(evidence, key=lambda s: evidence[s])
     key = ALONG.get(shape.along[0], "slip_step")
     gain = float(

@@ -87,10 +87,10 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
     )
 
 
-def _test(found: Screen) -> Test:
-    first, surprise = found.largest
+def _test(screen: Screen) -> Test:
+    first, surprise = screen.largest
     return Test(
-        label(first), surprise, found.threshold, found.p, TUNING.screen.level, len(found.nulls)
+        label(first), surprise, screen.threshold, screen.p, TUNING.screen.level, len(screen.nulls)
     )
 
 
@@ -112,12 +112,14 @@ def _hypotheses(
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
     ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
+
     out = []
     for name, probability in ranked[: TUNING.explain.shown_hypotheses]:
         models = [m for m in search.models if name in m.names]
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
         alike = _alike(decision, name)
+
         out.append(
             Hypothesis(
                 effect=name,
@@ -131,6 +133,7 @@ def _hypotheses(
                 separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
             )
         )
+
     return tuple(out)
 
 
@@ -160,6 +163,7 @@ def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]])
 def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
     """Fitted values of an effect, in what its units mean for the rig."""
     sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
+
     return {
         p.name: Quantity(
             f.value(float(x)) * rig.unit_factor(p.unit),
@@ -209,6 +213,7 @@ def _caveats(rig: Rig, redo: Mapping[str, Any]) -> list[str]:
             "One run only: nothing tells a misfit from what was peculiar to that run;"
             " thirds of it were held out."
         )
+
     return [*sentences, *rig.shortcomings]
 
 

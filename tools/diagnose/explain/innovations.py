@@ -37,12 +37,14 @@ def with_innovations(
     """
     if not soil:
         return _noted(diagnosis, NO_FILTER)
+
     try:
         before = innovations(configuration.settings, recordings)
         if not before:
             return _noted(diagnosis, NO_UPDATE)
         if not diagnosis.accepted and diagnosis.law is None:
             return _noted(diagnosis, NOTHING_NEW, before, before)
+
         improved = config.loads(applied(configuration, diagnosis), "improved configuration")
         return _noted(diagnosis, "", before, innovations(improved.settings, recordings))
     except (RecordingError, config.ConfigError) as error:

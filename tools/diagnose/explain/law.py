@@ -102,6 +102,7 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
     """Every step and wave, with its size in the channel's unit."""
     taken = start.fitted.slack[len(start.fitted.slack) - start.columns.shape[1] :]
     ends = np.cumsum([0, *(s.columns.shape[1] for s in start.functions)])
+
     for function, (first, last) in zip(start.functions, pairwise(ends.tolist()), strict=True):
         added = start.columns[:, first:last] @ taken[first:last]
         acting = added[added != 0.0]
@@ -109,6 +110,7 @@ def _words(stack: Stack, start: Start) -> Iterator[str]:
             size = float(np.sqrt(2.0 * np.mean(acting**2)))
         else:
             size = float(acting[np.argmax(np.abs(acting))])
+
         yield f"{function.shape.channel} {wording.term(stack, function.shape, size)}"
 
 
@@ -136,12 +138,14 @@ def _forward(fitted: Fitted, columns: Array) -> list[int]:
     a, b = fitted.projection().project(columns)
     kept: list[int] = []
     best = 0.0
+
     while len(kept) < len(b):
         tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
         i = max(tried, key=lambda k: tried[k])
         if tried[i] < best + TUNING.explain.term_pays:
             break
         kept, best = [*kept, i], tried[i]
+
     return kept
 
 
@@ -190,21 +194,23 @@ def _law(
     fitted, stack = start.fitted, search.problem.stack
     form = stack.rig.law
     assert form is not None
-    channel, found = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
-    terms = [f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in found.items()]
+    channel, quantities = form.channel[prefix], _quantities(fitted, len(model.fitted.x), free)
+    terms = [
+        f"{q.value:+.3g}·{form.terms[n.removeprefix(prefix + '_')]}" for n, q in quantities.items()
+    ]
     parts = [f"{channel} {' '.join(terms)}, {form.note}"] if terms else []
     parts += _words(stack, start)
 
     along = sorted({f.shape.along[0] for f in start.functions})
     covariates = {n: stack.covariate(n) for n in along}
     ranges = {n: (float(np.min(x)), float(np.max(x))) for n, x in covariates.items()}
-    edges = _stated_edges(form.effect, domain) if found else {}
+    edges = _stated_edges(form.effect, domain) if quantities else {}
     return Law(
         channel,
         "; ".join(parts),
-        {**(domain if found else {}), **ranges},
+        {**(domain if quantities else {}), **ranges},
         taken_share(search, Model(fitted)),
-        {**found, **edges},
+        {**quantities, **edges},
     )
 
 

@@ -164,6 +164,7 @@ def _calibration(rig: Rig) -> list[int]:
     by. Where the motor tells the torque too, that of the axle's sensor is not the filter's.
     """
     other = ("axle_torque_",) if {"torque", "axle_torque"} <= set(rig.channels) else ()
+
     return [
         number
         for number, constant in enumerate(rig.constants)
@@ -201,9 +202,11 @@ class _Reduced:
         """Rounded, as it is written."""
         size = len(self._points)
         channels: dict[str, ChannelForm | None] = dict.fromkeys(CHANNELS)
+
         for number, (name, part) in enumerate(self._parts.items()):
             place = slice(number * size, (number + 1) * size)
             channels[name] = self._channel(part, place)
+
         return LearntForm(
             float(f"{usual.load:.4g}"),
             float(f"{usual.rim_speed:.4g}"),
@@ -240,6 +243,7 @@ class _Reduced:
         among = np.round(
             shrunk**2 * self._unknowns.among[np.ix_(rows, rows)], TUNING.explain.learnt_places - 1
         )
+
         cohesion, tan_phi, shear_modulus = (tuple(row) for row in beside.tolist())
         three = float(among[0, 1]), float(among[0, 2]), float(among[1, 2])
         return LearntSoil(0.0, 1.0, 1.0, cohesion, tan_phi, shear_modulus, three)
@@ -269,11 +273,12 @@ def _domain(stack: Stack, sources: list[FormSource]) -> Domain:
     slip, load, speed, direction = (
         stack.covariate(name)[acting] for name in ("slip", "load", "speed", "direction")
     )
+
     forward, backward = bool(np.any(direction > 0.0)), bool(np.any(direction < 0.0))
     return Domain(
-        _ends(slip, 2),
-        _ends(load, 2),
-        _ends(speed, 5),
+        _ends(slip, TUNING.explain.learnt_end_places),
+        _ends(load, TUNING.explain.learnt_end_places),
+        _ends(speed, TUNING.explain.learnt_speed_places),
         "both" if forward and backward else "forward" if forward else "backward",
     )
 

@@ -29,6 +29,7 @@ from gritd.tools.diagnose.screen.scans import candidates
 from gritd.tools.diagnose.screen.screen import tail_chance
 from gritd.tools.diagnose.screen.screening import Screening, chance_of
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 STRAINED = ("scale", "offset")  # constants of a channel's calibration
 
@@ -124,7 +125,7 @@ def _smooth_places(
         for family in _taken_up(projected, here):
             before, told = _gain(projected, _joined(told))[0], [*told, family]
             nats = _gain(projected, _joined(told))[0] - before
-            share = float(np.clip(nats / max(whole, 1e-9), 0.0, 1.0))
+            share = float(np.clip(nats / max(whole, SPAN), 0.0, 1.0))
             if q[family] <= TUNING.explain.false_discovery and share >= TUNING.explain.least_share:
                 chance = float(q[family])
                 location = _location(stack, residual, family, here, points, share, chance)
@@ -277,6 +278,7 @@ def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
     """Families of a channel by evidence, each beside those before it."""
     taken: list[Family] = []
     best = 0.0
+
     while True:
         tried = {f: _evidence(projected, [*taken, f]) for f in families if f not in taken}
         first = max(tried, key=lambda f: tried[f], default=None)
@@ -327,7 +329,7 @@ def _ripples(
 
         p = tail_chance(nats[:, 1:].max(axis=0), float(nats[best, 0]))
         whole = _gain(projected, _joined(here))[0]
-        share = float(nats[best, 0] / max(nats[best, 0] + whole, 1e-9))
+        share = float(nats[best, 0] / max(nats[best, 0] + whole, SPAN))
         q = min(p * len(channels), 1.0)  # any of them may ripple by noise (Bonferroni)
         if q <= TUNING.explain.order_chance and share >= TUNING.explain.least_share:
             amplitude = size * _amplitude(left, best, best + orders.size)
@@ -358,13 +360,15 @@ def _beside_smooth(
 def _pair(left: Projected, one: int, two: int) -> Array:
     """Nats (1 + draws,) that cosine and sine of an order gain."""
     own = [one, two]
-    gained = np.linalg.solve(left.a[np.ix_(own, own)] + 1e-9 * np.eye(2), left.b[own])
+    gained = np.linalg.solve(
+        left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2), left.b[own]
+    )
     return np.asarray(0.5 * np.sum(left.b[own] * gained, axis=0))
 
 
 def _amplitude(left: Projected, one: int, two: int) -> float:
     own = [one, two]
-    a = left.a[np.ix_(own, own)] + 1e-9 * np.eye(2)
+    a = left.a[np.ix_(own, own)] + TUNING.explain.ridge * np.eye(2)
     return float(np.linalg.norm(np.linalg.solve(a, left.b[own, 0])))
 
 

@@ -27,9 +27,9 @@ def check_rig(recordings: Sequence[Recording], settings: Settings, source: str) 
     """
     for recording in recordings:
         recorded = _recorded(recording)
-        if recorded is not None and (found := _other_rig(recorded, settings)):
+        if recorded is not None and (difference := _other_rig(recorded, settings)):
             raise CommandError(
-                f"{source}: another testbed than that of {recording.path.name}: {found}; "
+                f"{source}: another testbed than that of {recording.path.name}: {difference}; "
                 "expected its own configuration, or --other-rig where it is meant",
                 USAGE,
             )

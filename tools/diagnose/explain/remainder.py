@@ -13,6 +13,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 ALONG = ("slip", "load", "speed", "position", "time", "wheel_angle")
 
@@ -23,7 +24,8 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
     """
     stack, rig = problem.stack, problem.stack.rig
     left = stack.measured - model.fitted.predicted
-    found = {}
+    told = {}
+
     for channel, colour in zip(rig.channels, problem.noise.colours, strict=True):
         own = np.flatnonzero(stack.of(channel))
         squares = float(np.mean(left[own] ** 2)) - colour.sigma**2
@@ -33,8 +35,9 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
             if size > TUNING.explain.remainder_noise * colour.sigma
             else "within the noise"
         )
-        found[channel] = Remainder(size, rig.units[channel], where)
-    return found
+        told[channel] = Remainder(size, rig.units[channel], where)
+
+    return told
 
 
 def _where(stack: Stack, channel: str, left: Array) -> str:
@@ -62,7 +65,7 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
 
 def _share(along: Array, left: Array) -> float:
     """Share of the squares about the mean that a smooth function of a covariate takes."""
-    if along.size < TUNING.explain.remainder_values or np.ptp(along) <= 1e-9:
+    if along.size < TUNING.explain.remainder_values or np.ptp(along) <= SPAN:
         return 0.0
     scaled = (along - along.mean()) / np.ptp(along)
     columns = np.vander(scaled, TUNING.explain.remainder_bends + 1)
@@ -78,9 +81,11 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
     spread = np.sqrt(np.sum(fitted.allowance.carried**2, axis=1))
     source = "reference" if stack.referred else "recordings"
     learnt = source if fitted.slack.size > count else "prior"
-    found = {}
+
+    told = {}
     for channel in rig.channels:
         own = stack.of(channel)
         size = float(np.sqrt(np.mean(spread[own] ** 2))) if own.any() else 0.0
-        found[channel] = Discrepancy(size, rig.units[channel], learnt)
-    return found
+        told[channel] = Discrepancy(size, rig.units[channel], learnt)
+
+    return told

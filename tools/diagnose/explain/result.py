@@ -117,6 +117,7 @@ class SoilFit:
             for k, s in self.strain.items()
             if math.isfinite(s) and abs(s) >= TUNING.explain.strained_soil
         ]
+
         moved = [f"{SOIL.get(k, k)} by {s:+.1f} σ".replace("-", "−") for k, s in far]
         together = ", ".join(moved[:-1]) + (" and " if moved[1:] else "") + "".join(moved[-1:])
         return f"Without an effect the fit moves {together} from what was known." if moved else ""
@@ -335,6 +336,7 @@ class Diagnosis:
         """The contract of docs/diagnosis.md; more keys than those promised may appear."""
         whole = asdict(replace(self, learnt=None))
         del whole["learnt"]
+
         soil, fit = whole.pop("soil"), whole.pop("fit")
         whole["soil"] = soil and {**soil, "strain_words": self.soil.strained() if self.soil else ""}
         whole["fit"] = {

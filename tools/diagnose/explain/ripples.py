@@ -74,6 +74,7 @@ def left_over(rig: Rig, accepted: Sequence[Effect]) -> Iterator[str]:
             "The wheel's encoder begins at other angles from run to run: a ripple of"
             f" {rig.lines.aligned:.2f} a turn aligned the runs."
         )
+
     named = [order for effect in accepted if (order := _order(effect)) is not None]
     ripples = [x for x in rig.lines.fresh("angle") if not _taken(x, named)]
     if ripples:
@@ -96,7 +97,11 @@ def _place(rig: Rig, group: Sequence[Line]) -> str:
     low, high = first.frequency
     if first.axis == "time":
         return f"{first.at:.2f} Hz ({sizes})"
-    hertz = f"{low:.1f} to {high:.1f} Hz" if high > 1.05 * low else f"{low:.1f} Hz"
+    hertz = (
+        f"{low:.1f} to {high:.1f} Hz"
+        if high > TUNING.explain.one_frequency * low
+        else f"{low:.1f} Hz"
+    )
     return f"{first.at:.2f} times a turn, {hertz} ({sizes})"
 
 

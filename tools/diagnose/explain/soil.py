@@ -45,8 +45,10 @@ def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
         for w in decision.weighed
         if w.probability > TUNING.explain.slight_explanation
     ]
+
     told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
     total = sum(share for _, share in told)
+
     out = {}
     for name, first in told[0][0].items():
         mean = sum(share * soil[name].value for soil, share in told) / total
@@ -54,20 +56,21 @@ def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
             share * (soil[name].sigma ** 2 + (soil[name].value - mean) ** 2) for soil, share in told
         )
         out[name] = Quantity(mean, float(np.sqrt(square / total)), first.unit)
+
     return {k.name: _beside_prior(k, out[k.name]) for k in rig.constants if k.name in out}
 
 
-def _beside_prior(known: Constant, found: Quantity) -> Quantity:
+def _beside_prior(known: Constant, fitted: Quantity) -> Quantity:
     """What was found, with a σ that what was known before is within reach of.
 
     Two determinations that contradict each other are off by more than their σ say, both of them
     (Birge 1932, Phys. Rev. 40, 207-227): the form of the model may have moved the soil, or the
     earlier measurement was wrong, and the recordings do not tell which.
     """
-    reach, strain = TUNING.explain.contradicts, known.strain(found.value)
+    reach, strain = TUNING.explain.contradicts, known.strain(fitted.value)
     if abs(strain) <= reach:
-        return found
-    return replace(found, sigma=max(found.sigma, known.spread(strain, abs(strain) / reach)))
+        return fitted
+    return replace(fitted, sigma=max(fitted.sigma, known.spread(strain, abs(strain) / reach)))
 
 
 def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
@@ -76,9 +79,9 @@ def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
     told = {}
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):
         if constant.soil:
-            found = _told(rig, constant, mean, spread)
-            sigma = constant.sigma if held else found.sigma
-            told[constant.name] = Quantity(found.value, sigma, found.unit)
+            quantity = _told(rig, constant, mean, spread)
+            sigma = constant.sigma if held else quantity.sigma
+            told[constant.name] = Quantity(quantity.value, sigma, quantity.unit)
     return told
 
 

@@ -153,11 +153,13 @@ def _sizes(stack: Stack, channel: str) -> Say:
 def _everywhere(residual: Array, own: Bools, rest: Bools, say: Say) -> str:
     """Friction acts while the wheel turns, an offset at rest too."""
     mean = float(residual[own].mean())
+
     if not rest.any():
         return f"everywhere {say(mean)}"
     still = float(residual[rest].mean())
     if abs(still - mean) < TUNING.explain.means_alike * abs(mean):
         return f"at rest as while the wheel turns {say(mean)}"
+
     known = (
         "as the model"
         if abs(still) < TUNING.explain.means_alike * abs(mean)
@@ -192,6 +194,7 @@ def _apart(stack: Stack, covariate: str, values: Sequence[float]) -> list[str]:
     unit, factor = covariate_shown(covariate, stack.rig.units.get(covariate, ""))
     least = TUNING.explain.reads_nothing * max(abs(v) for v in values)
     known = [v * factor if abs(v) > least else 0.0 for v in values]
+
     texts: list[str] = []
     for more in range(TUNING.explain.more_digits + 1):
         texts = [spaced(v, unit, _digits(covariate, v) + more) for v in known]
@@ -201,7 +204,7 @@ def _apart(stack: Stack, covariate: str, values: Sequence[float]) -> list[str]:
 
 
 def _digits(covariate: str, value: float) -> int:
-    return 3 if covariate in ("position", "time") and abs(value) >= 10.0 else 2
+    return 3 if covariate in ("position", "time") and abs(value) >= TUNING.explain.long_place else 2
 
 
 def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) -> str:
@@ -212,9 +215,11 @@ def _along(stack: Stack, residual: Array, own: Bools, covariate: str, say: Say) 
         for part in (TUNING.explain.low_end, TUNING.explain.middle, TUNING.explain.high_end)
     ]
     (_, low), (_, middle), (_, high) = ends
+
     outside = max(middle - max(low, high), min(low, high) - middle)
     if outside <= TUNING.explain.middle_stands_out * abs(high - low):
         ends = [ends[0], ends[2]]
+
     (first, mean), *rest = ends
     at, *beyond = _apart(stack, covariate, [first, *(v for v, _ in rest)])
     others = [f"{_brief(say(m))} at {v}" for (_, m), v in zip(rest, beyond, strict=True)]
@@ -283,7 +288,9 @@ def _contrast(inside: Array, rest: Array) -> tuple[float, float]:
     between = (
         (inside.mean() - rest.mean()) ** 2 * inside.size * rest.size / (inside.size + rest.size)
     )
-    return round(float(between), 12), abs(float(inside.mean())) - abs(float(rest.mean()))
+    return round(float(between), TUNING.explain.equal_places), abs(float(inside.mean())) - abs(
+        float(rest.mean())
+    )
 
 
 def _span(stack: Stack, covariate: str, low: float, high: float) -> str:

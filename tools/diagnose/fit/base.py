@@ -60,8 +60,8 @@ def explainable(rough: BaseFit) -> Explainable:
 
     signatures = raw_signatures(stack, fitted.u, fitted.predicted, others)
     leading = [s.columns for s in (*signatures, *smooth_signatures(stack))]
-    found = ripple_columns(stack, stack.measured - fitted.predicted)
-    ripples = np.column_stack((found, line_columns(stack)))
+    turning = ripple_columns(stack, stack.measured - fitted.predicted)
+    ripples = np.column_stack((turning, line_columns(stack)))
     return Explainable(np.column_stack([*leading, fitted.raw]), ripples)
 
 

@@ -89,8 +89,8 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
     here, damping = start, TUNING.fit.damping_start
     for _ in range(rounds):
         held = ground.bounds.held(here.centre, here.gradient)
-        found = None
-        while found is None and damping < TUNING.fit.damping_most:
+        better = None
+        while better is None and damping < TUNING.fit.damping_most:
             step = bounded_step(here, ground.bounds, held, damping)
             foretold = _gain(here, step)
             if foretold < TUNING.fit.gain:
@@ -99,7 +99,7 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
             tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
             share = (here.nats - nats) / foretold
             if np.isfinite(nats) and share > TUNING.fit.fulfilled:
-                found = tried
+                better = tried
                 damping = max(
                     damping * (TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0),
                     TUNING.fit.damping_least,
@@ -107,10 +107,10 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
             else:
                 damping *= TUNING.fit.damping_harder
 
-        if found is None:
+        if better is None:
             return here, False
         near = foretold < TUNING.fit.near and share > TUNING.fit.good
-        here = ground.moved(here, found) if near else ground.linearised(found)
+        here = ground.moved(here, better) if near else ground.linearised(better)
     return here, _gain(here, _undamped(here, ground.bounds)) < TUNING.fit.gain
 
 

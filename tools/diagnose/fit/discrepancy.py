@@ -21,13 +21,13 @@ from gritd.tools.diagnose.tuning import TUNING
 
 def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
     """A freedom for each source of the rig; none for a rig that declares none."""
-    found = []
+    freedoms = []
     for source in stack.rig.forms:
         columns = _columns(stack, source)
         if columns.shape[1]:
             sizes = _drive_sizes() if source.drive else _form_sizes()
-            found.append(freedom(source.name, columns, noise, sizes))
-    return tuple(found)
+            freedoms.append(freedom(source.name, columns, noise, sizes))
+    return tuple(freedoms)
 
 
 def _form_sizes() -> Sizes:

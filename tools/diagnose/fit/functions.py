@@ -16,6 +16,7 @@ from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
 LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
@@ -62,6 +63,7 @@ def tolerance(stack: Stack, share: float) -> Array:
         families = [f for along, f in _families(stack) if _tolerated(along)]
         scaled = _scaled(np.where(own[:, None], np.column_stack(families), 0.0), own, 1.0)
         columns.append(scaled * size / np.sqrt(max(scaled.shape[1], 1)))
+
     return np.column_stack(columns) if columns else np.zeros((stack.size, 0))
 
 
@@ -117,7 +119,7 @@ def _families(stack: Stack) -> Iterator[tuple[tuple[str, ...], Array]]:
 
 def _waves(values: Array) -> Array | None:
     span = float(np.ptp(values))
-    if span <= 1e-9:
+    if span <= SPAN:
         return None
     along = (values - values.min()) / span
     return np.column_stack([np.cos(np.pi * k * along) for k in range(1, TUNING.fit.waves + 1)])
@@ -126,7 +128,7 @@ def _waves(values: Array) -> Array | None:
 def _standard(values: Array, where: Bools) -> Array | None:
     inside = values[where]
     spread = float(np.std(inside)) if inside.size else 0.0
-    if spread <= TUNING.fit.varies * max(float(np.abs(values).max()), 1e-12):
+    if spread <= TUNING.fit.varies * max(float(np.abs(values).max()), SIZE):
         return None
     return np.asarray(
         np.clip((values - inside.mean()) / spread, -TUNING.fit.outlying, TUNING.fit.outlying)
@@ -136,5 +138,5 @@ def _standard(values: Array, where: Bools) -> Array | None:
 def _scaled(columns: Array, own: Bools, size: float) -> Array:
     """Columns of root mean square `size` on the channel; those that vanish there are left out."""
     rms = np.sqrt(np.mean(columns[own] ** 2, axis=0)) if own.any() else np.zeros(columns.shape[1])
-    kept = rms > 1e-9
+    kept = rms > SPAN
     return columns[:, kept] / rms[kept] * size

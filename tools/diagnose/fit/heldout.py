@@ -17,6 +17,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,12 @@ class HeldOut:
 
 
 def run_folds(stack: Stack) -> list[Bools]:
-    """Marks (N,) of each run; with fewer than three, of the thirds of each run in time."""
+    """Marks (N,) of each run; with few runs, of equal parts of each run in time."""
     runs = np.unique(stack.run)
-    if len(runs) >= 3:
+    if len(runs) >= TUNING.fit.folds:
         return [stack.run == r for r in runs]
-    ranks = _thirds(stack.time, stack.run)
-    return [f for f in ((ranks == k) for k in range(3)) if f.any()]
+    ranks = _parts(stack.time, stack.run)
+    return [f for f in ((ranks == k) for k in range(TUNING.fit.folds)) if f.any()]
 
 
 def condition_folds(stack: Stack) -> list[Bools]:
@@ -44,7 +45,7 @@ def condition_folds(stack: Stack) -> list[Bools]:
     for name in ("load", "slip"):
         if name in stack.rig.runs[0].covariates:
             values = stack.covariate(name)
-            if np.ptp(values) > TUNING.fit.band_spread * max(float(np.abs(values).max()), 1e-9):
+            if np.ptp(values) > TUNING.fit.band_spread * max(float(np.abs(values).max()), SPAN):
                 band = _bands(values)
                 folds += [band == k for k in range(TUNING.fit.bands)]
     return [f for f in folds if f.any() and not f.all()]
@@ -55,12 +56,14 @@ def _bands(values: Array) -> Index:
     return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.intp)
 
 
-def _thirds(time: Array, run: Index) -> Index:
+def _parts(time: Array, run: Index) -> Index:
+    count = TUNING.fit.folds
     out = np.zeros(time.size, dtype=np.intp)
     for r in np.unique(run):
         own = run == r
-        span = max(float(np.ptp(time[own])), 1e-9)
-        out[own] = np.minimum((3.0 * (time[own] - time[own].min()) / span).astype(int), 2)
+        span = max(float(np.ptp(time[own])), SPAN)
+        part = (count * (time[own] - time[own].min()) / span).astype(int)
+        out[own] = np.minimum(part, count - 1)
     return out
 
 
@@ -75,10 +78,12 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     centre = np.concatenate(
         (fitted.u, fitted.x, np.zeros_like(fitted.slack))
     )  # r is the residual without tolerance
+
     penalty = fitted.penalty**2
     gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
     spread = float(np.linalg.slogdet(gram)[1])
     density, predicted = [], fitted.predicted.copy()
+
     for fold in folds:
         inside = j[fold]
         less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]

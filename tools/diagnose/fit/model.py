@@ -40,6 +40,7 @@ class Model:
         sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
         first = sum(columns.shape[1] for columns, _, _ in allowance.parts[: allowance.fixed])
         acting = sum(size > 0.0 for size in sizes)
+
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for columns, white, size in allowance.parts[allowance.fixed :][:acting]:
@@ -47,6 +48,7 @@ class Model:
             own = own + size * (columns @ weights)
             whitened = whitened + size * (white @ weights)
             first += columns.shape[1]
+
         return own, whitened
 
     def constants(self) -> tuple[Array, Array]:

@@ -225,6 +225,7 @@ class Problem:
         start, nats = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))
         if not np.isfinite(nats):  # an effect that runs away: begin with none of it
             start = ground.tried(ground.bounds.clipped(np.concatenate((u, np.zeros_like(x)))))[0]
+
         here = ground.linearised(start)
         most = TUNING.fit.rounds if rounds is None else rounds
         fitted, converged = descent.descend(ground, here, most) if most else (here, False)
@@ -235,8 +236,8 @@ class Problem:
         ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
         most = TUNING.fit.rounds if rounds is None else rounds
-        found, converged = descent.descend(ground, ground.moved(fitted, start), most)
-        return replace(found, converged=converged)
+        reached, converged = descent.descend(ground, ground.moved(fitted, start), most)
+        return replace(reached, converged=converged)
 
 
 @dataclass(frozen=True)
@@ -328,6 +329,7 @@ class Ground:
     def _derivatives(self, centre: Array, predicted: Array) -> Array:
         """Of the prediction by every unknown (N, q + p); away from a bound."""
         stack, raw = self._problem.stack, np.zeros((predicted.size, centre.size))
+
         for i in (i for i in range(centre.size) if i not in stack.partial):
             step = (
                 -TUNING.fit.step
@@ -337,8 +339,10 @@ class Ground:
             moved = centre.copy()
             moved[i] += step
             raw[:, i] = (self._predicted(moved) - predicted) / step
+
         for i, (whole, share) in stack.partial.items():
             raw[:, i] = share * raw[:, whole]
+
         return np.nan_to_num(raw, nan=0.0, posinf=0.0, neginf=0.0)
 
 

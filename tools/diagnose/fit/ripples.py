@@ -26,6 +26,7 @@ def line_columns(stack: Stack, unheld: bool = False) -> Array:
     """
     moving, angle = stack.covariate("speed") > 0.0, stack.covariate("wheel_angle")
     columns = [np.zeros((stack.size, 0))]
+
     for channel in stack.rig.channels:
         own = stack.of(channel) & moving
         for line in restored(stack.rig, channel):
@@ -36,6 +37,7 @@ def line_columns(stack: Stack, unheld: bool = False) -> Array:
                 here = own & (stack.run == number)
                 waves = np.column_stack((np.cos(phase), np.sin(phase)))
                 columns.append(np.where(here[:, None], waves, 0.0))
+
     return np.column_stack(columns)
 
 

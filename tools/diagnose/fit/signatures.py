@@ -14,6 +14,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.rig.interface import Index, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT, WAY
 
 
 def strengths(effect: type[Effect]) -> list[Parameter]:
@@ -58,6 +59,7 @@ def signature(
     columns = np.column_stack(derivatives)
     if not np.isfinite(columns).all() or not np.abs(columns).max(initial=0.0) > 0.0:
         return None
+
     sign = tuple(int(p.low >= p.off) for p in strengths(effect))
     return Signature(effect.name, columns, sign, dict(fixed))
 
@@ -76,12 +78,14 @@ def _derivative(
     as a motor may that heats the more the more current it draws; NaN where every step does.
     """
     largest = TUNING.fit.runaway * np.abs(stack.measured).max(initial=0.0)
+
     for step in TUNING.fit.derivative_steps:
         acting = effect(**{**fixed, strength.name: strength.off + step * strength.sigma})
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             change = stack.predict(u, (*others, acting), everywhere) - base
         if np.isfinite(change).all() and np.abs(change).max(initial=0.0) <= step * largest:
             return np.asarray(change / step)
+
     return np.full(stack.size, np.nan)
 
 
@@ -127,7 +131,7 @@ def _places(rig: Rig, parameter: Parameter) -> list[float]:
     """Lengths as shares of the bed that was driven; centres along it."""
     along = np.concatenate([run.covariates["position"] for run in rig.runs])
     low, high = float(along.min()), float(along.max())
-    span = max(high - low, 1e-3)
+    span = max(high - low, WAY)
     if "length" in parameter.name:
         return [share * span for share in TUNING.fit.patch_lengths]
     return [float(x) for x in np.linspace(low, high, TUNING.fit.patch_centres)]
@@ -150,12 +154,12 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
         * rate
         * 2.0
         * np.pi
-        / max(float(np.quantile(turning, TUNING.fit.usual_turning)), 1e-6)
+        / max(float(np.quantile(turning, TUNING.fit.usual_turning)), SLIGHT)
     )
 
     top = min(parameter.high, TUNING.fit.highest_order, highest)
     turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
-    least = max(parameter.low, TUNING.fit.least_turns / max(turned, 1e-6))
+    least = max(parameter.low, TUNING.fit.least_turns / max(turned, SLIGHT))
 
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // TUNING.fit.most_orders))]]

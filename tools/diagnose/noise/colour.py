@@ -17,6 +17,7 @@ from scipy.linalg import solve_banded
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ def products_of_innovations(
     """
     recursion, (_, width) = _recursion(gaps, colours), columns.shape
     rows = max(TUNING.noise.whitened_at_once // max(len(colours) * width, 1), 1)
+
     gram = np.zeros((len(colours), width, width))
     for piece in _innovations(columns, recursion, rows):
         gram += piece.transpose(0, 2, 1) @ piece
@@ -183,7 +185,7 @@ def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Ar
         total = to_slow + to_fast + white
         gain[0, i], gain[1, i], scale[i] = to_slow / total, to_fast / total, np.sqrt(total)
         ss, ff, sf = ss - to_slow * gain[0, i], ff - to_fast * gain[1, i], sf - to_slow * gain[1, i]
-    return kept[..., None], gain[..., None], np.maximum(scale, 1e-6)
+    return kept[..., None], gain[..., None], np.maximum(scale, SLIGHT)
 
 
 def step_of(gaps: Array) -> float:

@@ -263,7 +263,7 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 
     root = np.linalg.cholesky(inner)
     taken = np.linalg.solve(root, gram[:, :-1, -1:])[:, :, 0]
-    free = max(count - size, 3)
+    free = max(count - size, TUNING.noise.least_freedom)
 
     variance = np.maximum(gram[:, -1, -1] - np.sum(taken**2, axis=1), SQUARE) / free
     spread = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)

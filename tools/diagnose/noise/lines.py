@@ -18,6 +18,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
 from gritd.tools.diagnose.rig.interface import Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 AXES = ("time", "position")
 
@@ -28,17 +29,19 @@ def stretches(stack: Stack, channel: str) -> list[Index]:
     """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     parts: list[Index] = []
+
     for number in range(len(stack.rig.runs)):
         index = np.flatnonzero(own & (stack.run == number))
         if index.size:
             time = stack.time[index]
-            count = int(np.ceil(max(float(np.ptp(time)), 1e-9) / TUNING.noise.stretch))
+            count = int(np.ceil(max(float(np.ptp(time)), SPAN) / TUNING.noise.stretch))
             parts += [index[part == k] for part in [_parts(time, count)] for k in range(count)]
+
     return [index for index in parts if index.size >= TUNING.noise.stretch_values]
 
 
 def _parts(time: Array, count: int) -> Index:
-    share = (time - time[0]) / max(float(np.ptp(time)), 1e-9)
+    share = (time - time[0]) / max(float(np.ptp(time)), SPAN)
     return np.asarray(np.minimum((count * share).astype(int), count - 1), dtype=np.intp)
 
 
@@ -48,7 +51,7 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     """
     x, parts = stack.covariate(axis), stretches(stack, channel)
     longest = max((float(np.ptp(x[index])) for index in parts), default=0.0)
-    if longest <= 1e-9:
+    if longest <= SPAN:
         return np.zeros(0)
 
     along = np.concatenate(parts)
@@ -56,7 +59,7 @@ def frequencies(stack: Stack, channel: str, axis: str) -> Array:
     span = longest if axis == "time" else float(np.ptp(x[along]))
     low, high = (
         TUNING.noise.cycles / longest,
-        TUNING.noise.line_nyquist / max(interval, 1e-3 * longest),
+        TUNING.noise.line_nyquist / max(interval, TUNING.noise.least_interval * longest),
     )
 
     tried = np.arange(low, high, 1.0 / (TUNING.noise.line_density * span))
@@ -174,9 +177,11 @@ def _chance(power: Array, parts: int, near: Array) -> Array:
     known.
     """
     out = np.zeros(power.size)
+
     for side in (np.tril(near), np.triu(near)):
         count = side.sum(axis=1)
         freedom = 2.0 * parts * np.maximum(count / TUNING.noise.line_density, 1.0)
-        beside = fdtrc(2.0 * parts, freedom, power * count / np.maximum(side @ power, 1e-300))
+        beside = fdtrc(2.0 * parts, freedom, power * count / np.maximum(side @ power, SQUARE))
         out = np.maximum(out, np.where(count > TUNING.noise.line_density, beside, 1.0))
+
     return out

@@ -9,6 +9,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SQUARE
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ def saturated_mean(residual: Array, columns: Array, sure: Array, cells: Index) -
     held = (cells[:, None] == np.unique(cells[cells >= 0])).astype(float)
     held = np.column_stack((held, sure[:, np.any(sure != 0.0, axis=0)]))
     held = basis(held, held.shape[1])
+
     beside = columns - held @ (held.T @ columns)
     acting = np.linalg.norm(beside, axis=0) > TUNING.noise.slight_column * np.linalg.norm(residual)
     return np.column_stack((held, basis(beside[:, acting])))
@@ -42,7 +44,7 @@ def basis(columns: Array, most: int | None = None) -> Array:
 
     most = TUNING.noise.saturated_columns if most is None else most
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = np.flatnonzero(values > TUNING.noise.rank * max(values[-1], 1e-300))[
+    kept = np.flatnonzero(values > TUNING.noise.rank * max(values[-1], SQUARE))[
         -max(min(columns.shape[0] // TUNING.noise.values_per_column, most), 1) :
     ]
     basis: Array = columns @ (vectors[:, kept] / np.sqrt(values[kept]))

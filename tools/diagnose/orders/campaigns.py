@@ -62,13 +62,13 @@ class Lines:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported
         first; those far behind it are left out.
         """
-        found: list[Line] = []
+        standing: list[Line] = []
         inside = (line for line in self.fresh() if low <= line.at <= high)
         for line in sorted(inside, key=lambda x: (-x.support, x.sigma)):
-            least = found[0].support - TUNING.orders.behind if found else -np.inf
-            if line.support > least and not any(_near(line, other) for other in found):
-                found.append(line)
-        return [line.at for line in found]
+            least = standing[0].support - TUNING.orders.behind if standing else -np.inf
+            if line.support > least and not any(_near(line, other) for other in standing):
+                standing.append(line)
+        return [line.at for line in standing]
 
 
 NO_LINES = Lines()

@@ -23,6 +23,7 @@ import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPEED, SQUARE
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def changes(model: Array, step: float) -> Array:
     smooth = np.convolve(np.pad(np.nan_to_num(model), count, mode="edge"), kernel, mode="same")
     rate = np.abs(np.gradient(smooth, step))[count:-count]
     size = float(np.quantile(np.abs(model), TUNING.orders.usual_size))
-    return np.asarray(rate / max(size, 1e-300))
+    return np.asarray(rate / max(size, SQUARE))
 
 
 def events(rate: Array, step: float) -> list[slice]:
@@ -95,23 +96,23 @@ def lag_of(time: Array, read: Array, model: Array, speed: Array) -> Event | None
         lag = float(np.clip(lag + late / size, -farthest, farthest))
 
     left = read - columns @ np.linalg.lstsq(columns, read, rcond=None)[0]
-    part = float(1.0 - np.var(left) / max(float(np.var(read)), 1e-300))
+    part = float(1.0 - np.var(left) / max(float(np.var(read)), SQUARE))
     if part < TUNING.orders.followed or abs(lag) >= farthest:
         return None
     products = np.linalg.inv(columns.T @ columns)
     colour = np.sqrt(TUNING.orders.event_colour * float(np.var(left)) * products[2, 2])
     usual = float(np.mean(speed[speed >= 0.5 * speed.max()]))
     sigma = float(colour / size)
-    return Event(lag, sigma, max(usual, 1e-4)) if 0.0 < sigma < np.inf else None
+    return Event(lag, sigma, max(usual, SPEED)) if 0.0 < sigma < np.inf else None
 
 
-def latency_of(channel: str, found: Sequence[Event]) -> Latency | None:
+def latency_of(channel: str, events: Sequence[Event]) -> Latency | None:
     """From the lags of all events, weighted by their noise and by what they scatter beyond it;
     None of too few.
     """
-    if len(found) < TUNING.orders.least_events:
+    if len(events) < TUNING.orders.least_events:
         return None
-    lag, sigma, speed = np.array([(e.lag, e.sigma, e.speed) for e in found]).T
+    lag, sigma, speed = np.array([(e.lag, e.sigma, e.speed) for e in events]).T
     columns = np.column_stack((np.ones(lag.size), 1.0 / speed))
     prior = np.array([0.0, 1.0 / TUNING.orders.usual_length])
 

@@ -18,6 +18,7 @@ from gritd.tools.diagnose.orders.stretches import Samples
 from gritd.tools.diagnose.orders.transform import sums_at
 from gritd.tools.diagnose.orders.wave import Amplitude, amplitude_of, wave_of
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 AXES = ("angle", "time")
 
@@ -110,6 +111,7 @@ class _Channel:
         """
         if axis in self._cleaned:
             return self._cleaned[axis]
+
         at, places = self.refined(axis, place), self.places[axis]
         beside = []
         for part, before in zip(self.parts, self.spectra[axis], strict=True):
@@ -118,6 +120,7 @@ class _Channel:
             )
             after = spectrum(without, axis, places)
             beside.append(replace(after, power=before.power))
+
         self._cleaned[axis] = float(log_chance([s.only(place) for s in beside])[0])
         return self._cleaned[axis]
 
@@ -155,11 +158,13 @@ class _Channel:
     ) -> tuple[Amplitude | None, ...]:
         """Of each run, its parts together, as they were before the line was taken."""
         place = min(round(at / self.places[axis].spacing), self.places[axis].count - 1)
-        found: list[list[Amplitude]] = [[] for _ in range(runs)]
+        of_runs: list[list[Amplitude]] = [[] for _ in range(runs)]
         for part, s in zip(before, self.spectra[axis], strict=True):
             if np.isfinite(s.level[place]):
-                found[part.run].append(amplitude_of(part.samples, axis, at, float(s.level[place])))
-        return tuple(_together(each) for each in found)
+                of_runs[part.run].append(
+                    amplitude_of(part.samples, axis, at, float(s.level[place]))
+                )
+        return tuple(_together(each) for each in of_runs)
 
     def take(self, axis: str, at: float) -> None:
         """Leave a line out."""
@@ -185,14 +190,14 @@ class _Channel:
             if a is not None:
                 length = part.samples.span(axis)
                 precision += (np.pi * length * a.size / a.sigma) ** 2 / 3.0
-        return float(1.0 / np.sqrt(max(precision, 1e-300)))
+        return float(1.0 / np.sqrt(max(precision, SQUARE)))
 
     def frequency(self, axis: str, at: float) -> tuple[float, float]:
         """[Hz] of a line in the slowest and in the fastest stretch."""
         if axis == "time":
             return at, at
         rates = [
-            abs(float(s.angle[own][-1] - s.angle[own][0])) / max(float(np.ptp(s.time[own])), 1e-9)
+            abs(float(s.angle[own][-1] - s.angle[own][0])) / max(float(np.ptp(s.time[own])), SPAN)
             for s in (p.samples for p in self.parts)
             for own in s.slices
         ]
@@ -205,7 +210,7 @@ def _together(parts: Sequence[Amplitude]) -> Amplitude | None:
         return parts[0] if parts else None
     size = float(np.sqrt(np.mean([a.size**2 for a in parts])))
     sigma = float(np.sqrt(np.mean([a.sigma**2 for a in parts]) / len(parts)))
-    scale = size / max(parts[0].size, 1e-300)
+    scale = size / max(parts[0].size, SQUARE)
     return Amplitude(scale * parts[0].cos, scale * parts[0].sin, sigma)
 
 
@@ -215,7 +220,7 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
     channels = [_Channel(name, parts) for name in names if (parts := list(_parts(runs, name)))]
     tried = sum(places.count for c in channels for places in c.places.values())
 
-    found: list[Line] = []
+    lines: list[Line] = []
     for _ in range(TUNING.orders.most_lines):
         best = _likeliest(channels, tried)
         if best is None or best[0] + np.log(tried) > np.log(TUNING.orders.level):
@@ -228,8 +233,8 @@ def find_lines(runs: Sequence[Mapping[str, Samples]]) -> tuple[Line, ...]:
             log_p = (chance if channel is first else channel.near(axis, at)) + np.log(tries)
             if log_p <= np.log(TUNING.orders.level):
                 line = _taken(channel, axis, at, float(np.exp(log_p)), support, len(runs))
-                found += [] if _rest(line, found) else [line, *_overtones(channel, line, len(runs))]
-    return tuple(_with_harmonics(found, channels))
+                lines += [] if _rest(line, lines) else [line, *_overtones(channel, line, len(runs))]
+    return tuple(_with_harmonics(lines, channels))
 
 
 def _overtones(channel: _Channel, line: Line, runs: int) -> Iterator[Line]:
@@ -242,13 +247,13 @@ def _overtones(channel: _Channel, line: Line, runs: int) -> Iterator[Line]:
             yield _taken(channel, line.axis, at, float(np.exp(log_p)), 0.0, runs)
 
 
-def _rest(line: Line, found: Sequence[Line]) -> bool:
+def _rest(line: Line, louder: Sequence[Line]) -> bool:
     """Whether it is what is left about a louder line, whose size changes within a stretch."""
     return any(
         (other.channel, other.axis) == (line.channel, line.axis)
         and line.size < TUNING.orders.rest * other.size
         and abs(line.at - other.at) < TUNING.orders.rest_cells * line.cell
-        for other in found
+        for other in louder
     )
 
 
@@ -261,17 +266,18 @@ def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
 
 def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channel, str, int] | None:
     """Log chance, channel, axis and place of the likeliest line of all."""
-    found = []
+    strongest = []
     for channel in channels:
         for axis in AXES:
             chance, place = channel.strongest(axis)
             if chance + np.log(tried) < np.log(TUNING.orders.promising):
                 chance = min(chance, channel.cleaned(axis, place))
-            found.append((chance, channel, axis, place))
-    if not found:
+            strongest.append((chance, channel, axis, place))
+
+    if not strongest:
         return None
     prefer = {"angle": TUNING.orders.prefer_angle, "time": 0.0}
-    return min(found, key=lambda each: each[0] - prefer[each[2]])
+    return min(strongest, key=lambda each: each[0] - prefer[each[2]])
 
 
 def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, runs: int) -> Line:
@@ -279,6 +285,7 @@ def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, ru
     before = channel.parts
     channel.take(axis, at)
     amplitudes = channel.amplitudes(before, axis, at, runs)
+
     return Line(
         channel.name,
         axis,
@@ -292,10 +299,10 @@ def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, ru
     )
 
 
-def _with_harmonics(found: Sequence[Line], channels: Sequence[_Channel]) -> Iterator[Line]:
+def _with_harmonics(lines: Sequence[Line], channels: Sequence[_Channel]) -> Iterator[Line]:
     """The lines by channel, the loudest first, each told whether it is a harmonic."""
     for channel in channels:
-        own = sorted((x for x in found if x.channel == channel.name), key=lambda x: -x.size)
+        own = sorted((x for x in lines if x.channel == channel.name), key=lambda x: -x.size)
         for number, line in enumerate(own):
             louder = [x for x in own[:number] if x.axis == line.axis and not x.harmonic]
             yield replace(line, harmonic=_base(line, louder))

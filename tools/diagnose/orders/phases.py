@@ -21,10 +21,10 @@ def guide(lines: Lines) -> Line | None:
     """The ripple by which the runs of the new campaign are aligned; None where they are already, or
     where one speed alone cannot tell it from a vibration.
     """
-    found = [line for line in lines.fresh() if line.p < TUNING.screen.line and _at_speeds(line)]
-    if not found:
+    ripples = [line for line in lines.fresh() if line.p < TUNING.screen.line and _at_speeds(line)]
+    if not ripples:
         return None
-    best = max(found, key=lambda line: (line.support, -line.p))
+    best = max(ripples, key=lambda line: (line.support, -line.p))
     apart = [abs(turn) for turn in _turns(best)]
     return best if max(apart, default=0.0) > TUNING.orders.out_of_step else None
 

@@ -18,8 +18,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.stretches import Ints, Samples
 from gritd.tools.diagnose.orders.transform import fourier_sums
 from gritd.tools.diagnose.tuning import TUNING
-
-TINY = 1e-300
+from gritd.tools.diagnose.tuning.guards import SQUARE
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +98,7 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
     """Noise (o,) about each place and its freedom (o,), by places low … high − 1; cells: that the
     part resolves between two places.
     """
-    total = np.concatenate(([0.0], np.cumsum(np.log(np.maximum(power, TINY)))))
+    total = np.concatenate(([0.0], np.cumsum(np.log(np.maximum(power, SQUARE)))))
     near, far = (max(round(c / cells), 1) for c in (TUNING.orders.near, TUNING.orders.far))
     at = np.arange(power.size, dtype=np.int64)
 
@@ -113,7 +112,7 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
     above, many = side(at + near, at + far + 1)
     known = (np.minimum(few, many) >= TUNING.orders.least_neighbours) & (at < high)
 
-    together = 4.0 / (1.0 / np.maximum(few, TINY) + 1.0 / np.maximum(many, TINY))
+    together = 4.0 / (1.0 / np.maximum(few, SQUARE) + 1.0 / np.maximum(many, SQUARE))
     level = np.exp(0.5 * (below + above) + np.euler_gamma)
     freedom = np.maximum(2.0 * TUNING.orders.geometric * together, 1.0)
     return np.where(known, level, np.inf), freedom
@@ -125,6 +124,6 @@ def log_chance(spectra: Sequence[Spectrum]) -> Array:
     count = np.sum([s.known for s in spectra], axis=0)
     terms = np.arange(len(spectra))[:, None]
     with np.errstate(divide="ignore"):
-        logs = terms * np.log(np.maximum(beside, TINY)) - gammaln(terms + 1.0)
+        logs = terms * np.log(np.maximum(beside, SQUARE)) - gammaln(terms + 1.0)
     summed = logsumexp(np.where(terms < count, logs, -np.inf), axis=0)
     return np.where(count > 0, np.minimum(summed - beside, 0.0), 0.0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
 TURN = 2.0 * np.pi  # [rad]
 Ints = NDArray[np.int64]
@@ -53,12 +54,12 @@ class Samples:
 
     def span(self, axis: str) -> float:
         """From the first reading to the last along an axis."""
-        return max(float(np.ptp(self.of(axis))), 1e-9)
+        return max(float(np.ptp(self.of(axis))), SPAN)
 
     def longest(self, axis: str) -> float:
         """Of the stretches along an axis."""
         place = self.of(axis)
-        return max(max(float(np.ptp(place[own])) for own in self.slices), 1e-9)
+        return max(max(float(np.ptp(place[own])) for own in self.slices), SPAN)
 
     def parts(self) -> list[Samples]:
         """A long run cut into equal parts, each with a phase of its own."""
@@ -77,7 +78,7 @@ class Samples:
         out = []
         for own in self.slices:
             time = self.time[own]
-            x = 2.0 * (time - time[0]) / max(float(np.ptp(time)), 1e-9) - 1.0
+            x = 2.0 * (time - time[0]) / max(float(np.ptp(time)), SPAN) - 1.0
             degree = min(TUNING.orders.trend, x.size - 1)
             out.append(np.linalg.qr(np.polynomial.legendre.legvander(x, degree))[0])
         return tuple(out)
@@ -111,6 +112,7 @@ def steady_samples(
     out: dict[str, Samples] = {}
     if not begins.size:
         return out
+
     for name, (time, values) in channels.items():
         number = np.searchsorted(begins, time, side="right") - 1
         inside = (number >= 0) & (time < ends[np.maximum(number, 0)]) & np.isfinite(values)
@@ -159,7 +161,7 @@ def _changes(speed: Array, step: float) -> NDArray[np.bool_]:
 
     noise = NORMAL * float(np.median(change))
     usual = float(np.median(np.abs(known[known != 0.0]))) if np.any(known) else 0.0
-    least = np.minimum(np.maximum(np.abs(known), usual), 2.0 * np.abs(known) + 1e-12)
+    least = np.minimum(np.maximum(np.abs(known), usual), 2.0 * np.abs(known) + SIZE)
     threshold = np.maximum(TUNING.orders.changed * least, TUNING.orders.change_noise * noise)
     marked: NDArray[np.bool_] = whole > threshold
     return marked

@@ -19,7 +19,8 @@ def fourier_sums(place: Array, values: Array, spacing: float, count: int) -> Com
     the spreading damps; the error is 1e-7 of Σ|y|. Source: Barnett, Magland, af Klinteberg (2019),
     SIAM J. Sci. Comput. 41, C479-C504, section 3, with twice as fine a grid.
     """
-    size = 1 << int(np.ceil(np.log2(max(4 * count, 64))))
+    # a power of two, twice as fine as the window's highest frequency asks for, at least 8 windows
+    size = 1 << int(np.ceil(np.log2(max(4 * count, 8 * WINDOW))))
     at = np.mod(place * spacing, 1.0) * size
     first = np.floor(at).astype(np.int64) - (WINDOW // 2 - 1)
 
@@ -43,7 +44,7 @@ def sums_at(place: Array, values: Array, at: Array) -> Complexes:
 
 
 def _kernel(x: Array) -> Array:
-    """Of the window (n,), x from −1 to 1."""
+    """Of the window (n,), x from −1 to 1: exp(β (√(1 − x²) − 1)), β = 2.3 grid points (ibid.)."""
     inside = np.sqrt(np.maximum(1.0 - x**2, 0.0))
     return np.asarray(np.exp(2.3 * WINDOW * (inside - 1.0)) * (np.abs(x) < 1.0))
 
@@ -52,6 +53,7 @@ def _kernel(x: Array) -> Array:
 def _damping(count: int, size: int) -> Array:
     """The window's Fourier transform at 0 … count − 1 cycles in `size` grid points."""
     frequency = np.arange(count) / size
+    # 40 nodes integrate the window to the rounding of a float
     nodes, weights = np.polynomial.legendre.leggauss(40)
     half = 0.5 * WINDOW
     waves = np.cos(2.0 * np.pi * half * np.outer(frequency, nodes))

@@ -9,6 +9,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.stretches import Samples
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SQUARE
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def amplitude_of(part: Samples, axis: str, at: float, level: float) -> Amplitude
     columns = part.detrended(pair(part.of(axis), at))
     products = columns.T @ columns
     cos, sin = np.linalg.lstsq(products, columns.T @ part.values, rcond=None)[0].tolist()
-    sigma = np.sqrt(level * 2.0 / max(float(np.trace(products)), 1e-300))
+    sigma = np.sqrt(level * 2.0 / max(float(np.trace(products)), SQUARE))
     return Amplitude(cos, sin, float(sigma))
 
 

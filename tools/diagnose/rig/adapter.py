@@ -65,6 +65,7 @@ def _check_drives(rig: WheelRig, new: bool, recordings: Sequence[Recording]) -> 
     runs = [run for run, acting in zip(rig.runs, rig.new, strict=True) if acting == new]
     counts = {c: sum(int(run.used[c].sum()) for run in runs) for c in rig.channels}
     channel, least = min(counts.items(), key=lambda item: item[1])
+
     if runs and not least:
         names = ", ".join(str(recording.path) for recording in recordings)
         raise CommandError(

@@ -38,6 +38,7 @@ def steady_states(signals: Signals) -> bool:
     """
     if signals.info.steady_states:
         return True
+
     known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
     stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
     return not any(

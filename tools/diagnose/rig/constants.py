@@ -11,6 +11,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
 UNITS = {
     "torque": "N·m", "axle_torque": "N·m", "drawbar_pull": "N", "load": "N", "sinkage": "m",
@@ -46,13 +47,13 @@ def _calibrations(
         scale, offset = calibration_sigmas(settings, channel)
         constants += [
             Constant(f"{channel}_scale", 0.0, max(scale, TUNING.rig.scale_floor)),
-            Constant(f"{channel}_offset", 0.0, max(offset, 1e-9), UNITS[channel]),
+            Constant(f"{channel}_offset", 0.0, max(offset, SPAN), UNITS[channel]),
             Constant(f"{channel}_delay", 0.0, TUNING.rig.timing, "s"),
             Constant(f"{channel}_blur", 0.0, TUNING.rig.blur),
         ]
 
     nominal = settings.load.nominal
-    common = max(nominal.sigma / max(nominal.value, 1e-9), TUNING.rig.least_weights)
+    common = max(nominal.sigma / max(nominal.value, SPAN), TUNING.rig.least_weights)
     constants.append(Constant("weights", 0.0, common))
     for name, load in zip(sets.names, sets.loads, strict=True):
         constants.append(Constant(name, 0.0, _own_weight(settings, load, common, weights_stated)))
@@ -80,8 +81,10 @@ def calibration_sigmas(settings: Settings, channel: str) -> tuple[float, float]:
         constant = settings.drive.torque_constant
         scale = float(np.hypot(_relative(shunt.scale), _relative(constant)))
         return scale, constant.value * shunt.offset.sigma
+
     if channel == "sinkage":
         return _sigmas(settings.channels["sinkage_pot"].calibration)
+
     assert settings.wrench is not None
     axis = "torque" if channel == "axle_torque" else channel
     return _sigmas(getattr(settings.wrench, axis))
@@ -122,7 +125,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
         Constant(
             name,
             value,
-            max(sigma, TUNING.rig.soil_floors[name] * value, 1e-12),
+            max(sigma, TUNING.rig.soil_floors[name] * value, SIZE),
             unit,
             True,
             name in ("k", "K"),
@@ -151,6 +154,7 @@ def _configured(settings: Settings) -> tuple[Constant, ...]:
                         high=p.high,
                     )
                 )
+
     return tuple(constants)
 
 
@@ -160,8 +164,8 @@ def preparation(settings: Settings) -> dict[str, float]:
     """
     stated, soil = settings.bed.repeatability, settings.soil
     known = {
-        "c": stated.cohesion / max(soil.cohesion.value, 1e-9),
-        "tan_phi": stated.tan_phi / max(soil.tan_phi.value, 1e-9),
+        "c": stated.cohesion / max(soil.cohesion.value, SPAN),
+        "tan_phi": stated.tan_phi / max(soil.tan_phi.value, SPAN),
         "k": stated.shear_modulus,
     }
     return {name: known.get(name, 0.0) or usual for name, usual in TUNING.rig.prepared.items()}

@@ -120,6 +120,7 @@ class DriveRig:
             self._torque(m, inertia / self.unit, damping / self.unit, effects)
             for m in self._motions
         ]
+
         return [
             {"torque": m.compared(_timed(t, m.step, *timing))}
             for m, t in zip(self._motions, torques, strict=True)

@@ -32,6 +32,7 @@ def wheel_forms(
     usual = usual_of(runs)
     if usual is None:
         return ()
+
     conditions = tuple(_conditions(run, usual, radius) for run in runs)
     forms = []
     for name, both, signed in SOURCES:
@@ -40,6 +41,7 @@ def wheel_forms(
         if measured:
             weight = tuple(_weight(run, usual, signed) for run in runs)
             forms.append(FormSource(name, measured, conditions, weight))
+
     if driven is not None:
         weight = tuple(_weight(run, usual, True) for run in runs)
         size = _mean_square([t[w != 0.0] for t, w in zip(driven, weight, strict=True)]) ** 0.5

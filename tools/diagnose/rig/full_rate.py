@@ -46,14 +46,14 @@ def beside_lines(
     pairs = list(zip(signals, reads, strict=True))
     runs = [steady_readings(known, read(), most) for known, read in pairs]
 
-    found = lines_of(runs[reference:], runs[:reference])
-    if not found.every:
-        return list(signals), found
-    beside = [restored(known, read(), found) for known, read in pairs]
-    line = guide(found)
+    lines = lines_of(runs[reference:], runs[:reference])
+    if not lines.every:
+        return list(signals), lines
+    beside = [restored(known, read(), lines) for known, read in pairs]
+    line = guide(lines)
     beside[reference:] = aligned(beside[reference:], line)
-    found = replace(found, aligned=line.at if line else 0.0)
-    return beside, found.renamed("current", "torque", torque_constant)
+    lines = replace(lines, aligned=line.at if line else 0.0)
+    return beside, lines.renamed("current", "torque", torque_constant)
 
 
 def steady_readings(signals: Signals, full: FullRate, most: int) -> dict[str, Samples]:
@@ -71,9 +71,11 @@ def restored(signals: Signals, full: FullRate, lines: Lines) -> Signals:
     """Signals with the lines as they stand at the grid's times."""
     if steady_states(signals):
         return signals
+
     angle, motion = _since(signals, full["wheel_encoder"]), _motion(signals)
     edges = _edges(signals.time)
     analogue = dict(signals.analogue)
+
     for name in set(analogue) & {line.channel for line in lines.every}:
         read = _since(signals, full[name])
         less, ripple = on_grid(lines.of(name), motion, angle, read, signals.time)

@@ -35,9 +35,11 @@ class HeldForm:
         self._kinds = {
             c: kind for c in channels if c not in lost and (kind := _kind(c)) is not None
         }
+
         told = [_told(run, radius, self._correction) for run in runs]
         self._conditions = [conditions for conditions, _ in told]
         self._weights = [weights for _, weights in told]
+
         self._form = form
         self.means: Sequence[Mapping[str, Array]] = [
             self._mean(conditions, weights, channels) for conditions, weights in told
@@ -45,14 +47,16 @@ class HeldForm:
 
     def doubts(self, stack: Stack) -> Array:
         """(N, t): see interface.Held."""
-        found = self._correction.at(
+        correction = self._correction.at(
             np.vstack(self._conditions), np.vstack(self._weights)
         )  # of all values of all runs, used or not
-        parts = [self._placed(stack, {k: found.columns[:, k] for k in range(len(CHANNELS))})]
+
+        parts = [self._placed(stack, {k: correction.columns[:, k] for k in range(len(CHANNELS))})]
         for kind, channel in enumerate(self._form.channels):
             if channel is not None and kind in self._kinds.values():
                 columns = self._rest(kind, channel.size, channel.rest)
                 parts.append(self._placed(stack, {kind: columns}))
+
         every = np.hstack(parts)
         return every[:, np.any(every != 0.0, axis=0)]
 

@@ -283,7 +283,7 @@ class Stack:
     def gaps_of(self, kept: Bools) -> Array:
         """The same (n,), with only the n values kept that are marked (N,)."""
         gap = np.diff(self.time[kept], prepend=0.0)
-        first = np.diff(self.channel[kept] * 100_000 + self.run[kept], prepend=-1) != 0
+        first = np.diff(self.channel[kept] * len(self.rig.runs) + self.run[kept], prepend=-1) != 0
         return np.where(first, np.inf, gap)
 
     def predict(self, u: Array, effects: Sequence[Effect] = (), everywhere: bool = False) -> Array:

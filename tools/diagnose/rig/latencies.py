@@ -26,14 +26,16 @@ def latencies_in(
     """Of every channel, beside the soil and the effects of the configuration. known: the signals
     on the grid. Tables of steady states tell nothing, and long runs are not looked at.
     """
-    found: dict[str, list[Event]] = {}
+    events: dict[str, list[Event]] = {}
+
     for recording, coarse in zip(recordings, known, strict=True):
         if steady_states(coarse) or coarse.time[-1] > TUNING.orders.lag_longest:
             continue
         fine = signals(recording, settings, TUNING.orders.lag_rate)
         for channel, event in lags(fine, settings):
-            found.setdefault(channel, []).append(event)
-    told = (latency_of(channel, each) for channel, each in found.items())
+            events.setdefault(channel, []).append(event)
+
+    told = (latency_of(channel, each) for channel, each in events.items())
     return tuple(latency for latency in told if latency is not None)
 
 

@@ -70,6 +70,7 @@ def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
         name: _series(recording, settings.channels[name])
         for name in ("wheel_encoder", "motor_shunt")
     }
+
     for name, (time, _) in series.items():
         if time.size < TUNING.rig.drive_readings:
             raise _too_little(
@@ -78,9 +79,9 @@ def drive_series(recording: Recording, settings: Settings) -> dict[str, Series]:
     return series
 
 
-def _too_little(recording: Recording, found: str, expected: str) -> CommandError:
+def _too_little(recording: Recording, amount: str, expected: str) -> CommandError:
     damage = f" ({recording.damage[0]})" if recording.damage else ""
-    return CommandError(f"{recording.path}: found {found}; expected {expected}{damage}", DAMAGED)
+    return CommandError(f"{recording.path}: found {amount}; expected {expected}{damage}", DAMAGED)
 
 
 def sha256(path: Path) -> str:
@@ -108,6 +109,7 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
                 f"{path}: found the same recording as {first}; expected each run once", USAGE
             )
         checksums[str(path)] = checksum
+
     return checksums
 
 
@@ -181,8 +183,8 @@ def _grid(recording: Recording, encoders: Sequence[Series], rate: float) -> tupl
         )
 
     if (end - start) * rate < TUNING.rig.grid_values:
-        found = f"{max(end - start, 0.0):.2f} s of both encoders together"
-        raise _too_little(recording, found, "some seconds")
+        overlap = f"{max(end - start, 0.0):.2f} s of both encoders together"
+        raise _too_little(recording, overlap, "some seconds")
     try:
         return edges_of(within, start, end, rate), left_out
     except RecordingError as error:
@@ -199,18 +201,21 @@ def _analogue(
     analogue = {
         names[name]: series[name] for name in names if name in series and series[name][0].size
     }
+
     wrench = settings.wrench
     if wrench is None:
         return analogue
     rows = recording.arrays("/raw/wrench")
     if not rows.size:
         return analogue
+
     time = rows["stamp"] * NS - wrench.latency
     axes = {
         "drawbar_pull": ("fx", wrench.drawbar_pull),
         "load": ("fz", wrench.load),
         "axle_torque": ("ty", wrench.torque),
     }
+
     return analogue | {
         name: _ordered(time, physical(rows[axis], c)) for name, (axis, c) in axes.items()
     }
@@ -221,12 +226,15 @@ def _series(recording: Recording, channel: Channel) -> Series:
     rows = recording.arrays(f"/raw/{channel.name}")
     if not rows.size:
         return _NONE
+
     raw = rows[
         next(name for name in ("count", "volts", "celsius") if name in (rows.dtype.names or ()))
     ].astype(float)
+
     good = np.isfinite(raw)
     if channel.name not in ("wheel_encoder", "carriage_encoder"):
         good &= (raw >= channel.low) & (raw <= channel.high)
+
     return _ordered(
         rows["stamp"][good] * NS - channel.latency, physical(raw[good], channel.calibration)
     )

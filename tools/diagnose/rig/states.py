@@ -15,6 +15,7 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 
 def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
@@ -34,7 +35,7 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
 
     passing = float(
         np.clip(
-            TUNING.rig.contact_angle / max(usual / settings.wheel.radius, 1e-6),
+            TUNING.rig.contact_angle / max(usual / settings.wheel.radius, SLIGHT),
             TUNING.rig.settling,
             TUNING.rig.longest_settling,
         )
@@ -57,7 +58,9 @@ def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     nothing.
     """
     turning = np.abs(rim_speed)[np.abs(rim_speed) > TUNING.rig.turning_speed]
-    least = TUNING.rig.rest_speed * float(np.median(turning)) if turning.size else 1e-4
+    least = (
+        TUNING.rig.rest_speed * float(np.median(turning)) if turning.size else TUNING.rig.standing
+    )
     rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
     return rest
 
@@ -71,6 +74,7 @@ def _inside(state: Array, after: int, before: int) -> Bools:
     n, at = state.size, np.arange(state.size)
     changed = np.flatnonzero(np.diff(state)) + 1  # first intervals of a new state
     bounds = np.concatenate(([-after - 1], changed, [n + before]))
+
     place = np.searchsorted(changed, at, side="right")
     inside: Bools = (
         (state != 0.0) & (at - bounds[place] >= after) & (bounds[place + 1] - at > before)

@@ -35,6 +35,7 @@ from gritd.tools.diagnose.rig.states import states
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import weights_of
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 # constants that need the forward model
 PHYSICS = ("c", "tan_phi", "k", "n", "K", "weights", "carriage_scale")
@@ -161,6 +162,7 @@ class WheelRig:
             constant.name: constant.of(float(x))
             for constant, x in zip(self.constants, u, strict=True)
         }
+
         baseline = self._baseline(value)
         true = [
             self._true(
@@ -168,8 +170,10 @@ class WheelRig:
             )
             for new, campaign in self._campaigns
         ]
+
         read = self._read(np.hstack(true), value)
         told = [dict(zip(self.channels, read[:, part], strict=True)) for part in self._parts]
+
         if self.held is None:
             return told
         return [
@@ -191,6 +195,7 @@ class WheelRig:
         own = (*(value[name] for name in self._sets.names), 0.0)
         shifts = tuple(value[f"new_{name}"] if new else 0.0 for name in self._prepared)
         physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
+
         if physics not in self._kept:
             if len(self._kept) >= TUNING.rig.kept_simulations:
                 self._kept.pop(next(iter(self._kept)))
@@ -314,7 +319,7 @@ class WheelRig:
     def shortcomings(self) -> list[str]:
         sentences = []
         loads = np.concatenate([run.covariates["load"] for run in self.runs])
-        if np.ptp(loads) < TUNING.rig.one_load * max(float(np.max(loads)), 1e-9):
+        if np.ptp(loads) < TUNING.rig.one_load * max(float(np.max(loads)), SPAN):
             sentences.append(
                 "One load only: c and tan φ are nearly inseparable, and so are effects that differ"
                 " by load alone."
@@ -330,12 +335,15 @@ class WheelRig:
         measured = {c: measured_of(signals, c, self._constant) for c in self.channels}
         if self.loss_of_drive:
             measured["torque"] = measured["torque"] - measured["axle_torque"]
+
         along = covariates(signals, motion, self.settings.wheel, self._tabled)
         along["sinkage"] = self._depth(number)
+
         driving, resting, lifted = states(motion, self.settings)
         still = {"torque": driving | resting | lifted}
         known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
         known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
+
         used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in self.channels}
         return Run(signals.name, np.asarray(motion.time), measured, used, along)
 

@@ -8,6 +8,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Noise, whiten_rows
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE
 
 
 def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) -> list[float]:
@@ -24,5 +25,5 @@ def loudest(stack: Stack, noise: Noise, residual: Array, orders: list[float]) ->
             for wave in (np.cos(phase), np.sin(phase))
         )
         taken = (residual[own] @ cosine) ** 2 + (residual[own] @ sine) ** 2
-        power += taken / np.maximum(np.sum(cosine**2, axis=0) + np.sum(sine**2, axis=0), 1e-12)
+        power += taken / np.maximum(np.sum(cosine**2, axis=0) + np.sum(sine**2, axis=0), SIZE)
     return [orders[i] for i in np.argsort(-power)[: TUNING.screen.loudest]]

@@ -30,8 +30,7 @@ from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
-
-TINY = 1e-12
+from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +109,11 @@ def _weighed(
 def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
     """Geometric mean (f, draws) of the neighbours' power, in that of the noise; 1 at least."""
     ratio = np.sum(
-        [power / np.maximum(size, TINY) for size, power in zip(sizes, powers, strict=True)], axis=0
+        [power / np.maximum(size, SIZE) for size, power in zip(sizes, powers, strict=True)], axis=0
     )
     expected = digamma(len(sizes)) + np.log(2.0)  # of the logarithm of a χ² of two degrees each
     share = near / np.maximum(near.sum(axis=1, keepdims=True), 1.0)
-    return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, TINY)) - expected), 0.0)))
+    return np.asarray(np.exp(np.maximum(share @ (np.log(np.maximum(ratio, SIZE)) - expected), 0.0)))
 
 
 # ---- what is searched --------------------------------------------------------------------------
@@ -128,12 +127,14 @@ def families(
     """
     acting = stack.new if acting is None else acting
     searched = []
+
     for channel in stack.rig.channels:
         for axis in lines.AXES:
             every = lines.frequencies(stack, channel, axis)
             searched.append(waves(stack, noise, surrogates.residuals, channel, axis, every, acting))
             at = places(stack, channel, axis)
             searched.append(steps(stack, noise, surrogates.residuals, channel, axis, at, acting))
+
     return tuple(family for family in searched if family.blocks and family.at.size)
 
 
@@ -179,6 +180,7 @@ def steps(
     if not at.size:
         return Family(shape, at, ())
     rows = _rows(stack.of(channel))
+
     raw = size_of(stack, channel) * _risen(stack, rows, axis, at, acting)[:, :, None]
     return Family(shape, at, (_block(noise, nulls, rows, raw),))
 
@@ -189,14 +191,16 @@ def places(stack: Stack, channel: str, axis: str) -> Array:
     """
     own = stack.of(channel) & (stack.covariate("speed") > 0.0)
     x = stack.covariate(axis)[own]
-    if x.size < 2 * TUNING.screen.step_values or np.ptp(x) <= 1e-9:
+    if x.size < 2 * TUNING.screen.step_values or np.ptp(x) <= SPAN:
         return np.zeros(0)
+
     ordered = np.sort(x)
     beyond = np.unique(
         np.linspace(
             TUNING.screen.step_values, x.size - TUNING.screen.step_values, TUNING.screen.step_places
         ).astype(int)
     )
+
     return np.unique(0.5 * (ordered[beyond - 1] + ordered[beyond]))
 
 
@@ -328,6 +332,7 @@ def without_harmonics(
     projection, columns = fitted.projection(surrogates), list(_harmonics(problem.stack, fitted))
     if not columns:
         return projection
+
     return projection.with_columns(whiten(problem.noise, np.column_stack(columns)))
 
 
@@ -336,10 +341,12 @@ def _harmonics(stack: Stack, fitted: Fitted) -> Iterator[Array]:
     for column in line_columns(stack, unheld=True).T:
         sizes = [size_of(stack, channel) for channel in stack.rig.channels]
         yield TUNING.screen.large_ripple * np.array(sizes)[stack.channel] * column
+
     for effect in fitted.acting:
         if effect.fingerprint.covariate == "wheel_angle":
             name = order_of(type(effect))
             phase = stack.covariate("wheel_angle") * (getattr(effect, name) if name else 1.0)
+
             for channel in stack.rig.channels:
                 own = stack.of(channel) & (stack.covariate("speed") > 0.0)
                 for number in range(1, TUNING.screen.ripple_harmonics + 1):

@@ -24,6 +24,7 @@ from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SIZE
 
 
 @dataclass(frozen=True)
@@ -152,21 +153,21 @@ def tail_chance(values: Array, value: float) -> float:
 
     if counted > TUNING.screen.counted * least or not beyond.size:
         return counted
-    fitted = TUNING.screen.tail * float(np.exp(-(value - start) / max(float(beyond.mean()), 1e-12)))
+    fitted = TUNING.screen.tail * float(np.exp(-(value - start) / max(float(beyond.mean()), SIZE)))
     return min(counted, max(fitted, TUNING.screen.trusted_tail * least))
 
 
 def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[WhitenedSignature]:
     """All columns whitened, some at a time."""
-    found = []
+    ready = []
     for some in _some(signatures):
         columns = whiten(noise, np.column_stack([s.columns for s in some]))
         ends = np.cumsum([len(s.sign) for s in some])
-        found += [
+        ready += [
             WhitenedSignature(s, columns[:, end - len(s.sign) : end].copy())
             for s, end in zip(some, ends, strict=True)
         ]
-    return found
+    return ready
 
 
 Taken = TypeVar("Taken")
@@ -189,6 +190,7 @@ def screen_signatures(
     """
     if not signatures:
         return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
+
     weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]] = {}
     for some in _some(signatures):
         projected = projection.project_all(np.column_stack([s.columns for s in some]))
@@ -197,6 +199,7 @@ def screen_signatures(
             own = slice(end - s.columns.shape[1], end)
             value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
             weighed.setdefault(s.signature.of, []).append((value, s))
+
     return _ranked(weighed, searched or {})
 
 

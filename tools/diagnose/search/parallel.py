@@ -22,6 +22,7 @@ def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list
     """
     if jobs < 2 or len(items) < 2:
         return [work(item) for item in items]
+
     global _work
     # a closure is the point: it is inherited, never pickled
     _work = lambda place: work(items[place])  # noqa: E731

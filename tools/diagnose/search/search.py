@@ -170,14 +170,16 @@ def promises(search: Search, model: Model) -> list[Promise]:
     """
     effects = search.problem.stack.rig.effects
     settings, habit = _settings(search, model), search.first.habit
-    found = []
+
+    promised = []
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
         tried = list(_tried(search, model, effects[name], settings))
         if tried:
             best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
             usual = TUNING.screen.habit * habit.get(name, 0.0)
-            found.append(replace(best, gain=best.gain - usual))
-    return sorted(found, key=lambda promise: -promise.gain)
+            promised.append(replace(best, gain=best.gain - usual))
+
+    return sorted(promised, key=lambda promise: -promise.gain)
 
 
 def _settings(search: Search, model: Model) -> Settings:
@@ -213,10 +215,12 @@ def _tried(
 ) -> Iterator[Promise]:
     """The promise of an effect for each of its likeliest signatures and each setting."""
     fitted, problem = model.fitted, search.problem
+
     for fixed in search.first.fixed[effect.name][: TUNING.search.again]:
         made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
         if made is None:
             continue
+
         columns = whiten(problem.noise, made.columns)
         projected = settings.projections.project(columns)
         for sizes, cost, (a, b) in zip(settings.sizes, settings.costs, projected, strict=True):
@@ -230,11 +234,13 @@ def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
     amplitude = np.where(
         np.array(made.sign) > 0, np.maximum(amplitude, TUNING.search.least_start), amplitude
     )
+
     size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
     values = [
         size[p.name] if p.name in size else (made.fixed[p.name] - p.centre) / p.sigma
         for p in effect.parameters()
     ]
+
     return np.asarray(
         np.clip(np.array(values), -TUNING.search.farthest_start, TUNING.search.farthest_start)
     )

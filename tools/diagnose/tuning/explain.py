@@ -84,6 +84,7 @@ class Explain:
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
     beside_gain: float = tuned(3.0, "nats", "a covariate must gain beside those already named")
     lowest_order: float = tuned(3.0, "1/turn", "lower orders belong to the wheel's angle")
+    ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
 
     # --- provenance.py ---
     same_value: float = tuned(1e-6, "-", "relative difference below which values are the same")
@@ -101,9 +102,14 @@ class Explain:
     # --- traces.py ---
     pictures: int = tuned(4, "scatters", "at most")
 
+    # --- ripples.py ---
+    one_frequency: float = tuned(1.05, "-", "ratio of two frequencies that are told as one")
+
     # --- wording.py ---
     reads_nothing: float = tuned(1e-3, "-", "of the largest of several values: less reads 0")
     more_digits: int = tuned(3, "digits", "at most, that tell values apart")
+    long_place: float = tuned(10.0, "m or s", "from which on a place has a digit more")
+    equal_places: int = tuned(12, "decimals", "to which two contrasts are equal", "rounding")
     low_end: Range = tuned((0.0, 0.15), "choice", "quantiles between which a mean is taken")
     middle: Range = tuned((0.4, 0.6), "choice", "quantiles between which a mean is taken")
     high_end: Range = tuned((0.85, 1.0), "choice", "quantiles between which a mean is taken")
@@ -121,6 +127,8 @@ class Explain:
     learnt_places: int = tuned(
         4, "decimals", "of means; directions and correlations have one less, points two"
     )
+    learnt_end_places: int = tuned(2, "decimals", "of the domain's ends of slip and load")
+    learnt_speed_places: int = tuned(5, "decimals", "of the domain's ends of rim speed [m/s]")
     learnt_left_out: float = tuned(
         1e-3, "share", "of the variance that is left of δ: no further direction is kept for it"
     )

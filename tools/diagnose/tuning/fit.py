@@ -97,6 +97,7 @@ class Fit:
     )
 
     # --- heldout.py ---
+    folds: int = tuned(3, "parts", "of which each is foretold by the others, where runs are fewer")
     bands: int = tuned(3, "bands", "of slip and of load that are held out")
     band_spread: float = tuned(0.05, "-", "relative spread below which there are no bands")
 

@@ -41,6 +41,7 @@ class Noise:
         20, "colours", "drawn from the posterior of the colour for the surrogates", "run time"
     )
     ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
+    least_freedom: int = tuned(3, "values", "beside the mean's columns that tell a size, at least")
     steady: float = tuned(
         1.3, "-", "values that blur makes noisier than so many of their channel's σ say nothing"
     )
@@ -70,6 +71,9 @@ class Noise:
         2.0, "-", "frequencies tried in each that the longest stretch resolves"
     )
     line_nyquist: float = tuned(0.35, "-", "of the grid's rate: faster waves are damped", DAMPED)
+    least_interval: float = tuned(
+        1e-3, "-", "of the longest stretch: values along an axis count as no closer", "run time"
+    )
     most_frequencies: int = tuned(200, "frequencies", "of a scan, at most", "run time")
     stretch_values: int = tuned(12, "values", "a stretch must hold")
     line_chance: float = tuned(

@@ -113,6 +113,7 @@ class Rig:
     resting: float = tuned(0.4, "s", "the wheel must have stood for its current to be that at rest")
     rising: float = tuned(0.2, "s", "the wheel must go on standing")
     turning_speed: float = tuned(1e-3, "m/s", "a slower rim does not turn")
+    standing: float = tuned(1e-4, "m/s", "slower is rest where no rim turns")
     rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
     lifted: float = tuned(0.2, "-", "of the least load: below it the wheel is lifted")
 

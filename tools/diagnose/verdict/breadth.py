@@ -21,6 +21,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.search.search import Search, without
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 
 
 class Breadth:
@@ -75,13 +76,15 @@ def stretches(stack: Stack) -> list[Bools]:
     """Marks (N,) of equal parts of the runs in which candidates act, in time."""
     runs = np.flatnonzero(stack.rig.new)
     count = max(-(-TUNING.verdict.stretches // len(runs)), TUNING.verdict.stretches_of_a_run)
-    found = []
+    marks = []
+
     for number in runs:
         own = stack.run == number
         if not own.any():
             continue
         first, last = stack.time[own].min(), stack.time[own].max()
-        share = (stack.time - first) / max(float(last - first), 1e-9)
+        share = (stack.time - first) / max(float(last - first), SPAN)
         part = np.minimum((count * share).astype(int), count - 1)
-        found += [own & (part == k) for k in range(count)]
-    return [part for part in found if part.any()]
+        marks += [own & (part == k) for k in range(count)]
+
+    return [part for part in marks if part.any()]

@@ -18,6 +18,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.breadth import Breadth
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
 from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
@@ -26,12 +27,12 @@ from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 
 def decide(search: Search) -> Decision:
     """The verdict on a search."""
-    found = search.first
-    if not found.alarmed:
+    screen = search.first
+    if not screen.alarmed:
         verdict: Verdict = (
-            "consistent" if power(search, found) >= TUNING.verdict.power else "insufficient"
+            "consistent" if power(search, screen) >= TUNING.verdict.power else "insufficient"
         )
-        return Decision(verdict, search.bare, 1.0, None, _quiet(found), 0.0, {})
+        return Decision(verdict, search.bare, 1.0, None, _quiet(screen), 0.0, {})
 
     evidence = Breadth(search).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
@@ -61,6 +62,7 @@ def weigh(
     bare = search.bare.evidence
     standing = [m for m in search.models[1:] if np.isfinite(evidence[m])]
     every = [Weighed(m, m.names, False, evidence[m] - bare) for m in standing]
+
     if alone is not None:
         every.append(Weighed(alone.model, (), True, alone.gain))
     if beside is not None and best.names:
@@ -113,12 +115,14 @@ def taken_share(search: Search, model: Model) -> float:
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
+
     shared = np.zeros(fitted.residual.size)
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
+
     left = [f.residual - shared for f in (off, fitted)]
     before, after = (float(r @ r) - r.size for r in left)
-    return float(np.clip(1.0 - max(after, 0.0) / max(before, 1e-9), 0.0, 1.0))
+    return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 
 
 def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
@@ -130,9 +134,9 @@ def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
     return out
 
 
-def _quiet(found: Screen) -> dict[str, float]:
+def _quiet(screen: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
-    listed = found.listed
+    listed = screen.listed
     weight = {
         n: float(np.exp(min(e, TUNING.verdict.quiet_most) / TUNING.verdict.quiet_temperature))
         / max(len(listed), 1)
@@ -162,13 +166,13 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
     return out
 
 
-def power(search: Search, found: Screen) -> float:
+def power(search: Search, screen: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size."""
     projection = search.base.fitted.projection()
     seen = []
-    for name, ready in found.best.items():
+    for name, ready in screen.best.items():
         if isinstance(name, str):
             a, _ = projection.project(ready.columns)
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(found.surprise(name, float(gain)) > found.threshold)
+            seen.append(screen.surprise(name, float(gain)) > screen.threshold)
     return float(np.mean(seen)) if seen else 0.0

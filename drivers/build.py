@@ -38,6 +38,7 @@ def build_readers(
     one line, where channels, devices and signals do not fit together.
     """
     readers = []
+
     for device in used_devices(settings):
         decoder = build_decoder(settings, device)
         link: Link
@@ -46,6 +47,7 @@ def build_readers(
         else:
             link = build_link(device, decoder.framing, clock)
         readers.append(Reader(device.name, link, decoder, queue, tap(device.name)))
+
     return readers
 
 
@@ -68,6 +70,7 @@ def build_decoder(settings: Settings, device: Device) -> Decoder:
         for name, of in _sensor_settings(settings).items()
         if of.device == device.name
     ]
+
     framing = _framing(device, sensors)
     if isinstance(framing, CanFraming):
         _check_signals(framing, sensors)

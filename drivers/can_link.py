@@ -150,6 +150,7 @@ def packed(message: can.Message) -> bytes:
     flags = EXTENDED if message.is_extended_id else 0
     flags |= REMOTE if message.is_remote_frame else 0
     flags |= ERROR if message.is_error_frame else 0
+
     data = bytes(message.data)
     if message.dlc != len(data) and not message.is_remote_frame:
         raise ValueError(f"length {message.dlc}, but {len(data)} bytes")
@@ -178,6 +179,7 @@ def _is_damage(interface: str, error: Exception) -> bool:
         return isinstance(error, TypeError) or (
             unpacking and not isinstance(error.__cause__, OSError)
         )
+
     return False
 
 

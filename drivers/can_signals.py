@@ -48,6 +48,7 @@ def database(device: Device) -> Database:
         raise DeviceSettingsError(
             f"device {device.name}", "both dbc and signals are given, expected one of them"
         )
+
     if device.signals:
         return _inline(device)
     if device.dbc:
@@ -84,6 +85,7 @@ def _inline(device: Device) -> Database:
     if len(device.signals) > MAX_INLINE:
         reason = f"{len(device.signals)} signals, expected at most {MAX_INLINE}"
         raise DeviceSettingsError(f"device {device.name}", reason)
+
     messages: dict[str, dict[str, dict[str, Any]]] = {}
     for name, definition in device.signals.items():
         where = f"device {device.name}, signal {name}"
@@ -91,6 +93,7 @@ def _inline(device: Device) -> Database:
         if not (message and dot and signal):
             raise DeviceSettingsError(where, "expected a name of the form Message.Signal")
         messages.setdefault(message, {})[signal] = _checked(where, definition)
+
     return Database([_message(device, name, signals) for name, signals in messages.items()])
 
 
@@ -151,6 +154,7 @@ def _signal(name: str, values: dict[str, Any]) -> Signal:
     conversion = BaseConversion.factory(
         scale=values["scale"], offset=values["offset"], is_float=values["is_float"]
     )
+
     return Signal(
         name,
         values["start"],

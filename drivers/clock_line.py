@@ -88,13 +88,16 @@ class Line:
         height = self._height(point)
         since, seen, near = self._steady
         is_alone = received - since >= STEADY and seen > ENOUGH and 2 * near < seen
+
         stray, before = height < self._level - STRAY, self._stray
         self._stray = stray
+
         if not seen or (stray and before) or is_alone:
             self._blocks.clear()
             self._begin(received)
             self._level = height
             since, seen, near, stray = received, 0, 0, False
+
         if not stray:
             self._level = min(self._level, height)
         seen, near = seen + 1, near + (not stray and height - self._level <= HELD)
@@ -122,6 +125,7 @@ class Line:
         blocks = list(self._blocks)
         before, recent = blocks[:-RECENT], blocks[-RECENT:]
         levels = [self._height(self._lower(block)) for block in before]
+
         if len(levels) >= KNOWN and self._second(recent) - max(levels) > MOVED:
             self._blocks = deque(
                 recent[-SURE:], BLOCKS
@@ -146,10 +150,12 @@ def hull_slope(points: Sequence[Point]) -> float:
     two or more.
     """
     hull: list[Point] = []
+
     for point in points:
         while len(hull) >= 2 and _turns_down(hull[-2], hull[-1], point):
             hull.pop()
         hull.append(point)
+
     middle = sum(x for x, _ in points) / len(points)
     right = next((i for i, (x, _) in enumerate(hull) if x > middle and i > 0), len(hull) - 1)
     (x0, y0), (x1, y1) = hull[right - 1], hull[right]

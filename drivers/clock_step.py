@@ -63,13 +63,16 @@ class Doubt:
         rivals, self._calm = self._rivals, 0
         self._impossible.extend(impossible)
         self._back = rival.received if went_back else self._back
+
         if rivals and rival.received - rivals[-1].received < TOGETHER:
             rivals[-1] = min(rivals[-1], rival, key=lambda one: one.delay)
             return
+
         if not rivals:
             self._began = self._useful = rival.received
         self._tried += 1
         rivals.append(rival)
+
         while len(rivals) > KEPT and rival.received - rivals[1].received >= STEADY:
             del rivals[0]
 

@@ -46,6 +46,7 @@ class Decoder:
         """
         frames = [frame for frame in self.framing.decode(data) if self._is_wanted(frame)]
         stamps = self._stamps(frames, received)
+
         readings = []
         for frame, stamp in zip(frames, stamps, strict=True):
             if stamp is None:  # nobody knows when it was taken
@@ -56,6 +57,7 @@ class Decoder:
                 value = sensor.value(frame)
                 if value is not None:
                     readings.append(Reading(stamp, sensor.channel, value, received))
+
         return readings
 
     def restart(self) -> None:
@@ -94,13 +96,16 @@ class Decoder:
         """
         stamps: list[int | None] = [received] * len(frames)
         timed: dict[str, list[int]] = {}
+
         for place, frame in enumerate(frames):
             if frame.device_us is not None:
                 timed.setdefault(frame.key, []).append(place)
+
         for key, places in timed.items():
             mapped = self._mapped(key, [frames[i].device_us or 0 for i in places], received)
             for place, stamp in zip(places, mapped, strict=True):
                 stamps[place] = stamp
+
         return stamps
 
     def _mapped(self, key: str, device_us: Sequence[int], received: int) -> list[int | None]:

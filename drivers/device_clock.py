@@ -52,13 +52,16 @@ class DeviceClock:
         """
         if self._started and received - self._newest_received > SILENCE:
             self._line.unsettle()
+
         times = [self._unwrap(us * 1000, received) for us in device_us]
         right = self._judged(times, received) if times else []
         kept = [time for time, is_right in zip(times, right, strict=True) if is_right]
         self.rejected += len(times) - len(kept)
+
         if kept:
             self._follow(max(kept), received)
             self._seen = sorted([*self._seen, *kept])[-2:]
+
         end = self._squeezed(kept, received)
         return [
             self._stamp(time, received, end) if is_right else None
@@ -95,6 +98,7 @@ class DeviceClock:
             if self._went_back(times, LATE):
                 self._begin_again(times[-1], received)
             return [True] * len(times)
+
         delays = [self._delay(time, received) for time in times]
         possible = self._possible(times, delays)
         if -STRAY <= min(delays) <= LATE:
@@ -147,9 +151,11 @@ class DeviceClock:
         """
         least = median(rival.delay for rival in agreed) - FLAT
         rivals = [rival for rival in agreed if rival.delay >= least]
+
         self.steps += 1
         self.step = -min(rival.delay for rival in rivals) * 1e-9
         self._begin_again(rivals[0].time, rivals[0].received)
+
         for rival in rivals:
             if rival.received < now:
                 self._follow(rival.time, rival.received)
@@ -175,10 +181,12 @@ class DeviceClock:
         if self._line.settled and self._delay(time, received) > LATE:
             return
         self._line.add((float(time - self._first), self._offset(time, received)))
+
         if self._delay(self._newest, self._newest_received) < -STRAY:
             # a wrong time, taken before the line was known: nothing is measured from it
             self._newest = self._second = time
             self._newest_received = received
+
         self._second = max(self._second, min(self._newest, time))
         if time > self._newest:
             self._newest, self._newest_received = time, received

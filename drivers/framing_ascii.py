@@ -71,10 +71,12 @@ class AsciiFraming:
         """The frame of what follows one `$`, counted."""
         line, _, rest = text.partition(b"\n")
         frame = _parse(line.removesuffix(b"\r")) if len(line) < MAX_LINE else None
+
         if frame is None or frame.sequence is None:
             self.counts.bad += 1
             self.counts.garbage += 1 + len(text)
             return None
+
         self.counts.good += 1
         self.counts.garbage += len(rest)
         self.counts.lost += self._gap.lost_before(frame.sequence)

@@ -104,6 +104,7 @@ class CanFraming:
     def decode(self, chunk: bytes) -> list[Frame]:
         frames: list[Frame] = []
         at = 0
+
         while len(chunk) - at >= HEAD.size:
             can_id, length = HEAD.unpack_from(chunk, at)
             data_at = at + HEAD.size
@@ -111,6 +112,7 @@ class CanFraming:
                 break
             frames += self._message(can_id, chunk[data_at : data_at + length])
             at = data_at + length
+
         self.counts.garbage += len(chunk) - at
         return frames
 
@@ -157,6 +159,7 @@ class CanFraming:
             for s in wanted.message.signals
             if s is not wanted.counter and s is not wanted.device_time
         )
+
         names = (signal,) if signal else data
         if not names or not set(names) <= set(data):
             self._unknown(f"signal {key}", f"{name} has {', '.join(data) or 'no data signals'}")

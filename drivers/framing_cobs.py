@@ -41,6 +41,7 @@ def encode(frame: Frame, kind: str | None = None) -> bytes:
     kind = kind or _narrowest(frame)
     key = frame.key.encode("ascii")
     timed = frame.device_us is not None
+
     body = _HEAD.pack(frame.sequence or 0, ord(kind), len(key) | (_TIMED if timed else 0)) + key
     if frame.device_us is not None:
         body += struct.pack("<I", frame.device_us)
@@ -48,6 +49,7 @@ def encode(frame: Frame, kind: str | None = None) -> bytes:
     body += struct.pack("<H", crc_hqx(body, 0xFFFF))
     if len(body) > MAX_BODY:
         raise ValueError(f"frame of {len(body)} bytes, expected at most {MAX_BODY}")
+
     return _stuff(body) + b"\0"
 
 

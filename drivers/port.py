@@ -25,10 +25,12 @@ class Port:
         """
         if not self._ready.poll(POLL * 1e3):
             return b""
+
         try:
             data = os.read(self._fileno, ROOM)
         except BlockingIOError:  # another process was quicker
             return b""
+
         if not data:  # ready, and nothing there: the port has hung up
             raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
         return data

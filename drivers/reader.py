@@ -153,6 +153,7 @@ class Reader:
         self._new_session = True
         self.decoder.restart()
         self._state = "OPEN"
+
         while not self._stop.is_set():
             chunk = self._link.read()
             self.beats += 1

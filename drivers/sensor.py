@@ -154,6 +154,7 @@ def sensor_kinds() -> dict[str, type[Sensor]]:
     package = importlib.import_module("gritd.drivers.sensors")
     for module in pkgutil.iter_modules(package.__path__, "gritd.drivers.sensors."):
         importlib.import_module(module.name)
+
     kinds = [kind for base in (Sensor, Encoder, Analog) for kind in base.__subclasses__()]
     own = {
         kind.channel: kind for kind in kinds if kind.__module__.startswith("gritd.drivers.sensors.")
@@ -163,12 +164,12 @@ def sensor_kinds() -> dict[str, type[Sensor]]:
 
 def _added(own: Mapping[str, type[Sensor]]) -> dict[str, type[Sensor]]:
     """Sensor kinds of other packages, each named for a channel."""
-    found = plugins(SENSORS)
-    for name, kind in found.items():
+    kinds = plugins(SENSORS)
+    for name, kind in kinds.items():
         if not (isinstance(kind, type) and issubclass(kind, Sensor)):
             raise refused(SENSORS, name, "found no subclass of Sensor; expected one")
         if name not in own or kind.channel != name:
             known = ", ".join(sorted(own))
             why = f"found the channel {kind.channel}; expected {name} to be one of {known}"
             raise refused(SENSORS, name, why)
-    return found
+    return kinds

@@ -76,12 +76,14 @@ def _parsed(line: str) -> tuple[int, bytes]:
     digits, flags = _KINDS.get(line[:1], (0, 0))
     if not digits:
         return -1, b""
+
     start = digits + 2
     length = int(line[start - 1 : start], 16)
     if line[0] in "dDbB":
         length = CAN_FD_DLC[length]
     if flags & REMOTE:
         length = 0
+
     data = bytes.fromhex(line[start : start + 2 * length])
     if len(data) != length:
         raise ValueError(line)

@@ -63,6 +63,7 @@ def _number(name: str, text: str) -> float:
     if name not in names:
         known = ", ".join(names)
         raise LimitsError(f"{VARIABLE}: found {name[:40]!r}; expected NAME=VALUE of {known}")
+
     unit = "B" if name in BYTES else ""
     try:
         value = parse(text, unit)
@@ -70,6 +71,7 @@ def _number(name: str, text: str) -> float:
         value, reason = 0.0, f" ({error})"
     else:
         reason = ""
+
     if not 0.0 < value < 2**53:
         expected = "a number of bytes such as 64 MB" if unit else "a number"
         raise LimitsError(f"{VARIABLE}: {name}: found {text[:40]!r}{reason}; expected {expected}")

@@ -20,12 +20,12 @@ class PluginError(Exception):
 
 def plugins(group: str) -> dict[str, Any]:
     """What the entry points of a group name, by their names, in order. Raises PluginError."""
-    found: dict[str, Any] = {}
+    objects: dict[str, Any] = {}
     for entry in sorted(_offered(group), key=lambda each: each.name):
-        if entry.name in found:
+        if entry.name in objects:
             raise refused(group, entry.name, "found it twice; expected each name once")
-        found[entry.name] = _loaded(entry)
-    return found
+        objects[entry.name] = _loaded(entry)
+    return objects
 
 
 def _offered(group: str) -> EntryPoints:

@@ -94,6 +94,7 @@ def _channel(unit: str) -> Section:
             Quantity("", low=0, high=1), "σ of what the directions do not hold, in sizes", "0.0"
         ),
     }
+
     return Section(keys, ChannelForm)
 
 
@@ -144,11 +145,13 @@ def _form(**values: Any) -> LearntForm:
     form = LearntForm(**values)
     if not any(form.channels):
         raise Impossible("points", f"one at least of {', '.join(CHANNELS)} beside them")
+
     for name, channel in zip(CHANNELS, form.channels, strict=True):
         if channel is not None:
             _check_channel(name, channel, form)
     if form.soil is not None:
         form = replace(form, soil=_checked(form.soil, form.directions))
+
     try:
         Correction(form)
     except np.linalg.LinAlgError:

@@ -102,6 +102,7 @@ class Options:
             return int(node.text, 0)
         if node.tag == "float" and units.NUMBER.fullmatch(node.text):
             return float(node.text)
+
         raise node.place.error(
             describe(node), "a number, true, false, or text (in quotes if YAML reads it otherwise)"
         )

@@ -309,6 +309,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
     devices = Named(
         device(folder), lambda name, value: replace(value, name=name), "a mapping of devices"
     )
+
     keys = {
         "testbed": Key(NAME, "name of the testbed"),
         "wheel": Key(Section(WHEEL, Wheel), "the rigid wheel"),
@@ -334,6 +335,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
             Section(RUN, _run), "about this run; the command line may say it instead", ABSENT
         ),
     }
+
     return Section(keys, _settings)
 
 
@@ -354,6 +356,7 @@ def _check_channels(settings: Settings) -> None:
     """
     if settings.drive.torque_source == "wrench" and settings.wrench is None:
         raise Impossible("drive.torque_source", "motor_shunt, since there is no channel wrench")
+
     sources = dict(settings.channels) | ({"wrench": settings.wrench} if settings.wrench else {})
     for name, channel in sources.items():
         if channel.device not in settings.devices:
@@ -371,6 +374,7 @@ def _check_soil(settings: Settings) -> None:
     if settings.soil.pressure_sinkage.modulus(settings.wheel.width) <= 0:
         second = FORMS[soil.pressure_sinkage.form][1]
         raise Impossible(f"soil.{second}", "moduli that give a positive pressure under this wheel")
+
     for name in ("cohesion", "tan_phi", "shear_modulus"):
         low, high = getattr(bounds, f"{name}_bounds")
         value = getattr(soil, name).value

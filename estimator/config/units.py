@@ -172,6 +172,7 @@ def _symbol(symbol: str) -> Unit:
     """A symbol of the table, with or without prefix; `1` is the empty product."""
     if symbol == "1":
         return Unit(Fraction(1), {})
+
     if symbol in SYMBOLS:
         factor, powers, _ = SYMBOLS[symbol]
     elif symbol[0] in PREFIXES and symbol[1:] in SYMBOLS and SYMBOLS[symbol[1:]][2]:
@@ -179,6 +180,7 @@ def _symbol(symbol: str) -> Unit:
         factor *= Fraction(10) ** PREFIXES[symbol[0]]
     else:
         raise UnitError(f"unknown unit {symbol!r}")
+
     return Unit(factor, {name: (Fraction(power), 0) for name, power in powers.items()})
 
 

@@ -171,6 +171,7 @@ def _yaml(node: Node) -> yaml.Node:
         return yaml.SequenceNode(
             "tag:yaml.org,2002:seq", [_yaml(item) for item in node.items], flow_style=True
         )
+
     pairs = [
         (yaml.ScalarNode("tag:yaml.org,2002:str", key), _yaml(item))
         for key, item in node.items.items()
@@ -271,6 +272,7 @@ class _Composer:
                     f"the key again (first on line {items[name].place.line})", "each key once"
                 )
             items[name] = self._node(self._next(), here, depth + 1)
+
         return Mapping(place, items)
 
     def _key(self, event: yaml.Event, place: Place) -> str:

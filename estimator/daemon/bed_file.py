@@ -63,6 +63,7 @@ def save(folder: Path, bed: Bed) -> None:
     """Put the bed into the bin, whole or not at all. Raises BedError."""
     path = path_of(folder)
     new = path.with_suffix(".new")
+
     try:
         with new.open("w", encoding="utf-8") as file:
             json.dump(_plain(bed), file, indent=1)
@@ -85,6 +86,7 @@ def begin(folder: Path, name: str, now: float) -> Bed:
             path.replace(path.with_name(f"bed-{_name_of(path)}-{date}.json"))
     except OSError as error:
         raise BedError(f"{path}: {(error.strerror or 'cannot rename').lower()}") from None
+
     bed = Bed(name, now)
     save(folder, bed)
     return bed

@@ -132,6 +132,7 @@ class Daemon:
         fixed = needs_restart(self.configuration.settings, configuration.settings)
         if fixed:
             raise DaemonError(f"{configuration.source}: {fixed}: changed, which needs a restart")
+
         return Change(
             configuration.text, Pipeline(settings_of_run(configuration.settings, self.run))
         )
@@ -148,6 +149,7 @@ class Daemon:
         """
         self.writer.start()
         loop = Thread(target=self._run_loop, name="loop", daemon=True)
+
         with undisturbed():
             with on_one_core():
                 for reader in self.readers:
@@ -156,6 +158,7 @@ class Daemon:
             while not self._stop.wait(WATCH):
                 self._look(loop, watch)
             left = self._drain(loop)
+
         return self._close(left)
 
     def _drain(self, loop: Thread) -> float:

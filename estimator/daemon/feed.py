@@ -63,8 +63,8 @@ class Feed:
 def _wrong(tick: tuple[float, ...], used: Mapping[str, int]) -> dict[str, str]:
     """What is wrong, by channel."""
     stale, stuck = int(tick[PLACE["stale"]]), int(tick[PLACE["stuck"]])
-    found = {name: STUCK for name, bit in used.items() if stuck & bit}
-    return found | {name: STALE for name, bit in used.items() if stale & bit}
+    faults = {name: STUCK for name, bit in used.items() if stuck & bit}
+    return faults | {name: STALE for name, bit in used.items() if stale & bit}
 
 
 def _channels(names: list[str]) -> str:

@@ -72,6 +72,7 @@ class Loop:
         self._log_dropped = 0  # as of the last checkpoint
         self._checkpointed = 0  # when that was [ns]
         self._lateness: deque[float] = deque(maxlen=RECENT)
+
         self.latest: tuple[TickRow, LoopRecord] | None = None
         self.ticks = self.missed = 0
         self._start = start
@@ -140,6 +141,7 @@ class Loop:
         on.
         """
         dropped = self.latest[1].log_dropped if self.latest else 0
+
         if self._asked:
             change = self._asked.popleft()
             if change.pipeline is not None and change.configuration != self._configuration:
@@ -148,6 +150,7 @@ class Loop:
             self._checkpoint(state, stamp, dropped, new_part=True)
         elif dropped > self._log_dropped and stamp - self._checkpointed >= MEND:
             self._checkpoint(state, stamp, dropped, new_part=False)
+
         return state
 
     def _checkpoint(self, state: State, stamp: int, dropped: int, new_part: bool) -> None:

@@ -43,6 +43,7 @@ def on_one_core() -> Iterator[None]:
     except (OSError, AttributeError):  # forbidden, or no Linux: they run where they like
         yield
         return
+
     try:
         yield
     finally:

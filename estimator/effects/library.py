@@ -42,8 +42,8 @@ def _find() -> dict[str, type[Effect]]:
 
 def _added(own: Mapping[str, type[Effect]]) -> dict[str, type[Effect]]:
     """Effects of other packages. Raises PluginError."""
-    found = plugins(GROUP)
-    for name, effect in found.items():
+    effects = plugins(GROUP)
+    for name, effect in effects.items():
         if not (isinstance(effect, type) and issubclass(effect, Effect)):
             raise refused(GROUP, name, "found no subclass of Effect; expected one")
         if effect.name != name:
@@ -51,7 +51,8 @@ def _added(own: Mapping[str, type[Effect]]) -> dict[str, type[Effect]]:
             raise refused(GROUP, name, why)
         if name in own:
             raise refused(GROUP, name, "found an effect of gritd's own; expected another name")
-    return found
+
+    return effects
 
 
 def make(name: str, values: Mapping[str, float]) -> Effect:

@@ -27,6 +27,7 @@ NO_PREDICTIONS = Predictions(*(nan,) * len(Predictions._fields))
 def measurements(snapshot: Snapshot, now: WheelState) -> Measurements:
     """The window as measured, effects accounted for."""
     theta_1 = _with_sigma(now)
+
     return Measurements(
         wheel_angle=snapshot.wheel_angle,
         wheel_speed=snapshot.wheel_speed.value,
@@ -56,6 +57,7 @@ def soil_estimate(estimate: Estimate) -> SoilEstimate:
     """The estimate in SI: the state is [c/kPa, tan φ, ln k]."""
     P = estimate.P
     c, tan_phi, k = soil(estimate)
+
     return SoilEstimate(
         cohesion=c,
         cohesion_sigma=sqrt(P[C][C]) * KPA,

@@ -53,6 +53,7 @@ def judge(
         factors, x = arithmetic.evidence(*known)
     else:
         factors, x = evidence(before, variances, spread, lines, windows)
+
     return Judgement(np.array(factors), _change(factors), x)
 
 

@@ -83,12 +83,14 @@ def plain_variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) 
     """`variance` in plain floats, to the same bits as compiled."""
     (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
     (h0, h1, h2), (c0, c1, c2) = h, estimate.cross
+
     own = (
         p00 * h0 * h0
         + p11 * h1 * h1
         + p22 * h2 * h2
         + 2.0 * (p01 * h0 * h1 + p02 * h0 * h2 + p12 * h1 * h2)
     )
+
     shared = h0 * dot(c0, g) + h1 * dot(c1, g) + h2 * dot(c2, g)
     return max(own + 2.0 * shared + dot(variances, tuple(map(mul, g, g))), 0.0)
 
@@ -115,11 +117,13 @@ def project(estimate: Estimate, bounds: tuple[tuple[float, float], ...]) -> Esti
     """
     if all([low <= value <= high for value, (low, high) in zip(estimate.x, bounds, strict=True)]):
         return estimate
+
     x, P = list(estimate.x), estimate.P
     for j, (low, high) in enumerate(bounds):
         step = min(max(x[j], low), high) - x[j]
         if step != 0.0:
             x = [value + P[i][j] / P[j][j] * step for i, value in enumerate(x)]
+
     clamped = tuple(
         min(max(value, low), high) for value, (low, high) in zip(x, bounds, strict=True)
     )

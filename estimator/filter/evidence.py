@@ -122,10 +122,12 @@ def _solved(L: Rows, right: list[float]) -> list[float]:
         for k in range(i):
             x[i] -= L[i][k] * x[k]
         x[i] /= L[i][i]
+
     for i in reversed(range(size)):
         for k in range(i + 1, size):
             x[i] -= L[k][i] * x[k]
         x[i] /= L[i][i]
+
     return x
 
 

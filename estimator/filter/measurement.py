@@ -34,6 +34,7 @@ class Measurement:
         self.chain = Chain(settings, configured(settings.effects))
         self.model = WheelModel(settings, self.chain)
         self.nuisances = nuisances(settings)
+
         self._variants = _variants(settings, self.chain)
         self._unmoved = ((0.0, 0.0),) * len(self._variants)
         self.variances = (
@@ -96,6 +97,7 @@ class Measurement:
         after = recall
         if now.situation is not None:
             after = self.chain.remember(recall, elapsed, now.situation)
+
         if form is None or now.form is None:
             return after
         lagging = form.remember(wheeling(now, snapshot.wheel_angle), recall.get(NAME, ()))
@@ -107,6 +109,7 @@ class Measurement:
         """
         torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity = _sensitivity(now, prediction)
+
         update = Update(
             innovation=(now.torque.value - torque.value, now.drawbar_pull.value - pull.value),
             H=(_state_gradient(torque), _state_gradient(pull)),
@@ -129,6 +132,7 @@ class Measurement:
         sigmas = (now.sinkage.sigma, now.slip.sigma, now.load.sigma)
         by_torque, by_pull = zip(s.by_sinkage, s.by_slip, s.by_load, strict=True)
         torque, pull = tuple(map(mul, by_torque, sigmas)), tuple(map(mul, by_pull, sigmas))
+
         common = dot(torque, pull)
         noise = (
             (dot(torque, torque) + now.torque.sigma**2, common),
@@ -145,6 +149,7 @@ class Measurement:
         sensitivity = _sensitivity(now, prediction)
         torque, pull = self._nuisance_gradients(sensitivity, now)
         of_torque, of_pull = _rest(now.form, sensitivity) if now.form is not None else ((), ())
+
         return (
             self._sigma(estimate, now, prediction.torque, torque, of_torque),
             self._sigma(estimate, now, prediction.drawbar_pull, pull, of_pull),
@@ -165,6 +170,7 @@ class Measurement:
             quantity.by_load * now.load.sigma,
             *rest,
         )
+
         return sqrt(
             variance(estimate, self.variances, _state_gradient(quantity), nuisance)
             + dot(noise, noise)
@@ -201,6 +207,7 @@ def _sensed(
     now = wheel_state(settings, snapshot, chain, context)
     if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
         return now
+
     return now._replace(added=_added(model, chain, now, estimate))
 
 
@@ -355,6 +362,7 @@ def selected(update: Update, components: tuple[int, ...]) -> Update:
 def _sensitivity(now: WheelState, prediction: Prediction) -> Sensitivity:
     torque, pull = prediction.torque, prediction.drawbar_pull
     by_z = now.theta_1.d_sinkage
+
     return Sensitivity(
         torque=torque.value,
         drawbar_pull=pull.value,

@@ -173,11 +173,13 @@ class Memory(NamedTuple):
         failed its gate since then belongs to the new soil, and that may go on changing.
         """
         at, age, since = self.since + number, 0.0, []
+
         for stretch in self.stretches[at:]:
             measured = tuple(range(len(stretch.line.y))) if stretch.line else stretch.components
             unrest = CHANGE.walk * exp(-age / CHANGE.cooling)
             since.append(stretch._replace(components=measured, unrest=unrest))
             age += stretch.elapsed
+
         since[0] = since[0]._replace(changed=known)
         return self._replace(stretches=(*self.stretches[:at], *since))
 
@@ -194,6 +196,7 @@ class Memory(NamedTuple):
                 rest = stretches[at + 1 :]
                 return self._replace(stretches=(*stretches[: at - 1], joined, *rest))
             after += right.windows
+
         return self
 
 

@@ -158,9 +158,11 @@ def _shift(
     """(8, nodes, nodes): the effects' part, and the share of what the triangles miss."""
     paper = np.array(true_integrals(wheel, soil, (), theta_1, slip))
     exponent = linear.shear_exponent(wheel, soil.shear_modulus, theta_1, slip, linear.ARRAYS)
+
     ratio = np.clip(wheel.c1 + wheel.c2 * slip, 0.0, 1.0)
     closed = np.array(integrals(theta_1, ratio, exponent.f, linear.ARRAYS))
     shift: Array = share * (paper - closed)
+
     if effects:
         shift = shift + np.array(true_integrals(wheel, soil, effects, theta_1, slip)) - paper
     return shift
@@ -197,10 +199,12 @@ def _fitted(values: Array) -> Array:
     what is rounded does not.
     """
     rows, columns = _weights(NODES[0], DEGREE[0]), _weights(NODES[1], DEGREE[1])
+
     # sums over an axis that is not the last are made term by term
     along = np.add.reduce(rows[:, :, None] * values[:, None], axis=2)
     turned = np.ascontiguousarray(along.transpose(0, 2, 1))
     fitted = np.add.reduce(columns.T[:, :, None] * turned[:, :, None], axis=1)
+
     # − 0 becomes 0
     rounded: Array = np.round(fitted.transpose(0, 2, 1) / QUANTUM) * QUANTUM + 0.0
     return rounded

@@ -146,6 +146,7 @@ class Tracker:
         standing = state.trust.standing(self._experienced, separability)
         believed = standing == Status.TRACKING
         told = separability if believed else 1.0
+
         return Account(
             snapshot,
             now,
@@ -163,6 +164,7 @@ class Tracker:
         remember.
         """
         recall = self.measurement.remember(state.recall, elapsed, now, snapshot)
+
         return state._replace(
             window_end=snapshot.evaluated,
             began=snapshot.evaluated if state.began < 0 else state.began,
@@ -229,6 +231,7 @@ class Tracker:
         """The memory with one more window; where a stretch ends, a review of the record begins."""
         radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
         memory, begun = state.memory.extended(now, taken, radius, elapsed, unrest)
+
         if not begun or not before:
             return memory, None
         return memory, self.reviewer.begun(before[0].like(now, taken), state.unlinearised + 1)
@@ -266,6 +269,7 @@ class Tracker:
         trust = state.trust
         disagrees = trust.disagrees(self._experienced)
         torque, drawbar_pull = trust.surprise
+
         return (
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
             + Flag.K_ESTIMATED * self.reviewer.estimates_k(state)
@@ -287,6 +291,7 @@ def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:
     if before is not None and elapsed > 0.0:
         acceleration = (snapshot.wheel_speed.value - before.read[0]) / elapsed
         sinking = (snapshot.sinkage.value - before.read[1]) / elapsed
+
     time = 0.0 if state.began < 0 else (snapshot.evaluated - state.began) / NS
     origin = snapshot.carriage_position if state.origin is None else state.origin
     return Context(time, *soil(state.estimate), acceleration, sinking, state.recall, origin)

@@ -89,12 +89,14 @@ def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int
     guess = bekker_entry_angle(wheel, contact.soil, load) if start is None else start
     theta_1, overloaded = np.zeros(load.size), np.zeros(load.size, dtype=bool)
     kept = np.zeros((len(Forces._fields), load.size))
+
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
         balance = _iterate(
             wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order
         )
         theta_1[touching], kept[:, touching], overloaded[touching] = balance
+
     return Balance(theta_1, Forces(*kept), overloaded)
 
 
@@ -166,6 +168,7 @@ def bekker_entry_angle(wheel: Wheel, soil: Soil, load: Array) -> Array:
 def _take(contact: Contact, index: slice | Index) -> Contact:
     """The same contact at some of its samples; what is one float for all stays so."""
     soil, law = contact.soil, contact.law
+
     return Contact(
         Soil(
             *(

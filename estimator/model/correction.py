@@ -44,9 +44,11 @@ class Correction:
         self.directions = form.directions
         self._points = np.array(form.points)
         self._root = root_of(self._points)
+
         parts = [_columns(channel, form) for channel in form.channels]
         # (m, 3 (1 + r)) means and directions in units of the kernel
         self._weights = np.linalg.solve(self._root.T, np.hstack(parts))
+
         given = [channel or ChannelForm(0.0, (), ()) for channel in form.channels]
         self._size = np.array([channel.size for channel in given])
         self._kept = np.array([1.0 - channel.rest**2 for channel in given])
@@ -89,6 +91,7 @@ class Correction:
             np.broadcast_to(np.asarray(value, float), shape)
             for value in (situation.slip, load, speed, situation.direction, situation.wheel_angle)
         ]
+
         parts = []
         for run in _runs(situation, shape[0]):
             slip, weights, rim, direction, angle = (value[run] for value in full)
@@ -98,6 +101,7 @@ class Correction:
             for start in range(0, len(conditions), CHUNK):
                 part = slice(start, start + CHUNK)
                 parts.append(self.at(conditions[part], weight[part]).mean)
+
         return np.concatenate(parts)
 
 

@@ -97,6 +97,7 @@ def _response(
     sensed = Sensed(
         reaction.sinkage, situation.current, reaction.drawbar_pull, reaction.load, reaction.torque
     )
+
     n = solved.theta_1.shape
     return Response(
         slip=_full(situation.slip, n),
@@ -153,6 +154,7 @@ def corrected_form(
     """The reaction with the mean of δ: torque, drawbar pull and sinkage, each (n,)."""
     if correction is None:
         return reaction
+
     torque, pull, sinkage = correction.of(situation).T
     return replace(
         reaction,
@@ -172,6 +174,7 @@ def drive(
     motor_torque = reduce(
         lambda torque, e: torque + e.torque_loss(situation), effects, situation.torque
     )
+
     situation = replace(situation, current=motor_torque / torque_constant)
     for _ in range(HEATING_ROUNDS):
         current = motor_torque / (torque_constant * torque_factor(situation, effects))

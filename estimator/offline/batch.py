@@ -170,6 +170,7 @@ def _window(tracker: Tracker, state: TrackState, account: Account) -> Window:
     """One window, after its update."""
     snapshot = account.snapshot
     torque, drawbar_pull = aids(account)
+
     return Window(
         head=WindowHead(
             evaluated=snapshot.evaluated,

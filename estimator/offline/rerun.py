@@ -78,10 +78,12 @@ class Rerun:
         """
         self.reconfigure(checkpoint)
         same = not self.known or encode(self._state) == checkpoint.state
+
         try:
             self._state = decode(checkpoint.state, self.pipeline.settings)
         except ValueError as error:
             raise RecordingError(f"/checkpoint: {error}") from None
+
         self.known = self._given = True
         return same
 

@@ -353,6 +353,7 @@ def _expected_step(stamp: Ints, counts: Ints, elapsed: int, shortest: int) -> in
     count = len(stamp)
     if count < 3 or stamp[-1] - stamp[0] < shortest:
         return 0
+
     t, x = (stamp - stamp[0]).tolist(), (counts - counts[0]).tolist()
     spread = count * sum([a * a for a in t]) - sum(t) ** 2
     rate = (count * sum([a * b for a, b in zip(t, x, strict=True)]) - sum(t) * sum(x)) / spread * NS

@@ -123,6 +123,7 @@ def fingerprint(settings: Settings) -> str:
         settings.effects,
         *([settings.discrepancy] if settings.discrepancy is not None else []),
     )
+
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 

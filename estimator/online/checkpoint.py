@@ -46,6 +46,7 @@ def decode(text: str, settings: Settings) -> State:
         parts = json.loads(text)
         sync = Sync(settings)
         sync.remember(_object(parts["sync"]))
+
         rest = _object(parts["rest"])
         _check(State, [name for name in _field_names(State) if name != "sync"], rest)
         return State(sync, *rest)
@@ -81,9 +82,11 @@ def _object(plain: Any, depth: int = 0) -> Any:
         return tuple([_object(item, depth + 1) for item in plain])
     if not isinstance(plain, dict):
         return plain
+
     ((name, content),) = plain.items()
     if name == "dict":
         return {key: _object(item, depth + 1) for key, item in content.items()}
+
     values = [_object(item, depth + 1) for item in content]
     return _kinds()[name](values) if name in ("list", "deque") else _build(_kinds()[name], values)
 
@@ -110,6 +113,7 @@ def _check(kind: Any, names: list[str], values: Sequence[Any]) -> None:
 def _fits(value: Any, hint: Any) -> bool:
     """Whether a value is what the hint declares; a number is also one to calculate with."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
+
     if origin in (typing.Union, UnionType):
         return any(_fits(value, part) for part in parts)
     if origin is tuple and parts[-1:] != (...,):

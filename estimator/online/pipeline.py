@@ -77,6 +77,7 @@ class Pipeline:
     def _tick(self, before: State, after: State, account: Account, consumed: int, t: int) -> Tick:
         """What the tick at t [ns] says."""
         torque, drawbar_pull = aids(account)
+
         return Tick(
             head=self._head(before, after, account, consumed, t),
             measurements=measurements(account.snapshot, account.now),

@@ -43,12 +43,14 @@ class Backlog:
         with self._lock:
             accepted, before = self._accepted + len(items), len(self._items)
             starts = self._starts + (isinstance(items[0], PartStart) if items else 0)
+
             try:
                 self._items.extend(items)
             except MemoryError:
                 while len(self._items) > before:
                     self._items.pop()
                 raise
+
             self._accepted, self._starts = accepted, starts
             self._drop_oldest(max(0, len(self._items) - self._capacity))
 
@@ -75,11 +77,13 @@ class Backlog:
             batch = list(islice(self._items, self._leading()))
             taken = self._taken + len(batch)
             lost, config = self._overflow, self._config
+
             # from here on nothing may fail: what is taken is counted
             for _ in batch:
                 self._items.popleft()
             if batch and isinstance(batch[0], PartStart):
                 self._starts -= 1
+
             self._taken, self._overflow, self._config = taken, 0, ""
         return batch, lost, config
 

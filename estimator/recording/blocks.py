@@ -116,10 +116,12 @@ class Unpacker:
         """
         if too_large(block, self._largest) or len(data) != block.stored:
             return None
+
         try:
             content = self._content(block, data)
         except (Damaged, zstandard.ZstdError):
             return None
+
         if len(content) != block.size or (block.crc and crc32(content) != block.crc):
             return None
         return content
@@ -169,6 +171,7 @@ def _decompress(block: Block, data: bytes) -> bytes:
         if "not enough memory" in str(error).lower():
             raise MemoryError(str(error)) from None
         raise Damaged(f"cannot be unpacked: {error}") from None
+
     if block.compression:
         raise Damaged(f"compression {block.compression!r} is not one of zstd, lz4, none")
     return data
@@ -189,6 +192,7 @@ def split(
         before = list(records(content, int(hint[0])))
         if all(opcode in (Opcode.SCHEMA, Opcode.CHANNEL) for opcode, _, _ in before):
             return hint, before
+
     return _walked(content)
 
 
@@ -208,9 +212,11 @@ def _tile(content: bytes, starts: Starts) -> bool:
     """Whether messages, and nothing else, lie end to end from the first of these to the end."""
     if starts[0] < 0 or starts[-1] + MESSAGE_HEAD.size > len(content):
         return False
+
     heads = gather(content, starts, MESSAGE_DTYPE)
     ends = starts + RECORD_HEAD.size + heads["length"].astype(np.int64)
     long_enough = heads["length"] >= MESSAGE_HEAD.size - RECORD_HEAD.size
+
     return bool(
         np.all(heads["opcode"] == Opcode.MESSAGE)
         and np.all(long_enough)
@@ -224,11 +230,13 @@ def _indexed(file: BinaryIO, block: Block) -> Starts:
     first, end = block.index
     if not 0 < end - first <= limits().chunk:
         return np.empty(0, np.int64)
+
     file.seek(first)
     data = file.read(end - first)
     starts = []
     for _, start, stop in records(data):
         starts.append(np.frombuffer(data, "<u8", (stop - start - 6) // 8, start + 6)[1::2])
+
     return np.sort(
         np.concatenate(starts).astype(np.int64)
     )  # one that is too large becomes negative, and stands first
@@ -240,6 +248,7 @@ def records(data: bytes, stop: int | None = None) -> Iterator[tuple[int, int, in
     """
     stop = len(data) if stop is None else stop
     position = 0
+
     while position < stop:
         if position + RECORD_HEAD.size > stop:
             raise Damaged("ends inside a record")

@@ -216,12 +216,14 @@ def _layout(codes: Sequence[str]) -> tuple[str, list[int], int]:
     the end.
     """
     text, offsets, end = "I", [], 0
+
     for code in codes:
         size = struct.calcsize("<" + code)
         padding = -end % size
         text += "x" * padding + code
         offsets.append(end + padding)
         end += padding + size
+
     return text, offsets, end
 
 

@@ -55,9 +55,11 @@ class ChunkIndexes:
             size,
             len(indexes),
         )
+
         self._packed += self._packer.compress(
             row + b"".join(_CHANNEL.pack(*index) for index in indexes)
         )
+
         self._end = start + length + sum(length for _, length in indexes)
         self._time = times[0]
         self.count += 1
@@ -76,10 +78,12 @@ class ChunkIndexes:
         for (gap, length, later, span, size, _), indexes in self._rows():
             start, time = end + gap, time + later & _MASK
             end = start + length
+
             offsets = {}
             for channel, taken in indexes:
                 offsets[channel] = end
                 end += taken
+
             yield ChunkIndex(
                 chunk_length=length,
                 chunk_start_offset=start,
@@ -96,6 +100,7 @@ class ChunkIndexes:
         """What `add` packed: the row and its channels."""
         unpack, rows = zlib.decompressobj(), bytearray()
         packed = self._packed + self._packer.copy().flush()
+
         for start in range(0, len(packed), PIECE):
             rows += unpack.decompress(packed[start : start + PIECE])
             while len(rows) >= _ROW.size:

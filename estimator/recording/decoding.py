@@ -67,13 +67,13 @@ class Chunk:
     """The good messages of one block: where their records begin in `content`, and their heads,
     shape (n,).
 
-    found: `groups`, where they are known already.
+    known: `groups`, where they are told already.
     """
 
     content: bytes
     starts: Starts
     heads: Rows
-    found: dict[int, Starts] | None = None
+    known: dict[int, Starts] | None = None
 
     def body(self, i: int) -> bytes:
         start = int(self.starts[i])
@@ -90,8 +90,8 @@ class Chunk:
     @cached_property
     def groups(self) -> dict[int, Starts]:
         """Channel number -> the numbers of its messages, in file order."""
-        if self.found is not None:
-            return self.found
+        if self.known is not None:
+            return self.known
         channels = self.heads["channel"]
         order = np.argsort(channels, kind="stable")
         cuts = np.flatnonzero(np.diff(channels[order])) + 1

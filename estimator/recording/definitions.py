@@ -48,10 +48,10 @@ class Definitions:
     def known(self, preamble: bytes) -> bool:
         """Whether these records are definitions, and each was met before, to the byte."""
         try:
-            found = list(records(preamble))
+            entries = list(records(preamble))
         except Damaged:
             return False
-        return all((opcode, preamble[start:end]) in self._seen for opcode, start, end in found)
+        return all((opcode, preamble[start:end]) in self._seen for opcode, start, end in entries)
 
     def _schema(self, fields: Texts) -> None:
         schema = Schema(
@@ -76,9 +76,11 @@ class Definitions:
             raise Damaged(
                 f"channel {channel.id} refers to schema {channel.schema_id}, which is missing"
             )
+
         fields = None
         if schema and schema.encoding == "ros2msg" and channel.message_encoding == "cdr":
             fields = parse_schema(schema.data.decode(errors="replace"))
+
         known = self._known.get(channel.topic)
         codec = Codec(fields) if fields else None
         if known:
@@ -94,6 +96,7 @@ def _require(path: Path, known: Topic, codec: Codec | None) -> None:
         raise RecordingError(
             f"{path}: {known.name}: not CDR with a flat ros2msg schema; expected {expected}"
         )
+
     for name, kind, _ in known.fields:
         held = dict(zip(codec.names, codec.kinds, strict=True)).get(name)
         if held is None:

@@ -94,8 +94,10 @@ def opened(path: Path, buffering: int = 1 << 18) -> BinaryIO:
         buffering,
         opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK),
     )
+
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
+
     file.close()
     raise OSError(errno.EINVAL, "it is no regular file")
 
@@ -119,6 +121,7 @@ def gather(
     """
     if starts.size == 0:
         return np.empty(0, dtype)
+
     room = len(content) - dtype.itemsize + 1
     windows = np.ndarray((room,), np.dtype((np.void, dtype.itemsize)), content, strides=(1,))
     return np.asarray(windows[starts]).view(dtype)
@@ -273,6 +276,7 @@ class McapFile:
         """Write index and summary; nothing may be added then. The medium may not have them yet."""
         if not self._indexed:
             raise RecordingError(f"{self.path}: without an index, since memory was short")
+
         before = self._length, self._crc
         try:
             for piece in self._ending():
@@ -291,6 +295,7 @@ class McapFile:
         # before anything is written: memory may be short
         view, length = memoryview(data), self._length + len(data)
         crc = zlib.crc32(data, self._crc)
+
         try:
             with reported(self.path, "write"):
                 while view:
@@ -298,6 +303,7 @@ class McapFile:
         except (RecordingError, MemoryError):
             self._rewind()
             raise
+
         self._length, self._crc = length, crc
 
     def _rewind(self) -> None:
@@ -349,6 +355,7 @@ class McapFile:
 
     def _statistics(self, schemas: int) -> Statistics:
         first, last = self._span or (0, 0)
+
         return Statistics(
             attachment_count=0,
             channel_count=len(self._counts),
@@ -393,4 +400,5 @@ def _message_index(
     head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
         "<HI", channel, len(entries)
     )
+
     return channel, head + entries

@@ -70,16 +70,16 @@ class Pile(NamedTuple):
             ends = {c: (int(numbers[own[0]]), int(numbers[own[-1]])) for c, own in groups.items()}
             return [{c: (*ends[c], len(own)) for c, own in groups.items()}]
 
-        found: list[Ranges] = [{} for _ in range(len(self.cuts) - 1)]
-        block = np.repeat(np.arange(len(found)), np.diff(self.cuts))
+        of_blocks: list[Ranges] = [{} for _ in range(len(self.cuts) - 1)]
+        block = np.repeat(np.arange(len(of_blocks)), np.diff(self.cuts))
         for channel, own in groups.items():
             last = np.append(np.flatnonzero(np.diff(block[own])), len(own) - 1)
             first = np.append(0, last[:-1] + 1)
             columns = (block[own[last]], numbers[own[first]], numbers[own[last]], last - first + 1)
             for at, begin, end, count in zip(*(c.tolist() for c in columns), strict=True):
-                found[at][channel] = begin, end, count
+                of_blocks[at][channel] = begin, end, count
 
-        return found
+        return of_blocks
 
 
 def alone(chunk: Chunk) -> Pile:
@@ -99,15 +99,15 @@ def opened(
 
     content = contents[0] if len(contents) == 1 else b"".join(contents)
     ends = np.cumsum([len(each) for each in contents])
-    found = (
+    joined = (
         _walked(content, ends, sources)
         if records.BUILT
         else _pointed(content, ends, indexes, sources)
     )
-    if found is None:
+    if joined is None:
         return None
 
-    chunk, cuts = found
+    chunk, cuts = joined
     begins = (chunk.starts[cuts[:-1]] - _bases(ends)).tolist()
     return Pile(chunk, cuts, tuple(c[:b] for c, b in zip(contents, begins, strict=True)))
 
@@ -128,11 +128,11 @@ def _walked(
         flat = source.codec is not None and source.codec.flat
         sizes[channel] = source.codec.size if source.codec and flat else records.NOT_FIXED
 
-    found = records.walk(content, ends, sizes)
-    if found is None:
+    walked = records.walk(content, ends, sizes)
+    if walked is None:
         return None
 
-    starts, heads, cuts, numbers, counts = found
+    starts, heads, cuts, numbers, counts = walked
     order = np.frombuffer(numbers, np.int64)
     edges = pairwise(accumulate(counts.values(), initial=0))
     groups = {channel: order[a:b] for channel, (a, b) in zip(counts, edges, strict=True)}
@@ -241,6 +241,7 @@ def _tiled(starts: Starts, heads: Rows, cuts: Starts, ends: Starts) -> bool:
     following = np.append(starts[1:], ends[-1])
     following[cuts[1:] - 1] = ends
     lengths = heads["length"].astype(np.int64)
+
     return bool(
         np.array_equal(starts + lengths + RECORD_HEAD.size, following)
         and np.all(heads["opcode"] == Opcode.MESSAGE)

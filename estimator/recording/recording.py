@@ -83,6 +83,7 @@ class Recording:
                         own.tolist(), times, source.values(chunk, own), strict=True
                     ):
                         rows[i] = (source.topic.name, time, values)
+
             yield from (row for row in rows if row is not None)
 
     def arrays(self, topic: str) -> Rows:

@@ -30,6 +30,7 @@ def sweep(folder: Path) -> list[Path]:
                 draft.unlink()
             elif not os.path.lexists(path):
                 renamed.append(draft.rename(path))
+
     return renamed
 
 

@@ -53,6 +53,7 @@ class RunWriter:
         self._pending = _Pending()
         self._file = McapFile(self.path, compression, mode=mode)
         self._encoders = _define(self._file, (*RAW_TOPICS, LOG_TOPIC, *topics))
+
         with self._file.beginning():
             computed = {**versions(), TICK_REVISION: str(REVISION)}
             self._file.add_metadata(CONFIG, sealed(CONFIG, {"yaml": config_yaml, **computed}))
@@ -74,6 +75,7 @@ class RunWriter:
             raise ValueError(
                 f"{topic}: {tuple(values)!r:.200} does not fit its fields: {error}"
             ) from None
+
         if self._is_full():
             self.write_out()
 

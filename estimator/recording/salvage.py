@@ -67,6 +67,7 @@ def read(
     path = Path(path)
     recording = Recording(path)
     wanted = Tables(tables)
+
     with reported(path, "read"), file_opened(path, buffering=0) as file:
         try:
             walk = Walk(file, path.stat().st_size)
@@ -77,6 +78,7 @@ def read(
             raise RecordingError(
                 message if message.startswith(str(path)) else f"{path}: {message}"
             ) from None
+
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
     recording._tables = wanted.done()
@@ -93,12 +95,14 @@ def _take_metadata(recording: Recording, contents: Contents) -> None:
             recording.metadata[name] = entries
         else:
             recording.damage.append(f"metadata {name}: its checksum does not hold; ignored")
+
     if contents.library == LIBRARY:
         recording.damage += [
             f"metadata {name} is missing"
             for name in (CONFIG, RUN)
             if name not in recording.metadata
         ]
+
     config = dict(recording.metadata.get(CONFIG, {}))
     recording.config_yaml = config.pop("yaml", None)
     recording.versions = {key: value for key, value in config.items() if key != CHECKSUM}
@@ -116,6 +120,7 @@ class _Check:
         self._definitions = Definitions(recording.path, known)
         recording.sources = self._definitions.sources
         self._tables = tables
+
         self._unpacker = Unpacker()
         self._sequence = Numbers()
         self._numbered = False  # its messages are numbered as ours are
@@ -128,7 +133,7 @@ class _Check:
 
     def whole(self, file: BinaryIO, walk: Walk) -> None:
         """Raises RecordingError where this is no MCAP file, or one without a field relied on."""
-        recording, contents = self._recording, walk.found
+        recording, contents = self._recording, walk.contents
         recording.damage = contents.damage
         walk.begin()
         expected = self._summary(contents.summary)
@@ -218,6 +223,7 @@ class _Check:
         bounds = limits()
         unpacked = self._unpacked + sum(block.size for block in blocks)
         stored = self._stored
+
         return (
             self._waste > MAX_WASTE
             or unpacked > bounds.start + bounds.ratio * stored
@@ -248,9 +254,11 @@ class _Check:
         starts, definitions = split(file, block, content)
         for opcode, start, end in definitions:
             self._definitions.add(opcode, content[start:end])
+
         chunk, complaints = select(content, starts, self._recording.sources)
         for complaint in complaints:
             self._say(f"byte {block.start}: {complaint}")
+
         self._waste += _COST * (len(starts) - len(chunk.starts))
         self._place(block, chunk)
         self._keep([block], alone(chunk))
@@ -265,6 +273,7 @@ class _Check:
         if self._numbered and self._sequence.repeated(ranges):
             self._recording.misplaced += 1
             raise Damaged("it stands there twice")
+
         if not self._sequence.add(ranges) and self._numbered:
             self._recording.misplaced += 1
             self._say(
@@ -293,6 +302,7 @@ class _Check:
         one.
         """
         expected: dict[int, int] = {}
+
         try:
             for opcode, start, end in records(summary):
                 if opcode == Opcode.STATISTICS:
@@ -301,6 +311,7 @@ class _Check:
                     self._definitions.add(opcode, summary[start:end])
         except Damaged:  # only the first part of a very long summary is read
             pass
+
         return expected
 
     def _expect(self, counts: Mapping[int, int], size: int) -> None:
@@ -337,6 +348,7 @@ def _piles(walk: Walk, damage: Sequence[str]) -> Iterator[list[tuple[Block, int]
     """
     pile: list[tuple[Block, int]] = []
     size = 0
+
     for block in walk.blocks():
         far = pile and block.start + block.stored - pile[0][0].start > REACH
         if pile and (far or size + block.size > ROOM):
@@ -344,6 +356,7 @@ def _piles(walk: Walk, damage: Sequence[str]) -> Iterator[list[tuple[Block, int]
             pile, size = [], 0
         pile.append((block, len(damage)))
         size += block.size
+
     if pile:
         yield pile
 

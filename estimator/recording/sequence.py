@@ -78,6 +78,7 @@ class Sequence:
             if _ahead(first, counted.first) < 0:
                 counted.first = first
             counted.count += count
+
         return in_place
 
 

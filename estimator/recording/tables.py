@@ -47,12 +47,13 @@ class _Copy(NamedTuple):
         """
         rows["log_time"] = chunk.heads["log_time"][own]
         rows["order"] = own + before
-        found = gather(chunk.content, chunk.starts[own] + self.low, self.record)
+
+        parts = gather(chunk.content, chunk.starts[own] + self.low, self.record)
         target = rows.view(self.row)
         for name in self.pieces:
-            target[name] = found[name]
+            target[name] = parts[name]
         for name, seconds, rest in self.times:
-            rows[name] = found[seconds].astype(np.int64) * BILLION + found[rest]
+            rows[name] = parts[seconds].astype(np.int64) * BILLION + parts[rest]
 
 
 class _CompiledCopy(NamedTuple):
@@ -103,11 +104,13 @@ class Table:
         groups = [chunk.groups[channel] for channel in channels]
         own = groups[0] if len(groups) == 1 else np.sort(np.concatenate(groups))
         rows = self._room(len(own))
+
         for channel, group in zip(channels, groups, strict=True):
             copy = self._copy(channel, sources[channel])
             if len(groups) == 1:
                 copy.into(rows, chunk, own, before)
                 continue
+
             places = np.searchsorted(own, group)
             some = rows[places]
             copy.into(some, chunk, group, before)
@@ -169,6 +172,7 @@ class Table:
         self, record: np.dtype[np.void], pieces: list[_Piece], times: list[tuple[str, str, str]]
     ) -> _CompiledCopy:
         lengths = [np.dtype(piece.kind).itemsize for piece in pieces]
+
         return _CompiledCopy(
             record.itemsize,
             tuple((p.offset, p.row_offset, n) for p, n in zip(pieces, lengths, strict=True)),

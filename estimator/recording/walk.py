@@ -66,7 +66,7 @@ class Walk:
         # the last one, whose message index may follow, and the one before
         self._blocks: list[Block] = []
         self._window, self._window_start = b"", 0  # the part of the file that was read last
-        self.found = Contents()
+        self.contents = Contents()
 
     def begin(self) -> None:
         """Look at both ends. Raises RecordingError if this is no MCAP file at all."""
@@ -82,8 +82,9 @@ class Walk:
                 yield self._blocks.pop(0)
             if too_many := self._too_many():
                 line = f"byte {position}: more than {too_many}; the rest is not read"
-                self.found.damage.append(line)
+                self.contents.damage.append(line)
                 break
+
         yield from self._blocks
 
     def _too_many(self) -> str:
@@ -112,7 +113,7 @@ class Walk:
             self._header(len(MAGIC) + RECORD_HEAD.size, length if opcode == Opcode.HEADER else 0)
         except (struct.error, Damaged):
             raise RecordingError("not an MCAP file") from None
-        self.found.damage.append("byte 0: the file's magic is damaged")
+        self.contents.damage.append("byte 0: the file's magic is damaged")
 
     def _read_closing(self) -> None:
         """Footer, magic and summary: trusted if the checksum holds, else the walk goes to the end
@@ -121,6 +122,7 @@ class Walk:
         tail = self._read(max(0, self.size - _CLOSING), _CLOSING)
         if len(tail) < _CLOSING or not tail.endswith(MAGIC):
             return
+
         opcode, length, start, _, crc = _FOOTER.unpack(tail[: _FOOTER.size])
         end = self.size - _CLOSING
         if (
@@ -129,19 +131,22 @@ class Walk:
             or not (start == 0 or _DATA_END_SIZE <= start <= end)
         ):
             return
+
         self._take_summary(start or end, end, crc, tail)
 
     def _take_summary(self, start: int, end: int, crc: int, tail: bytes) -> None:
         data_end = self._read(start - _DATA_END_SIZE, 9)
         if data_end != RECORD_HEAD.pack(Opcode.DATA_END, 4):
             return
+
         running = 0
         for position in range(start, end, _STEP):
             running = zlib.crc32(self._read(position, min(_STEP, end - position)), running)
         if crc and zlib.crc32(tail[: _FOOTER.size - 4], running) != crc:
             return
-        self.found.closed = True
-        self.found.summary = self._read(start, min(end - start, MAX_SUMMARY)) if crc else b""
+
+        self.contents.closed = True
+        self.contents.summary = self._read(start, min(end - start, MAX_SUMMARY)) if crc else b""
         self._limit = start - _DATA_END_SIZE
 
     def _step(self, position: int) -> int | None:
@@ -149,6 +154,7 @@ class Walk:
         end.
         """
         head = self._read(position, RECORD_HEAD.size)
+
         try:
             if len(head) < RECORD_HEAD.size:
                 raise Damaged("the data ends inside a record")
@@ -162,6 +168,7 @@ class Walk:
     def _record(self, opcode: int, position: int, length: int) -> int | None:
         start = position + RECORD_HEAD.size
         self._idle += opcode not in (*_LOOSE, Opcode.CHUNK)
+
         if opcode in _LOOSE:
             return self._loose_run(position)
         if opcode == Opcode.CHUNK:
@@ -173,11 +180,12 @@ class Walk:
         elif opcode == Opcode.HEADER:
             self._header(start, length)
         elif opcode == Opcode.ATTACHMENT:
-            self.found.attachments += 1
+            self.contents.attachments += 1
         elif opcode == Opcode.DATA_END and length == 4:
             return None
         else:
             raise Damaged(f"no record of MCAP's data section has opcode 0x{opcode:02x}")
+
         return start + length
 
     def _chunk(self, start: int, length: int) -> int:
@@ -198,6 +206,7 @@ class Walk:
             position = after
             if self._too_many():
                 break
+
         return position
 
     def _chunk_head(self, start: int, length: int) -> Block:
@@ -209,6 +218,7 @@ class Walk:
             fields.text(),
             fields.integer(8),
         )
+
         if fields.position + stored != length:
             raise Damaged("the lengths of a chunk contradict each other")
         return Block(start + fields.position, stored, size, crc, compression)
@@ -235,16 +245,16 @@ class Walk:
         name = fields.text()
         entries = fields.table()
         fields.finish()
-        self.found.metadata.setdefault(name, entries)
+        self.contents.metadata.setdefault(name, entries)
 
     def _header(self, start: int, length: int) -> None:
         if length > MAX_DEFINITION:
             raise Damaged(f"a header of {length} bytes")
         fields = Texts(self._read(start, length))
         fields.text()
-        self.found.library = fields.text()
+        self.contents.library = fields.text()
         fields.finish()
-        self.found.headed = True
+        self.contents.headed = True
 
     def _loose_run(self, position: int) -> int:
         """Unchunked records up to another kind of record, a bad one, or MAX_RUN."""
@@ -265,7 +275,7 @@ class Walk:
             return None
         lost = (following or self._limit) - position
         rest = f"; no chunk follows within {SEARCH} bytes, so" if lost > SEARCH else ","
-        self.found.damage.append(f"byte {position}: {why}{rest} {lost} bytes skipped")
+        self.contents.damage.append(f"byte {position}: {why}{rest} {lost} bytes skipped")
         return following
 
     def _cut_in_index(self, position: int) -> bool:

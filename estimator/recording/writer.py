@@ -88,6 +88,7 @@ class WriterThread:
             partial(RunWriter, topics=tuple(topics), compression=compression, mode=mode),
             self._sync.request,
         )
+
         self._interval = flush_interval
         self._retry = retry
         self._batch: list[Item] = []  # taken from the queue, not yet encoded
@@ -97,6 +98,7 @@ class WriterThread:
         self._rejected = 0  # messages encoded since the last flush that did not fit their topic
         self._unfit = 0  # in all
         self._suspect = False  # the current file failed for another reason than a full disk
+
         self._state: State = "writing"
         self._error = ""
         self._stopping = threading.Event()
@@ -120,6 +122,7 @@ class WriterThread:
 
     def status(self) -> WriterStatus:
         accepted, written, dropped, queued = self._queue.counters()
+
         return WriterStatus(
             self._state,
             self._error,
@@ -227,6 +230,7 @@ class WriterThread:
         following, batch = list[Item](), iter(self._batch)
         self._batch = following  # only now: making them may fail where memory is short
         turns = 0
+
         for item in batch:
             turns = (turns + 1) % TURN  # a small number, which takes no memory
             try:
@@ -277,6 +281,7 @@ class _Parts:
         self._run, self._sync = run, sync
         self._config = config_yaml
         self._make = partial(make, chunk_size=sys.maxsize)  # see _flush
+
         self.writer = self._make(path, config_yaml=config_yaml, run=run)
         self.writer.expect(LARGEST)
         self.files = [path]

@@ -22,6 +22,7 @@ def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
     half = min(
         round(0.5 * span * (time.size - 1) / max(time[-1] - time[0], 1e-9)), (value.size - 1) // 2
     )
+
     at = np.arange(value.size)
     reach = np.minimum(np.minimum(at, at[::-1]), half)
     total = np.concatenate(([0.0], np.cumsum(value - value[0])))
@@ -84,8 +85,10 @@ def _relax(target: Array, share: Array) -> Array:
     """
     kept, y = 1.0 - share, share * target
     reach = 1
+
     while reach < y.size and kept.any():
         y[reach:] += kept[reach:] * y[:-reach]
         kept[reach:] = kept[reach:] * kept[:-reach]
         reach *= 2
+
     return y

@@ -44,8 +44,10 @@ def integrals_of(theta_1: Value, f: Value, both: Both, maths: Maths) -> Integral
     straight, turning = both
     rotation = _rotation(theta_1, maths)
     sign = maths.sign(f)
+
     bare = rotation * turning.bare.hat
     one, hat = sign * rotation * turning.mobilised.one, sign * rotation * turning.mobilised.hat
+
     return Integrals(
         sign * straight.mobilised.one, sign * straight.mobilised.hat,
         bare.real, one.imag, hat.imag,
@@ -96,6 +98,7 @@ def ratio_derivative(
     rotation = _rotation(theta_1, maths)
     sign = maths.sign(f)
     bare, hat = rotation * turning.bare.shift, sign * rotation * turning.mobilised.shift
+
     dx = Integrals(
         0.0, sign * straight.mobilised.shift,
         bare.real, 0.0, hat.imag,

@@ -147,6 +147,7 @@ def predict_batch(
     """
     c, tan_phi, k, theta_1, slip, load = np.broadcast_arrays(c, tan_phi, k, theta_1, slip, load)
     prediction = predict(wheel, c, tan_phi, k, theta_1, slip, load, ARRAYS)
+
     shape = np.shape(c)
     gradients = (
         tuple(np.broadcast_to(entry, shape) for entry in gradient) for gradient in prediction[4:]
@@ -200,6 +201,7 @@ def shear_exponent(
     lag = slip / q
     half = maths.sin(0.5 * theta_1)
     scale = wheel.radius / k
+
     return Exponent(
         scale * (lag + (1.0 - lag) * half * half),
         scale * 0.5 * (1.0 - lag) * maths.sin(theta_1),
@@ -303,6 +305,7 @@ class _At(NamedTuple):
         ds = support / (x.b1 + self.tan_phi * x.b3)
         drag = area * (resistance + x.c3 * ds)
         friction = self.tan_phi * ds
+
         return (
             self.wheel.radius * area * (torque + x.a2 * friction),
             area * (pull + x.c2 * friction) - drag,

@@ -114,6 +114,7 @@ def fold(lam: Value, m0: Value, m1: Value, m2: Value, r0: Value, r1: Value, r2: 
     """
     alpha = 1.0 - lam
     fall = r0 - r1
+
     return Folded(
         alpha * m0 + lam * r0,
         alpha * alpha * m1 + lam * (alpha * r0 + lam * r1),
@@ -231,11 +232,13 @@ class Arrays:
         y, end = 1j * angle, np.exp(-1j * angle)
         step = -np.expm1(-eta) * end
         mu_near, delta_near = backward(y, eta, end, step)
+
         small = angle < SMALL
         half = np.where(small, 1.0, 0.5 * angle)
         m0 = np.exp(-1j * half) * (np.sin(half) / half)
         m1 = (m0 - end) / (2j * half)
         mu = _where(small, mu_near, (m0, m1, (2.0 * m1 - end) / (2j * half)))
+
         tiny = np.hypot(angle, eta) < SMALL
         far = forward(mu, np.where(tiny, 1.0, y), eta, step)
         return mu, _where(tiny, delta_near, far)

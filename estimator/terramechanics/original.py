@@ -212,6 +212,7 @@ def forces(
         side_slip=side_slip,
         order=order,
     )
+
     return integrate(wheel, stresses)
 
 

@@ -123,8 +123,10 @@ def load(
     lam = wheel.c1 + wheel.c2 * slip
     half = sin(0.5 * theta_1)
     f = wheel.radius / k * (slip + (1.0 - slip) * (half * half))  # Eq. (19)
+
     if _delicate(theta_1, f, slip, lam):
         return float(linear.forces(wheel, c, tan_phi, k, theta_1, slip, sigma_m, shift=shift).load)
+
     x, _, _ = _integrals(theta_1, f * theta_1, lam)
     _, _, bare, one, hat = x if shift is None else _added(x, shift.value, 1.0)
     supported = sigma_m * (bare.real + tan_phi * hat.imag) + c * one.imag

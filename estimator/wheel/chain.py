@@ -154,6 +154,7 @@ class Chain:
             tan_phi=tan_phi,
             shear_modulus=k,
         )
+
         reaction = react(situation, self.effects)
         return float(reaction.torque), float(reaction.drawbar_pull)
 

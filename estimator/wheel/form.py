@@ -75,6 +75,7 @@ class FormOnLine:
         slip, load = _short(now.slip), self._log_load(now)
         speed = log(max(abs(now.rim_speed), 1e-6) / self._speed)
         direction = tanh((now.rim_speed + now.travel_speed) / (2.0 * CREEP))
+
         conditions = (
             slip / SLIP,
             load / LOAD,
@@ -84,12 +85,14 @@ class FormOnLine:
             (lags[-2] - load) / LOAD_LAG,
             lags[-1] / START,
         )
+
         touched = weights_of(
             np.array([now.load]),
             np.array([abs(now.rim_speed)]),
             np.array([direction]),
             self._correction.usual,
         )
+
         return self._evaluated(conditions, _three(touched[0].tolist()))
 
     def at_slip(self, here: FormHere, slip: float) -> FormHere:
@@ -110,6 +113,7 @@ class FormOnLine:
         present = (*(_short(now.slip),) * len(TRAVELS), self._log_load(now))
         if not memory:
             return (*present, 1.0)
+
         *before, angle = memory
         travel = self._radius * abs(now.wheel_angle - angle)
         kept = [exp(-travel / length) for length in (*TRAVELS, LOAD_TRAVEL, START_TRAVEL)]
@@ -120,9 +124,9 @@ class FormOnLine:
         return log(max(now.load, 1e-3) / self._load)
 
     def _evaluated(self, conditions: Vector, weight: Three) -> FormHere:
-        found = self._correction.at(np.array([conditions]), np.array([weight]))
-        columns = tuple([_three(column) for column in found.columns[0].T.tolist()])
-        mean, rest = found.mean[0].tolist(), found.rest[0].tolist()
+        correction = self._correction.at(np.array([conditions]), np.array([weight]))
+        columns = tuple([_three(column) for column in correction.columns[0].T.tolist()])
+        mean, rest = correction.mean[0].tolist(), correction.rest[0].tolist()
         return FormHere(_three(mean), columns, _three(rest), conditions, weight)
 
 

@@ -35,10 +35,12 @@ def slip(rim_speed: float, travel_speed: float) -> Slip:
         return Slip(nan, nan, nan)
     if abs(rim_speed) < AT_REST and abs(travel_speed) < AT_REST:
         return Slip(0.0, 0.0, 0.0)
+
     if rim_speed >= travel_speed:
         if travel_speed < 0.0:
             return Slip(1.0, 0.0, 0.0)
         return Slip(1.0 - travel_speed / rim_speed, travel_speed / rim_speed**2, -1.0 / rim_speed)
+
     if rim_speed < 0.0:
         return Slip(-1.0, 0.0, 0.0)
     return Slip(rim_speed / travel_speed - 1.0, 1.0 / travel_speed, -rim_speed / travel_speed**2)

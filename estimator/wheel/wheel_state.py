@@ -74,6 +74,7 @@ def wheel_state(
     now = _with_effects(settings, snapshot, chain, context)
     if chain is None or context is None or chain.form is None or not snapshot.ready:
         return now
+
     return _with_form(now, snapshot.wheel_angle, chain.wheel, chain.form, context)
 
 

@@ -68,6 +68,7 @@ class Window:
     def insert(self, stamp: int, value: float, counters: Counters) -> None:
         """Sort one reading in; drop it as late or duplicate, and count that."""
         sample = Sample(stamp - self.latency, value)
+
         if sample.stamp <= self.closed:
             same = self._has(self.inside, sample.stamp)
             counters.duplicates += same
@@ -89,11 +90,13 @@ class Window:
         """Close the window at `end` [ns]: (end − length, end]."""
         self.closed = end
         pending, inside = self.pending, self.inside
+
         ready = 0
         while ready < len(pending) and pending[ready].stamp <= end:
             self._enter(pending[ready])
             ready += 1
         del pending[:ready]
+
         start = end - self.length
         while inside and inside[0].stamp <= start:
             self._leave(inside.popleft())

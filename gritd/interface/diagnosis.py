@@ -95,12 +95,14 @@ def diagnose(
         raise ValueError("runs: found a single run; expected a list of runs or files")
     if not runs:
         raise ValueError("runs: found none; expected recordings or their files")
+
     given = references.given([_file(each) for each in reference], bed)
     files, configuration = [_file(run) for run in runs], configured(config)
     if not other_rig:
         check_rig(read_all([*files, *given.files]), configuration.settings, configuration.source)
-    found, damage = of_files(files, configuration, seed, step, jobs, "", given, quick)
-    return Result(lab.with_runs(found, files, configuration), tuple(damage))
+
+    diagnosis, damage = of_files(files, configuration, seed, step, jobs, "", given, quick)
+    return Result(lab.with_runs(diagnosis, files, configuration), tuple(damage))
 
 
 def _file(run: Run | Place) -> Path:

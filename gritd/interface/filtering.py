@@ -102,6 +102,7 @@ class Filter:
         True
         """
         start = after.replayed.estimate if after is not None else None
+
         if isinstance(readings, Run):
             info = readings.info
             settings = without_absent(self._settings(info, load), readings.recording)
@@ -112,6 +113,7 @@ class Filter:
             if missing := [channel for channel in ENCODERS if channel not in raw]:
                 raise ValueError(f"{missing[0]}: found no readings; expected both encoders")
             made = followed(settings, streams_of(raw, settings.rates.tick), start=start)
+
         return Estimates(made.rows, made)
 
     def _settings(self, info: RunInfo, load: float | None) -> Settings:

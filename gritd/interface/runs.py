@@ -79,6 +79,7 @@ class Run(Mapping[str, Table]):
             pandas = importlib.import_module("pandas")
         except ImportError:
             raise ImportError("frame: needs pandas: pip install pandas") from None
+
         rows = self[topic]
         time = (rows["log_time"] - rows["log_time"][:1]) / NS
         index = pandas.Index(time, name="time")

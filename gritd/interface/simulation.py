@@ -50,13 +50,13 @@ class Simulation:
     def arrays(self) -> dict[str, Series]:
         """Channel → (times [s], raw values), for `Filter.run`."""
         start = min(reading.stamp for reading in self.made.readings)
-        found: dict[str, tuple[list[float], list[object]]] = {}
+        series: dict[str, tuple[list[float], list[object]]] = {}
         for reading in self.made.readings:
-            times, values = found.setdefault(reading.channel, ([], []))
+            times, values = series.setdefault(reading.channel, ([], []))
             times.append((reading.stamp - start) / NS)
             values.append(reading.value)
         return {
-            name: (np.array(times), np.array(values)) for name, (times, values) in found.items()
+            name: (np.array(times), np.array(values)) for name, (times, values) in series.items()
         }
 
     def __repr__(self) -> str:

@@ -31,12 +31,13 @@ def ratios(figures: Mapping[str, Any]) -> dict[str, float]:
 def loaded(path: Path) -> dict[str, float]:
     """The ratios of an earlier run. Raises CommandError where the file is none of `--json`."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        earlier = ratios(found)
+        figures = json.loads(path.read_text(encoding="utf-8"))
+        earlier = ratios(figures)
     except OSError as error:
         raise CommandError(f"{path}: cannot read: {error.strerror}", USAGE) from None
     except (ValueError, TypeError, AttributeError):
         earlier = {}
+
     if not earlier:
         raise CommandError(f"{path}: found no ratios; expected the output of --json", USAGE)
     return earlier
@@ -51,6 +52,8 @@ def comparison(before: Mapping[str, float], now: Mapping[str, float]) -> tuple[l
         lines.append(
             f"{name}: {before[name]:.3g} before, {now[name]:.3g} now{' WORSE' if worse else ''}"
         )
+
     for name in sorted(before.keys() - now.keys()):
         lines.append(f"{name}: {before[name]:.3g} before, not measured now")
+
     return lines, failed

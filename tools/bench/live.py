@@ -90,6 +90,7 @@ def _punctual(loop: Rows) -> Figures:
     for name in ("lateness", "duration"):
         for label, share in QUANTILES:
             figures[f"{name}_{label}"] = float(np.quantile(loop[name], share))
+
     at_work = loop[loop["stamp"] > loop["stamp"][0] + round(SETTLED * NS)]
     return figures | {
         "ticks": float(len(loop)),

@@ -130,11 +130,13 @@ def _subject(sizes: Sizes, folder: Path) -> Subject:
     schedule = Schedule(
         tuple(Segment(each, load, slip, RIM_SPEED) for load, slip in LEVELS), min(0.5, each / 4.0)
     )
+
     motion = motion_of(schedule, settings.wheel.radius, settings.rates.tick)
     run = simulate_run(settings, soil_of(settings), motion, (), SEED)
     subject = Subject(
         sizes, configuration, run, folder / "bench.mcap", folder / "bench-with-ticks.mcap"
     )
+
     _write(subject, subject.path)
     _write_ticks(subject)
     return subject
@@ -203,11 +205,13 @@ def long_replay(sizes: Sizes, folder: Path) -> Figures:
     place = folder / "long"
     place.mkdir()
     subject = _subject(replace(sizes, seconds=sizes.long), place)
+
     begun = process_time()
     recording = read(subject.logged, tables=STREAMS)
     read_by = process_time()
     rows = estimates(subject.configuration.settings, recording)
     spent, done = process_time() - begun, sizes.long
+
     return {
         "seconds": done,
         "windows": len(rows),
@@ -307,6 +311,7 @@ def forward_model(subject: Subject) -> Figures:
     """The simulator, and its vertical balance against brentq on adaptive quadrature."""
     simulated = subject.sizes.simulated
     balance = forward_bench.balance_speed(subject.sizes.samples, SEED)
+
     return {
         "speed": forward_bench.simulated_seconds_per_second(simulated),
         "speed_with_six_effects": forward_bench.simulated_seconds_per_second(
@@ -332,6 +337,7 @@ def _write_ticks(subject: Subject) -> None:
     settings = subject.configuration.settings
     pipeline = Pipeline(settings)
     state = pipeline.start()
+
     writer = RunWriter(subject.logged, TOPICS, subject.configuration.text, RunInfo())
     for each in recorded_ticks(read(subject.path), settings.rates.tick):
         state, record = pipeline.step(state, each.readings, each.stamp)
@@ -339,6 +345,7 @@ def _write_ticks(subject: Subject) -> None:
             writer.reading(reading)
         for message in messages_of(record):
             writer.message(*message)
+
     writer.close()
 
 

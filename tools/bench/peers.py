@@ -98,6 +98,7 @@ def write_by_mcap(path: Path, messages: Encoded) -> None:
         for topic in TOPICS:
             schema = writer.register_schema(topic.schema_name, "ros2msg", topic.schema.encode())
             channels[topic.name] = writer.register_channel(topic.name, "cdr", schema)
+
         for name, time, data in messages:
             writer.add_message(channels[name], time, data, time)
         writer.finish()  # type: ignore[no-untyped-call]

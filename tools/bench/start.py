@@ -34,12 +34,12 @@ def start(repeats: int) -> dict[str, float]:
     """
     taken: dict[str, list[list[float]]] = {engine: [] for engine in ENGINES}
     for _ in range(repeats):
-        for engine, found in taken.items():
-            found.append(_ready(engine))
+        for engine, starts in taken.items():
+            starts.append(_ready(engine))
 
     figures: dict[str, float] = {}
-    for engine, found in taken.items():
-        seconds, memory = (statistics.median(column) for column in zip(*found, strict=True))
+    for engine, starts in taken.items():
+        seconds, memory = (statistics.median(column) for column in zip(*starts, strict=True))
         figures |= {f"{engine}_seconds": seconds, f"{engine}_memory": memory}
     figures["over_filterpy"] = figures["filterpy_seconds"] / figures["plain_seconds"]
     return figures

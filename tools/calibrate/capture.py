@@ -32,12 +32,14 @@ def capture(configuration: Configuration, path: Path, seconds: float | None, wha
     until = f"for {seconds:g} s" if seconds else "then press Enter"
     print(f"{what}, {until}", file=sys.stderr, flush=True)
     ended = _until(seconds)
+
     try:
         writer = RunWriter(path, (), configuration.text, RunInfo(path.stem, notes=NOTES))
         count = _record(configuration, writer, ended)
         writer.close()
     except RecordingError as error:
         raise unwritten(error) from None
+
     if not count:
         path.unlink()
         raise CommandError(
@@ -50,6 +52,7 @@ def _record(configuration: Configuration, writer: RunWriter, ended: Callable[[],
     """Readings written; none where no sensor says anything."""
     line, last, count = LiveLine(sys.stderr), dict[str, Reading](), 0
     begin = shown = time.monotonic()
+
     with reading(configuration.settings) as drain:
         while not ended() and (count or time.monotonic() - begin < PATIENCE):
             time.sleep(INTERVAL)
@@ -60,6 +63,7 @@ def _record(configuration: Configuration, writer: RunWriter, ended: Callable[[],
             if line.terminal and time.monotonic() - shown > SHOWN:
                 shown = time.monotonic()
                 line.show(_seen(shown - begin, last))
+
     line.clear()
     return count
 

@@ -119,8 +119,8 @@ def _bend(known: Array, raw: Array, sigma: Array) -> float:
         return 0.0
     x = (known - known.mean()) / np.ptp(known)
     design = np.column_stack([np.ones_like(x), x, x**2]) / sigma[:, None]
-    found, left, *_ = np.linalg.lstsq(design, raw / sigma, rcond=None)
+    coefficients, left, *_ = np.linalg.lstsq(design, raw / sigma, rcond=None)
     covariance = np.linalg.inv(design.T @ design)
     freedom = known.size - 3
     least = float(np.sqrt(left[0] / freedom)) if freedom > 0 and left.size else 1.0
-    return abs(float(found[2])) / float(np.sqrt(covariance[2, 2])) / max(least, 1e-3)
+    return abs(float(coefficients[2])) / float(np.sqrt(covariance[2, 2])) / max(least, 1e-3)

@@ -45,11 +45,11 @@ class Live:
     def touches(self, signal: Signal, count: int) -> list[float]:
         """Readings at so many touches of the surface."""
         with reading(self.settings) as drain:
-            found = []
+            read = []
             for number in range(1, count + 1):
                 self.ask(f"touch {number} of {count}: lower the wheel until it just touches")
-                found.append(mean_of(self._read(drain, signal)).value)
-            return found
+                read.append(mean_of(self._read(drain, signal)).value)
+            return read
 
     def _one(self, drain: Drain, signal: Signal, known: Uncertain) -> Uncertain:
         self.ask(f"set {known.value / self.factor:g} {self.shown}")
@@ -60,20 +60,24 @@ class Live:
         drain()
         line, values = LiveLine(sys.stderr), list[float]()
         begin = last = time.monotonic()
+
         while (now := time.monotonic()) - begin < self.seconds or not values:
             time.sleep(0.02)
             values += [_value(r, signal) for r in drain() if r.channel == signal.channel]
+
             if not values and now - begin > PATIENCE:
                 raise CommandError(
                     f"{signal.channel}: found no reading in {PATIENCE:g} s; "
                     "expected the sensor connected",
                     FAILED,
                 )
+
             if values and line.terminal and now - last > SHOWN:
                 last = now
                 line.show(
                     f"{signal.channel} {values[-1]:.6g} {signal.unit}, {len(values)} readings"
                 )
+
         line.clear()
         return np.array(values)
 

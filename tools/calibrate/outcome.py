@@ -82,6 +82,7 @@ def residual_table(line: Line, raw: str, unit: str) -> list[str]:
     factor = float(units.unit(unit).factor)
     largest = max(abs(line.residuals).max(), line.expected.max()) or 1.0
     rows = [f"{'read [' + raw + ']':>14} {'known [' + unit + ']':>14} {'residual':>12}"]
+
     for point, residual in zip(line.points, line.residuals.tolist(), strict=True):
         at = round((BAR - 1) / 2 * (1.0 + residual / largest))
         bar = "".join("●" if i == at else "│" if i == BAR // 2 else " " for i in range(BAR))
@@ -89,6 +90,7 @@ def residual_table(line: Line, raw: str, unit: str) -> list[str]:
             f"{point.raw.value:>14.7g} {point.known.value / factor:>14.6g} "
             f"{residual / factor:>12.3g}  {bar.rstrip()}"
         )
+
     rms = f"{line.rms / factor:.3g}" if line.rms else "–"
     usual = float((line.expected**2).mean() ** 0.5) / factor
     rows.append(f"residual {rms} {unit} r.m.s., {usual:.2g} {unit} expected")

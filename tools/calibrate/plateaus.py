@@ -56,12 +56,12 @@ def plateaus(seconds: Array, values: Array) -> list[Plateau]:
 
     means = (np.bincount(block, values, minlength=edges.size) / np.maximum(count, 1))[filled]
     still = _still(means)
-    found = []
+    held = []
     for first, last in _stretches(still):
         begin, end = edges[filled[first]] + EDGE, edges[filled[last]] + BLOCK - EDGE
         if end - begin + 2.0 * EDGE >= LEAST and (one := between(seconds, values, begin, end)):
-            found.append(one)
-    return found
+            held.append(one)
+    return held
 
 
 def _still(means: Array) -> NDArray[np.bool_]:

@@ -19,11 +19,13 @@ def draw(path: Path, outcome: Outcome) -> None:
     require("matplotlib", "--png")
     if not outcome.fits:
         raise CommandError("--png: this calibration has no line to draw", USAGE)
+
     figure = import_module("matplotlib.figure").Figure(figsize=(7.0, 5.0), layout="constrained")
     name, line = outcome.fits[0]
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     _line(above, name, line)
     _residuals(below, line)
+
     try:
         figure.savefig(path, dpi=120)
     except OSError as error:

@@ -51,19 +51,22 @@ class Recorded:
 
     def points(self, signal: Signal, known: Sequence[Uncertain]) -> list[Point]:
         seconds, values = series(recording(self.path), signal)
-        found = self._chosen(seconds, values) if self.steps else plateaus(seconds, values)
-        if len(found) != len(known):
-            where = ", ".join(f"{p.begin:.1f}-{p.end:.1f} s" for p in found[:12]) or "none"
+        stretches = self._chosen(seconds, values) if self.steps else plateaus(seconds, values)
+
+        if len(stretches) != len(known):
+            where = ", ".join(f"{p.begin:.1f}-{p.end:.1f} s" for p in stretches[:12]) or "none"
             raise CommandError(
-                f"{self.path}: {signal.channel}: found {len(found)} stretches at rest ({where}); "
-                f"expected {len(known)}, one for each known value; --step BEGIN-END=VALUE "
-                "states them",
+                f"{self.path}: {signal.channel}: found {len(stretches)} stretches at rest "
+                f"({where}); expected {len(known)}, one for each known value; "
+                "--step BEGIN-END=VALUE states them",
                 DAMAGED,
             )
-        return [Point(p.mean, value) for p, value in zip(found, known, strict=True)]
+
+        return [Point(p.mean, value) for p, value in zip(stretches, known, strict=True)]
 
     def _chosen(self, seconds: Array, values: Array) -> list[Plateau]:
-        found = []
+        stretches = []
+
         for begin, end in self.steps:
             one = between(seconds, values, begin, end)
             if one is None:
@@ -72,8 +75,9 @@ class Recorded:
                     f"expected times from 0 to {seconds[-1]:.1f} s",
                     USAGE,
                 )
-            found.append(one)
-        return found
+
+            stretches.append(one)
+        return stretches
 
 
 def series(recorded: Recording, signal: Signal) -> tuple[Array, Array]:
@@ -131,10 +135,12 @@ def steps(
 ) -> tuple[list[tuple[float, float]], list[Uncertain]]:
     """Times and values of `2-5=10 mm`. Raises CommandError."""
     times, values = [], []
+
     for text in texts:
         match = STEP.fullmatch(text)
         if match is None:
             raise CommandError(f"--step {text}: expected BEGIN-END=VALUE, such as 2-5=10 mm", USAGE)
         times.append((float(match[1]), float(match[2])))
         values.append(Uncertain(known_value(match[3], unit), sigma))
+
     return times, values

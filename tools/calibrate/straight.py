@@ -37,11 +37,13 @@ class Straight:
         """What a line says. `factor` turns the known values into what the channel measures."""
         scale = Uncertain(line.scale.value * factor, line.scale.sigma * abs(factor))
         shown = f"{self.shown}/{self.signal.unit}" if self.scale else ""
-        found = [Found((*self.path, "scale"), scale, self.scale, shown)]
+
+        values = [Found((*self.path, "scale"), scale, self.scale, shown)]
         if self.offset:
-            found.append(Found((*self.path, "offset"), line.offset, self.unit, self.shown))
+            values.append(Found((*self.path, "offset"), line.offset, self.unit, self.shown))
+
         return Outcome(
-            tuple(found),
+            tuple(values),
             self.path,
             tuple(residual_table(line, self.signal.unit, self.shown)),
             line.warnings,

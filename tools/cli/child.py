@@ -27,6 +27,7 @@ def interruptible() -> Iterator[StopRequest]:
     stop = StopRequest()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, lambda *_: stop.set()) for number in numbers]
+
     try:
         yield stop
     finally:

@@ -27,6 +27,7 @@ def target(source: Path, output: Path | None, in_place: bool, option: str) -> Pa
     config.whole_text(source)
     if in_place and (output is None or output.resolve() == source.resolve()):
         return source
+
     if output is None:
         raise CommandError(f"expected {option} NEW.yaml, or --in-place to change {source}", USAGE)
     if in_place:
@@ -39,6 +40,7 @@ def target(source: Path, output: Path | None, in_place: bool, option: str) -> Pa
             "or --in-place too, which keeps a backup",
             USAGE,
         )
+
     return output
 
 
@@ -102,6 +104,7 @@ def _backed_up(path: Path) -> Path:
 def _replace(path: Path, text: str) -> None:
     """Write the file at once: whoever reads it finds the old one or the new one, never a part."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+
     try:
         with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
             stream.write(text)

@@ -61,6 +61,7 @@ def vacant(path: Path) -> Path:
     """
     if path.exists() or path.is_symlink():
         raise CommandError(f"{path}: is there already; expected the name of a new file", USAGE)
+
     if not path.parent.is_dir():
         raise CommandError(
             f"{path}: found no folder {path.parent}; expected one to write into", USAGE
@@ -69,6 +70,7 @@ def vacant(path: Path) -> Path:
         raise CommandError(
             f"{path}: may not write into {path.parent}; expected a folder of your own", USAGE
         )
+
     return path
 
 

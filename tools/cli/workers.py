@@ -44,6 +44,7 @@ def cluster_of(arguments: Namespace) -> str | None:
     address: str | None = arguments.scheduler
     if address is None or address.startswith(TLS) or arguments.trust_network:
         return address
+
     raise CommandError(
         f"--scheduler {address}: found no encryption; expected {TLS}…, or --trust-network, since"
         " whoever answers there can run anything here (docs/security.md)",

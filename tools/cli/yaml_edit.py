@@ -162,6 +162,7 @@ def _put(node: Any, key: str, value: Any) -> None:
     that one: they belong to the end of the mapping.
     """
     old = node.get(key)
+
     if isinstance(old, Mapping) and isinstance(value, Mapping) and set(old) == set(value):
         for name, item in value.items():
             node[key][name] = item

@@ -62,14 +62,17 @@ def _parser() -> Parser:
         prog="gritd bed", description="The bed in the bin: show it, or begin a new one."
     )
     _add_place(parser, default=None)
+
     commands = parser.add_subparsers(dest="what", metavar="show|new")
     shown = commands.add_parser("show", help="what is known of it")
     new = commands.add_parser(
         "new", help="a bed prepared anew: the next run begins with the stated prior"
     )
     new.add_argument("name", type=file_name, help="of the bed")
+
     for command in (shown, new):  # behind the word too; there they replace what stands before it
         _add_place(command, default=SUPPRESS)
+
     return parser
 
 

@@ -152,11 +152,13 @@ def _live(title: str, figures: Figures) -> list[str]:
     """When it is there, what it takes, how punctual it is."""
     if not figures:
         return []
+
     spans = [
         f"{name} {_µs(figures[f'{name}_median'])} at 50 %, {_µs(figures[f'{name}_at_99_percent'])} "
         f"at 99 %, worst {_µs(figures[f'{name}_worst'])}"
         for name in ("lateness", "duration")
     ]
+
     return [
         f"{title:11}first tick {figures['first_tick']:.2f} s, first estimate "
         f"{figures['first_estimate']:.2f} s after the command; "
@@ -173,6 +175,7 @@ def _diagnosis(figures: Figures) -> list[str]:
     """A line for each size, and the exponents."""
     if not figures:
         return []
+
     sizes = [name.removesuffix("_seconds") for name in figures if name.endswith("_seconds")]
     return [
         *(

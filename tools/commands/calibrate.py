@@ -77,6 +77,7 @@ def _capture(arguments: argparse.Namespace, configuration: Configuration) -> Non
             capture(configuration, path, arguments.seconds, what)
         arguments.files += arguments.record
         return
+
     if arguments.recorded is not None:
         raise CommandError("--record: expected it without --from", USAGE)
     arguments.recorded = capture(
@@ -86,7 +87,7 @@ def _capture(arguments: argparse.Namespace, configuration: Configuration) -> Non
 
 def _text(outcome: Outcome, document: EditedYaml, arguments: argparse.Namespace) -> str:
     """The configuration with what was found. Bekker's moduli take the place of Reece's."""
-    if any(found.path == ("soil", "k_c") for found in outcome.found):
+    if any(value.path == ("soil", "k_c") for value in outcome.found):
         for key in ("k1", "k2"):
             document.remove("soil", key)
     return written(outcome, document, arguments.date, arguments.serial)
@@ -134,10 +135,12 @@ def _torque(arguments: argparse.Namespace, settings: Settings) -> Outcome:
     if arguments.known is not None or arguments.step:
         known, source = _known(arguments, settings, "N*m")
         return torque.by_lever(source, known, settings)
+
     if arguments.recorded is None:
         raise CommandError(
             "torque: expected --known TORQUES, --from FILE.mcap or --record NEW.mcap", USAGE
         )
+
     recorded = recording(arguments.recorded)
     if arguments.sensor:
         _check_wrench("wrench", settings)
@@ -231,6 +234,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Fit scale and offset to known values; see docs/calibrating.md.",
     )
     commands = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+
     summaries = {
         "pot": pot.SUMMARY,
         "shunt": shunt.SUMMARY,
@@ -240,6 +244,7 @@ def _parser() -> argparse.ArgumentParser:
         "datum": datum.SUMMARY,
         "soil": soil.SUMMARY,
     }
+
     for name, summary in summaries.items():
         command = commands.add_parser(name, help=summary, description=summary)
         _add_common(command)
@@ -248,6 +253,7 @@ def _parser() -> argparse.ArgumentParser:
         else:
             _add_readings(command)
         _add_own(name, command)
+
     return parser
 
 
@@ -291,6 +297,7 @@ def _add_readings(command: argparse.ArgumentParser) -> None:
         metavar="NEW.mcap",
         help="record the live sensors until Enter, then as --from NEW.mcap",
     )
+
     command.add_argument(
         "--seconds", type=number(above=0.0), help="to read each value, default 3; or to record"
     )
@@ -308,6 +315,7 @@ def _add_presses(command: argparse.ArgumentParser) -> None:
         metavar="NEW.mcap",
         help="record this testbed pressing the plate, until Enter; once for each press",
     )
+
     command.add_argument("--seconds", type=number(above=0.0), help="to record each press")
     _add_touch(command)
 
@@ -327,11 +335,13 @@ def _add_own(name: str, command: argparse.ArgumentParser) -> None:
     if name == "encoders":
         command.add_argument("--wheel", metavar="TURNS", help="of the wheel: '0, 1, 2 turn'")
         command.add_argument("--carriage", metavar="LENGTHS", help="of rail: '0, 500, 1000 mm'")
+
     if name == "datum":
         command.add_argument(
             "--touches", type=whole(1, 100), default=3, help="live: so many; default 3"
         )
         _add_touch(command)
+
     if name == "torque":
         command.add_argument(
             "--sensor",

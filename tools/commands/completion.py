@@ -27,6 +27,7 @@ HOW = {
 def main(argv: Sequence[str]) -> int:
     """Print the script of a shell."""
     shells = "\n".join(f"  {line}" for line in HOW.values())
+
     parser = Parser(
         prog="gritd completion",
         description="Print what makes the shell complete gritd's commands and options.",
@@ -34,6 +35,7 @@ def main(argv: Sequence[str]) -> int:
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("shell", choices=HOW)
+
     print(SCRIPTS[parser.parse_args(argv).shell](words()))
     return DONE
 
@@ -66,10 +68,12 @@ def _bash(known: Mapping[str, Sequence[str]]) -> Iterator[str]:
     yield f'        known="{" ".join(known)} --help --version"'
     yield "    else"
     yield '        case "${COMP_WORDS[1]}" in'
+
     for command, follows in known.items():
         yield f'        {command}) known="{" ".join(follows)}" ;;'
     yield "        esac"
     yield "    fi"
+
     yield '    COMPREPLY=($(compgen -W "$known" -- "$word"))'
     yield "}"
     yield "complete -o default -F _gritd gritd"

@@ -116,6 +116,7 @@ def _follow(daemon: Child, testbed: Child, seconds: float) -> None:
     """Show the daemon's status until the time is over."""
     start = time.monotonic()
     status = LiveLine(sys.stdout)
+
     try:
         while (elapsed := time.monotonic() - start) < seconds:
             testbed.check()

@@ -119,6 +119,7 @@ def praise(estimates: Sequence[Estimate]) -> str:
 def table(estimates: Sequence[Estimate]) -> list[str]:
     """Estimate, truth, error and target, a line each."""
     lines = [f"{'':6}{'estimate ± σ':>22}{'truth':>12}{'error':>9}{'in σ':>8}   target"]
+
     for each in estimates:
         symbol, unit, factor, digits = SHOWN[each.name]
         value = f"{each.value * factor:.{digits}f} ± {each.sigma * factor:.{digits}f} {unit}"
@@ -127,6 +128,7 @@ def table(estimates: Sequence[Estimate]) -> list[str]:
             f"{symbol:6}{value:>22}{truth:>12}{each.relative:>+9.1%}{each.in_sigmas:>+8.2f}   "
             f"{_target(each)}"
         )
+
     return lines
 
 

@@ -58,28 +58,33 @@ def main(argv: Sequence[str]) -> int:
     _check_outputs(arguments)
     if arguments.redo is not None:
         return _again(arguments)
+
     if arguments.data is not None:
         raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
     if arguments.campaigns is not None:
         return _many(arguments)
     if arguments.scheduler is not None:
         raise CommandError("diagnose --scheduler: expected --campaigns DIR with it", USAGE)
+
     if not arguments.files or arguments.config is None:
         raise CommandError(
             "diagnose: expected recordings and --config F, or --redo FILE, or --campaigns DIR",
             USAGE,
         )
+
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     reference = references.given(arguments.reference, arguments.bed)
     if not arguments.other_rig:
         given = read_all([*arguments.files, *reference.files])
         provenance.check_rig(given, configuration.settings, configuration.source)
+
     named = [*map(str, arguments.files)]
     if arguments.reference:
         named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
     named += ["--config", str(arguments.config), "--seed", str(seed)]
     named += ["--quick"] if arguments.quick else []
     command = shlex.join(["gritd", "diagnose", *named])
+
     with Progress("diagnose") as progress:
         diagnosis, damage = of_files(
             arguments.files,
@@ -91,6 +96,7 @@ def main(argv: Sequence[str]) -> int:
             reference,
             arguments.quick,
         )
+
     _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
     print(text(diagnosis))
     return DAMAGED if damage else DONE
@@ -106,6 +112,7 @@ def _told(
     if arguments.report is None:
         return diagnosis
     lab = importlib.import_module("gritd.tools.report.lab")
+
     told: Diagnosis = lab.with_runs(diagnosis, files, configuration)
     return told
 
@@ -120,6 +127,7 @@ def _again(arguments: argparse.Namespace) -> int:
     then = record.read(arguments.redo, arguments.data)
     record.check(then)
     configuration = config.loads(then.configuration, f"{arguments.redo}: configuration")
+
     with Progress("diagnose") as progress:
         diagnosis, _ = of_files(
             list(then.files),
@@ -131,6 +139,7 @@ def _again(arguments: argparse.Namespace) -> int:
             then.reference,
             then.quick,
         )
+
     _write(arguments, _told(arguments, diagnosis, list(then.files), configuration), configuration)
     differs = list(record.differences(then, record.Record.of(diagnosis)))
     print(text(diagnosis))
@@ -147,11 +156,13 @@ def _many(arguments: argparse.Namespace) -> int:
             "diagnose --campaigns: expected no recordings or --config: they are in its folders",
             USAGE,
         )
+
     cluster, every = cluster_of(arguments), campaigns.find(arguments.campaigns)
     failed = False
     for campaign, sentence in campaigns.diagnosed(every, _one, arguments.jobs, cluster):
         print(f"{campaign.folder.name}: {sentence}", flush=True)
         failed |= not campaign.done
+
     print(
         f"{sum(campaign.done for campaign in every)} of {len(every)} campaigns diagnosed: "
         f"{campaigns.RESULT} in each"
@@ -192,6 +203,7 @@ def _check_output(path: Path, inputs: Sequence[Path]) -> None:
         raise CommandError(
             f"{path}: found no folder {path.parent}; expected one to write into", USAGE
         )
+
     if path.is_dir():
         raise CommandError(f"{path}: found a folder; expected the name of a file to write", USAGE)
     if any(path.resolve() == given.resolve() for given in inputs):
@@ -215,6 +227,7 @@ def _write(
         raise CommandError(
             f"{error.filename}: {(error.strerror or 'cannot write').lower()}", USAGE
         ) from None
+
     if arguments.apply is not None:
         _apply(arguments, diagnosis, configuration)
 
@@ -253,12 +266,14 @@ def of_files(
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError."""
     recordings, known = read_all(files), read_all(reference.files)
+
     hashes = distinct([*files, *reference.files])
     rig, rate = rig_of(recordings, configuration.settings, known, reference.bed)
     if not rig.channels:
         raise CommandError(
             f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
         )
+
     needed = {
         **({"command": command} if command else {}),
         "files": {str(path): hashes[str(path)] for path in files},
@@ -268,6 +283,7 @@ def of_files(
         "grid_hz": rate,
         "versions": versions(),
     }
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         each = step if callable(step) else lambda _: None
@@ -276,8 +292,10 @@ def of_files(
             diagnosis = with_innovations(
                 diagnosis, configuration, recordings, soil=diagnosis.soil is not None
             )
+
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)
+
     damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
     remarks = [
         *provenance.remarks(recordings, configuration.settings),
@@ -294,6 +312,7 @@ def _parser() -> argparse.ArgumentParser:
             "show the fit."
         ),
     )
+
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
     parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
     parser.add_argument(
@@ -317,6 +336,7 @@ def _parser() -> argparse.ArgumentParser:
         help="with --reference: FILEs were driven in the bed of the reference as it was left, or in"
         " one prepared anew; default: prepared",
     )
+
     parser.add_argument("--json", type=Path, metavar="OUT", help="the whole result")
     parser.add_argument("--report", type=Path, metavar="OUT.html", help="a page to read")
     parser.add_argument(
@@ -345,6 +365,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="each folder in DIR: its *.mcap and its *.yaml",
     )
+
     add_cluster(parser, "with --campaigns: ")
     parser.add_argument("--seed", type=whole(0), help="of the surrogates; default 0")
     parser.add_argument(
@@ -358,6 +379,7 @@ def _parser() -> argparse.ArgumentParser:
         default=os.cpu_count() or 1,
         help="processes, or campaigns at once; default: one a core",
     )
+
     return parser
 
 

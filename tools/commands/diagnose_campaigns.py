@@ -43,6 +43,7 @@ class Campaign:
     def arguments(self) -> list[str]:
         """What `gritd diagnose` is given for this campaign alone."""
         named = [*map(str, self.files), "--config", str(self.configuration)]
+
         return [
             *named,
             "--json",
@@ -63,6 +64,7 @@ def find(folder: Path) -> list[Campaign]:
             f"--campaigns {folder}: found no folder; expected one that holds a folder a campaign",
             USAGE,
         )
+
     campaigns = [
         _campaign(each.resolve()) for each in sorted(folder.iterdir()) if any(each.glob("*.mcap"))
     ]
@@ -70,6 +72,7 @@ def find(folder: Path) -> list[Campaign]:
         raise CommandError(
             f"--campaigns {folder}: found no folder with recordings (*.mcap) in it", USAGE
         )
+
     return campaigns
 
 

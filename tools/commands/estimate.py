@@ -98,6 +98,7 @@ def check_same_rig(given: Sequence[Settings], recordings: Sequence[Recording]) -
     the same in all of them could not be told from those that are not.
     """
     first = fingerprint(given[0])
+
     for settings, recording in zip(given, recordings, strict=True):
         if fingerprint(settings) != first:
             raise CommandError(
@@ -119,11 +120,13 @@ def _repeatability(configured: Repeatability, arguments: Namespace) -> Repeatabi
                 f"expected one of {', '.join(REPEATABILITY)}",
                 USAGE,
             )
+
         field, unit = REPEATABILITY[name]
         try:
             configured = replace(configured, **{field: _positive(value, unit)})
         except units.UnitError as error:
             raise CommandError(f"--repeatability {text}: {error}", USAGE) from None
+
     return configured
 
 
@@ -178,8 +181,10 @@ def _values(estimate: Estimate) -> tuple[float, float, float, float, float, floa
     x, P, _ = estimate
     sigma = [sqrt(max(P[i][i], 0.0)) for i in range(len(x))]
     k = exp(x[LN_K])
+
     product = sigma[C] * sigma[TAN_PHI]
     correlation = P[C][TAN_PHI] / product if product else 0.0
+
     return (
         x[C] * KPA,
         sigma[C] * KPA,
@@ -198,6 +203,7 @@ def _together(runs: Sequence[BedRun]) -> Iterator[str]:
         f"{count}: c {c:.0f} ± {c_sigma:.0f} Pa, tan φ {tan_phi:.4f} ± {tan_sigma:.4f} "
         f"(correlation {correlation:+.2f}), k {k * 1e3:.1f} ± {k_sigma * 1e3:.1f} mm"
     )
+
     if len(runs) > 1:
         alone = [_values(run.alone.estimate) for run in runs]
         yield (
@@ -272,6 +278,7 @@ def _parser() -> Parser:
         prog="gritd estimate",
         description="The soil of a bed from several runs, handed from run to run by the filter.",
     )
+
     parser.add_argument(
         "files", nargs="+", type=Path, metavar="FILE", help="recordings of one bed, in their order"
     )
@@ -291,4 +298,5 @@ def _parser() -> Parser:
         help="of preparations: c, tan_phi or k (relative); default: bed.repeatability",
     )
     parser.add_argument("--json", type=Path, metavar="OUT", help="the same in SI units")
+
     return parser

@@ -89,6 +89,7 @@ def _parser() -> Parser:
     parser = Parser(
         prog="gritd export", description="Write the topics of a recording as tables, one a topic."
     )
+
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="recording (.mcap); its parts are found"
     )
@@ -101,6 +102,7 @@ def _parser() -> Parser:
         const="parquet",
         help="Parquet; needs pyarrow",
     )
+
     parser.add_argument(
         "--topic", action="append", default=[], metavar="T", help="only this topic; may be repeated"
     )
@@ -111,4 +113,5 @@ def _parser() -> Parser:
         metavar="DIR",
         help="new folder for the tables; default: FILE without its ending",
     )
+
     return parser

@@ -24,6 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         written = importers()[args.rig].run(args, lambda line: print(line, flush=True))
     except RecordingError as error:
         raise unwritten(error) from None
+
     for path in written:
         print(path)
     return DONE

@@ -52,11 +52,13 @@ def told(recordings: Sequence[Recording]) -> Iterator[str]:
     """A run over all its parts, in lines."""
     first, of_run = recordings[0], summary(recordings)
     size = sum(recording.path.stat().st_size for recording in recordings)
+
     yield (
         f"{first.path}: {_clock(of_run.start)}, {of_run.duration:.1f} s, "
         f"{sum(topic.messages for topic in of_run.topics)} messages, {size / 1e6:.1f} MB"
         + (f", {len(recordings)} parts" if len(recordings) > 1 else "")
     )
+
     yield from _run(first)
     yield from _configuration(first)
     yield ""
@@ -81,6 +83,7 @@ def _run(recording: Recording) -> Iterator[str]:
         f"run            {run.name or 'without a name'}, {load}, pass {run.pass_number}, "
         f"start {run.start_position:g} m"
     )
+
     if run.operator:
         yield f"operator       {run.operator}"
     if run.notes:
@@ -109,6 +112,7 @@ def _testbed(settings: Settings) -> Iterator[str]:
         f"configuration  {settings.testbed}: wheel r {wheel.radius * 1e3:g} mm, "
         f"b {wheel.width * 1e3:g} mm; effects: {effects}"
     )
+
     yield (
         f"{INDENT}prior: c {soil.cohesion.value:g} ± {soil.cohesion.sigma:g} Pa, "
         f"tan φ {soil.tan_phi.value:.4g} ± {soil.tan_phi.sigma:.2g}, "
@@ -131,12 +135,14 @@ def _condition(recordings: Sequence[Recording]) -> Iterator[str]:
     """Whether the files are whole."""
     for recording in recordings:
         lost, lines = lost_of(recording), [*recording.damage]
+
         if not recording.closed:
             lines.append("not closed; `gritd recover` makes a closed one of it")
         if lost and not any("missing" in line for line in lines):
             lines.append(f"{lost} messages are missing, as `gritd recover` noted")
         if recording.run.lost_before:
             lines.append(f"{recording.run.lost_before} messages are missing before this part")
+
         for line in lines:
             yield f"{'damage':15}{recording.path.name}: {line}"
         if not lines:

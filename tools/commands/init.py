@@ -40,6 +40,7 @@ def write(folder: Path, files: dict[str, bytes]) -> None:
             raise CommandError(
                 f"{folder / name}: is there already; expected a folder without one", USAGE
             )
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():

@@ -157,13 +157,16 @@ def _trouble(report: Report) -> Iterator[str]:
         yield f"{TROUBLE} hanging: {report['hanging']}"
     if unfed := report.get("unfed"):
         yield f"{TROUBLE} the filter has not been fed for a second: {unfed}"
+
     for name, stats in report["devices"].items():
         if stats["state"] != "OPEN":
             yield f"{TROUBLE} {name} {stats['state']} {stats['last_error']}".rstrip()
+
     if report["log"]["state"] != "writing":
         yield f"{TROUBLE} log {report['log']['state']} {report['log']['error']}".rstrip()
     if disagreeing := report.get("disagreement"):
         yield f"{TROUBLE} model {disagreement(disagreeing)}"
+
     if "PRIOR" in report["flags"]:
         yield f"{TROUBLE} c, tan φ and k are the prior: the filter's estimate is not believed"
 
@@ -179,10 +182,12 @@ def _belief(tick: Report) -> Iterator[str]:
     """How far to believe the estimates."""
     separability = _number(tick["separability"], 1.0, 3)
     yield f"separability  {separability}  (1: the weakest direction is as unknown as at the start)"
+
     yield (
         f"consistency   {_number(tick['consistency'], 1.0, 2)}  {honesty(tick['consistency'])}"
         f"  {tick['updates']} updates, {tick['resets']} resets"
     )
+
     yield (
         f"readings      {tick['late']} late, {tick['duplicates']} duplicates, "
         f"{tick['invalid']} invalid, {tick['jumps']} jumps"
@@ -208,6 +213,7 @@ def _loop_and_log(report: Report) -> Iterator[str]:
         f"loop          {loop['ticks']} ticks, {loop.get('missed', 0)} missed, real time: "
         f"{report['real_time']}"
     )
+
     yield f"late, ms      {_lateness(loop)}"
     yield (
         f"queue         {queue['queued']} waiting, {queue['dropped']} dropped"

@@ -29,9 +29,11 @@ def never_ready(settings: Settings, recording: Recording) -> str:
     replayed = recorded_streams(recording, settings.rates.tick)
     ends = window_ends(replayed.ticks, round(NS / settings.rates.update))
     seen = list(snapshots(settings, replayed, ends))
+
     missing = [
         name for name, value in VALUES.items() if all(isnan(getattr(s, value).value) for s in seen)
     ]
+
     if not missing:
         return (
             "never ready: every required channel has readings, but never all of them in one window"

@@ -77,9 +77,11 @@ def summary(recording: Recording) -> str:
     saved = f"saved {recording.counts.total()} messages of {len(recording.counts)} topics"
     if recording.complete:
         return f"{saved}; the recording was complete"
+
     ending = "closed" if recording.closed else "not closed"
     if recording.misplaced:
         ending += f", {recording.misplaced} chunks in a wrong place or twice"
+
     if recording.saved:
         return f"{saved}; it was {ending}, nothing in it is lost"
     count = f"{recording.lost}" if recording.counted else f"{recording.lost} or more"

@@ -131,10 +131,12 @@ def _configuration(recording: Recording, arguments: Namespace) -> Configuration:
     """
     if arguments.config is not None:
         return with_engine(load(arguments.config), arguments.engine)
+
     if recording.config_yaml is None:
         raise CommandError(
             f"{recording.path}: holds no configuration; give one with --config", USAGE
         )
+
     recorded = loads(recording.config_yaml, f"{recording.path}: gritd.config")
     return with_engine(recorded, arguments.engine)
 

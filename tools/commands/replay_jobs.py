@@ -45,6 +45,7 @@ def each(paths: Sequence[Path], one: One, jobs: int) -> int:
 def _told(waiting: Sequence[Future[Said]]) -> int:
     """Print what is said in order, up to the first error."""
     code = DONE
+
     with Progress("replaying", len(waiting)) as progress:
         for future in waiting:
             said = future.result()
@@ -54,6 +55,7 @@ def _told(waiting: Sequence[Future[Said]]) -> int:
             if said.failed:
                 return said.code
             code = max(code, said.code)
+
     return code
 
 

@@ -70,6 +70,7 @@ def _parser() -> Parser:
             "Write a page on runs of one bed: forces beside the equations, estimates, sensors."
         ),
     )
+
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
     parser.add_argument(
         "--config", metavar="F", help="for all runs, instead of the recorded configurations"
@@ -87,4 +88,5 @@ def _parser() -> Parser:
         metavar="OUT.html",
         help="default: report.html",
     )
+
     return parser

@@ -34,9 +34,11 @@ def main(argv: Sequence[str]) -> int:
     arguments = parser.parse_args(argv)
     if arguments.fast and not arguments.from_tap:
         parser.error("argument --fast: only with --from-tap")
+
     runtime = os.environ.get("RUNTIME_DIRECTORY")
     if runtime:
         _wait(Path(runtime))
+
     try:
         with ExitStack() as held:
             code = _run(arguments, held)

@@ -115,11 +115,13 @@ def _weights(segments: Sequence[schedules.Segment], otherwise: float | None) -> 
 def _driven(recording: Recording, settings: Settings) -> Motion:
     """The motion of a recording. Raises CommandError."""
     stamps = recording.arrays("/raw/wheel_encoder")["stamp"]
+
     _check_length(
         recording.path,
         (int(stamps.max()) - int(stamps.min())) / NS if stamps.size else 0.0,
         settings.rates.tick,
     )
+
     try:
         return recorded_motion(recording, settings, settings.rates.tick)
     except RecordingError as error:

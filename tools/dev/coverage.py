@@ -114,11 +114,11 @@ def _write(path: Path) -> int:
 
 def packages(files: Mapping[str, Mapping[str, Any]]) -> dict[str, Covered]:
     """Branches of each package, from the `files` of a JSON report."""
-    found: defaultdict[str, list[Covered]] = defaultdict(list)
+    by_package: defaultdict[str, list[Covered]] = defaultdict(list)
     for name, file in files.items():
-        found[name.partition("/")[0]].append(_covered(file))
+        by_package[name.partition("/")[0]].append(_covered(file))
     return {
-        name: Covered(sum(c.taken for c in found[name]), sum(c.all for c in found[name]))
+        name: Covered(sum(c.taken for c in by_package[name]), sum(c.all for c in by_package[name]))
         for name in PACKAGES
     }
 
@@ -135,10 +135,12 @@ def _told(files: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     for name, covered in packages(files).items():
         yield f"| `{name}` | {covered.all} | {covered.taken} | {covered.percent:.1f} % |"
     yield ""
+
     yield f"Files of which less than {LEAST:g} % is taken, and from where to where no test goes:"
     yield ""
     yield "| file | branches | taken | not taken: line → line |"
     yield "|---|---|---|---|"
+
     for name, file in sorted(files.items()):
         covered = _covered(file)
         if covered.percent < LEAST:

@@ -106,6 +106,7 @@ def _seen(effect: type[Effect], motion: Motion, share: float) -> dict[str, Array
         return channels(
             simulate_arrays(WHEEL, SOIL, motion, (acting,), torque_constant=TORQUE_CONSTANT)
         )
+
     true = simulate_arrays(WHEEL, SOIL, motion)
     closed = linear.predict_batch(
         WHEEL, SOIL.cohesion, SOIL.tan_phi, SOIL.shear_modulus, true.theta_1, true.slip, true.load

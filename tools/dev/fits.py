@@ -90,7 +90,8 @@ def optimised(problem: Problem, model: Model, start: Array) -> float:
     ground = problem.ground(model.fitted.effects, model.fitted.free)
     low, high = ground.bounds.low, ground.bounds.high
     inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-    found = least_squares(
+
+    optimum = least_squares(
         lambda centre: _residuals(ground, problem, centre),
         inside,
         lambda centre: _slopes(ground, problem, centre),
@@ -100,7 +101,7 @@ def optimised(problem: Problem, model: Model, start: Array) -> float:
         gtol=1e-10,
         max_nfev=60,
     )
-    return float(found.cost)
+    return float(optimum.cost)
 
 
 def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
@@ -123,7 +124,8 @@ def _slopes(ground: Ground, problem: Problem, centre: Array) -> Array:
 
 def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -> list[Compared]:
     """Every fit of a search that decides, from where it ended and from so many points about it."""
-    found = []
+    rows = []
+
     for model in deciding(search):
         problem, here = problem_of(search, model), model.fitted.centre
         ours = problem.ground(model.fitted.effects, model.fitted.free).tried(here)[1]
@@ -131,8 +133,8 @@ def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -
         moved = [here + SPREAD * rng.standard_normal(here.size) for _ in range(starts)]
         elsewhere = min((optimised(problem, model, m) for m in moved), default=near)
         row = (case, model.names, ours, model.fitted.converged, ours - near, ours - elsewhere)
-        found.append(Compared(*row))
-    return found
+        rows.append(Compared(*row))
+    return rows
 
 
 # ---- campaigns ---------------------------------------------------------------------------------
@@ -161,6 +163,7 @@ def run_case(case: Case) -> list[Compared]:
     """One campaign; one that cannot be diagnosed compares nothing."""
     rng = np.random.default_rng(case.seed)
     name = str(case.folder.parent.name) if case.folder else f"drawn {case.seed}"
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         try:
@@ -193,6 +196,7 @@ def page(rows: Sequence[Compared], asked: int, cases: int) -> str:
     """The result in Markdown."""
     off = [r for r in rows if max(r.gain, r.gain_elsewhere) > LIMIT]
     near = [r for r in rows if r.gain > LIMIT]
+
     lines = [
         "# Fits that decide, against a full bounded optimisation",
         "",
@@ -204,6 +208,7 @@ def page(rows: Sequence[Compared], asked: int, cases: int) -> str:
         f"- off by more than {LIMIT} nats from there or from a point about it: {len(off)};",
         f"- did not converge, and are told so: {sum(not r.converged for r in rows)}.",
     ]
+
     if off:
         lines += ["", "| campaign | model | converged | gained there | elsewhere |"]
         lines += ["|---|---|---|--:|--:|"]
@@ -229,8 +234,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         multiprocessing.get_context("fork").Pool(arguments.jobs, maxtasksperchild=1) as pool,
         Progress("campaigns", len(cases)) as progress,
     ):
-        for found in pool.imap_unordered(run_case, cases):
-            rows, done = [*rows, *found], done + 1
+        for some in pool.imap_unordered(run_case, cases):
+            rows, done = [*rows, *some], done + 1
             progress.advance()
             if arguments.out:
                 arguments.out.write_text(page(rows, len(cases), done), encoding="utf-8")

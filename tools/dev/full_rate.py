@@ -39,8 +39,8 @@ def main() -> None:
             for row in of_case(batch, answers):
                 print(row, flush=True)
     if given.nulls:
-        found = sum(bool(lines_of_nothing(seed)) for seed in range(given.nulls))
-        print(f"{given.nulls} campaigns with nothing in them: {found} have a line")
+        with_line = sum(bool(lines_of_nothing(seed)) for seed in range(given.nulls))
+        print(f"{given.nulls} campaigns with nothing in them: {with_line} have a line")
 
 
 def of_case(batch: Path, answers: Path) -> Iterator[str]:

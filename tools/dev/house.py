@@ -68,6 +68,7 @@ def _arrows(
     """Which room imports which other one."""
     prefix = folder.replace("/", ".") + "."
     arrows = set()
+
     for path, module in parsed.items():
         here = _room(path, home)
         for name in _imported(module):
@@ -75,6 +76,7 @@ def _arrows(
             there = rest.split(".")[0]
             if inside and there in rooms and there != here:
                 arrows.add((here, there))
+
     return arrows
 
 

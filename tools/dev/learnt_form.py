@@ -74,6 +74,7 @@ def trial(seed: int, world: str) -> dict[str, Any]:
         "none", world=world, bed="same", without=(("runs", 3), ("loads", 3), ("wrench", True))
     )
     case = cases.drawn(seed, seed, assignment)
+
     with tempfile.TemporaryDirectory() as folder:
         given = Path(folder) / "given"
         handover.write(case, handover.driven(case), given)
@@ -87,6 +88,7 @@ def trial(seed: int, world: str) -> dict[str, Any]:
         then = _diagnosed(whole.settings, files, seed)
         ends = {name: _end(way, files) for name, way in zip(KINDS, ways, strict=True)}
         began = Tracker(whole.settings, "plain").prior
+
     return {
         "seed": seed,
         "world": world,
@@ -133,8 +135,8 @@ def _line(one: Mapping[str, Any]) -> str:
         for kind, end in every.items()
     ]
     said = " then ".join(
-        f"{found['verdict']} ({', '.join(found['names']) or 'no name'})"
-        for found in (one, one["then"])
+        f"{told['verdict']} ({', '.join(told['names']) or 'no name'})"
+        for told in (one, one["then"])
     )
     return f"{one['world']} {one['seed']} {said}; {'; '.join(parts)}"
 
@@ -145,6 +147,7 @@ def summary(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """
     quiet = [one["then"]["verdict"] for one in told].count("consistent")
     yield f"second campaign, nothing new, consistent: {quiet} of {len(told)}"
+
     for kind in KINDS:
         words = []
         for name in NAMES:

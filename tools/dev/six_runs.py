@@ -81,6 +81,7 @@ def drawn_soil(settings: Settings, rng: np.random.Generator) -> Soil:
     """A soil from the stated prior; k is lognormal, c at least 50 Pa."""
     prior, (a, b, c) = settings.soil, rng.normal(size=3)
     spread = prior.shear_modulus.sigma / prior.shear_modulus.value
+
     return soil_of(
         settings,
         {
@@ -135,6 +136,7 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
     met = sum(each.met for each in outcomes)
     yield f"{len(outcomes)} seeds, six runs each at {', '.join(f'{load:g}' for load in LOADS)} N"
     yield f"inside 2 σ and three times narrower than the best single run: {met} of {len(outcomes)}"
+
     for name in ("c", "tan_phi"):
         errors = np.array([getattr(each, name) for each in outcomes])
         narrower = np.array([getattr(each, f"{name}_narrower") for each in outcomes])

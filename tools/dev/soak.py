@@ -181,6 +181,7 @@ def laps(
     """(tick time, readings) of lap after lap: stamps go on, and so do the encoders' counts."""
     by, turned = 0, Counter(dict.fromkeys(ENCODERS, 0))
     ordered = [sorted(lap, key=lambda reading: reading.received) for lap in pool]
+
     for number in range(max(1, round(hours * 3600.0 / LAP))):
         lap, done = ordered[number % len(ordered)], dict(turned)
         moved = (later(reading, by, done) for reading in lap)
@@ -295,6 +296,7 @@ def watched(path: Path, seconds: float) -> Iterator[dict[str, Any]]:
     began, told = time.monotonic(), 0
     while (passed := time.monotonic() - began) < seconds:
         yield (report := look(path))
+
         if int(10.0 * passed / seconds) > told:
             told = int(10.0 * passed / seconds)
             print(
@@ -324,10 +326,12 @@ def unreported(last: dict[str, Any], played: dict[str, Any]) -> list[str]:
     devices = last["devices"].values()
     known = sum(device["lost"] + device["bad"] for device in devices) + sum(played["lost"].values())
     received = last["queue"]["received"]
+
     print(
         f"testbed: {played['readings']} readings sent, {received} received, "
         f"{known} messages known to be lost"
     )
+
     missing = played["readings"] - received
     return [f"{missing} readings missing, {known} messages counted as lost"] * (missing > known)
 

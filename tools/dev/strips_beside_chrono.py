@@ -47,6 +47,7 @@ def stretches(folder: Path) -> Iterator[Steady]:
     motions = [_motion(*each) for each in zip(recorded, WEIGHTS, strict=True)]
     strips = responses([(World(RIG, GROUND, bed=StripBed()), motion) for motion in motions])
     paper = responses([(World(RIG, GROUND), motion) for motion in motions])
+
     for run, known in enumerate(recorded):
         told = np.stack((known["z"], -known["T"], known["DP"]))
         for slip, inside in _steady(known):
@@ -90,6 +91,7 @@ def main(argv: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--data", type=Path, required=True, metavar="DIR")
     names = sorted(stretches(parser.parse_args(argv).data))
+
     print("| W [N] | slip | sinkage [mm]: SCM, strips, paper | T [N·m] | DP [N] |")
     print("|---|---|---|---|---|")
     for one in names:

@@ -81,6 +81,7 @@ def fit_base(rig: Rig, rng: np.random.Generator) -> BaseFit:
     """
     stack = Stack(rig)
     rough = fit_roughly(stack)
+
     if stack.referred:
         return fit_beside_reference(rough, rng)
     noise = estimate(stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng)

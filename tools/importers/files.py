@@ -101,6 +101,7 @@ def _bounded(path: Path, file: BinaryIO | gzip.GzipFile) -> Iterator[bytes]:
     """
     most, size = limits().text, 0
     file = _in_bytes(file)
+
     while piece := file.readline(MAX_LINE + 1):
         size += len(piece)
         if len(piece) > MAX_LINE:
@@ -231,6 +232,7 @@ def increasing(path: Path, what: str, values: Array, first: int = 2) -> Array:
     """
     if len(values) < 2:
         raise RigFileError(f"{path}: found {len(values)} rows; expected a log of two or more")
+
     if np.any(np.diff(values) <= 0):
         row = int(np.argmax(np.diff(values) <= 0)) + first + 1
         raise RigFileError(f"{path}: row {row}: {what} does not rise; expected times in order")

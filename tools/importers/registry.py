@@ -45,12 +45,12 @@ def importers() -> dict[str, Importer]:
 
 def _added(own: Mapping[str, Importer]) -> dict[str, Importer]:
     """Importers of other packages: modules like those of `rigs/`."""
-    found: dict[str, Importer] = plugins(IMPORTERS)
-    for name, importer in found.items():
+    importers: dict[str, Importer] = plugins(IMPORTERS)
+    for name, importer in importers.items():
         lacking = [part for part in PARTS if not hasattr(importer, part)]
         if lacking or name != importer.NAME:
             why = f"found no {lacking[0]}" if lacking else f"found the name {importer.NAME}"
             raise refused(IMPORTERS, name, f"{why}; expected {', '.join(PARTS)}, NAME {name!r}")
         if name in own:
             raise refused(IMPORTERS, name, "found one of gritd's own; expected another name")
-    return found
+    return importers

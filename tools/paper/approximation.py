@@ -131,6 +131,7 @@ def compare(label: str, soil: Soil, theta_1: Array, slip: Array) -> list[Row]:
     exact = original.forces(WHEEL, soil, theta_1, slip)
     state = (soil.cohesion, soil.tan_phi, soil.shear_modulus, theta_1, slip)
     peak = front_stress(WHEEL, soil, arc(theta_1, original.theta_m(WHEEL, slip, theta_1)))
+
     closed = {
         "of (21)": linear.forces_under_load(WHEEL, *state, exact.load, linear.ARRAYS),
         "of (3)": linear.forces(WHEEL, *state, peak, linear.ARRAYS),

@@ -25,6 +25,7 @@ def closed_forms(seed: int) -> Lines:
         "Closed forms (20)-(22), corrected, against Gauss-Legendre quadrature of (15)-(17), "
         f"{DRAWS} random draws"
     )
+
     differences = closed_form_differences(seed)
     for name, values in differences.items():
         yield f"  {name:<3} largest difference {values.max():.1e}   median {np.median(values):.1e}"

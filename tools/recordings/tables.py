@@ -54,6 +54,7 @@ def write_csv(
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([TIME, *topic.names])
+
         for rows in _blocks(topic, recordings, start):
             writer.writerows([["" if v != v else v for v in row] for row in rows])
             advance(len(rows))

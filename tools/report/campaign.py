@@ -106,14 +106,14 @@ def _differences(campaign: Campaign) -> str:
 
 
 def _off(campaign: Campaign, channel: str, which: str) -> float:
-    found = [
+    offs = [
         (run.beside.off(channel, which), len(run.beside.slip))
         for run in campaign.runs
         if run.beside and isfinite(run.beside.off(channel, which))
     ]
-    if not found:
+    if not offs:
         return float("nan")
-    return sum(off * count for off, count in found) / sum(count for _, count in found)
+    return sum(off * count for off, count in offs) / sum(count for _, count in offs)
 
 
 # --- forces ---
@@ -139,6 +139,7 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
         if run.beside is not None
         for part in run.beside.by_load()
     ]
+
     for channel, label in FORCES.items():
         drawn = [
             (
@@ -148,6 +149,7 @@ def _drawn_forces(of: Sequence[LabRun]) -> Iterator[Markup]:
             for name, part in parts
             if isfinite(part.off(channel, "original"))
         ]
+
         if drawn:
             name = label.split(" ")[0]
             caption = f"{name} against slip, original and closed form beside what was recorded."
@@ -178,10 +180,12 @@ def _over_slip(of: Beside, channel: str, label: str) -> Markup:
     slip, measured = of.slip * 100.0, of.measured[channel]
     computed = {"before": of.original[channel], "after": of.closed[channel]}
     at = plot.axes(plot.limits(slip), plot.limits(measured, *computed.values()), TOP, BOTTOM)
+
     curves = [
         plot.line(at, *_mean_over(slip, values), f"line {kind}")
         for kind, values in computed.items()
     ]
+
     frame = plot.frame(at, label, below="slip [%]")
     dots = plot.dots(at, slip, measured, "dots recorded")
     return plot.picture(HEIGHT, f"{label} against slip", frame, *curves, dots)
@@ -206,10 +210,12 @@ def _estimates(campaign: Campaign) -> Markup:
         if len(campaign.runs) > 1
         else "The band is ± 1σ."
     )
+
     panels = (
         figures.panel(label, _over_time(campaign, name, label, factor))
         for name, (label, factor) in SOIL.items()
     )
+
     caption = "Cohesion, tan φ and shear modulus over the time of all runs, one after the other."
     return section(
         "The estimates", tag("p", note), figures.figure(caption, figures.panels(panels), small=True)
@@ -221,6 +227,7 @@ def _over_time(campaign: Campaign, name: str, label: str, factor: float) -> Mark
     value = np.concatenate([run.rows[name] for run in campaign.runs]) * factor
     sigma = np.concatenate([run.rows[f"{name}_sigma"] for run in campaign.runs]) * factor
     time, begins = _time(campaign)
+
     at = plot.axes(plot.limits(time), plot.limits(value - sigma, value + sigma), TOP, BOTTOM)
     edges = [plot.line(at, time, value + sign * sigma, "line thin prior") for sign in (-1, 1)]
     return plot.picture(
@@ -252,6 +259,7 @@ def _ellipses(campaign: Campaign) -> Markup:
         for run in campaign.runs
         for row in run.rows[np.linspace(0, len(run.rows) - 1, ELLIPSES).astype(int)]
     ]
+
     last = chosen.pop()
     at = plot.axes(
         plot.limits(*(c for c, _ in chosen), last[0]),
@@ -259,6 +267,7 @@ def _ellipses(campaign: Campaign) -> Markup:
         TOP,
         BOTTOM,
     )
+
     drawn = [plot.line(at, *outline, "line thin prior") for outline in chosen]
     picture = plot.picture(
         HEIGHT,
@@ -267,6 +276,7 @@ def _ellipses(campaign: Campaign) -> Markup:
         *drawn,
         plot.line(at, *last, "line after"),
     )
+
     key = figures.legend({"prior": "on the way", "after": "at the end"})
     caption = "What is known of c and tan φ together: ellipses of 1σ over the time of all runs."
     panel = figures.panels([figures.panel("c and tan φ", picture)])
@@ -283,11 +293,13 @@ def _outline(row: np.void) -> tuple[Array, Array]:
             [row["cov_c_tan_phi"], row["tan_phi_sigma"] ** 2],
         ]
     )
+
     scale = np.sqrt(np.diag(covariance)) + 1e-300
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     angle = np.linspace(0.0, 2.0 * np.pi, 61)
     circle = np.vstack([np.cos(angle), np.sin(angle)])
     ring = (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle * scale[:, None]
+
     return row["cohesion"] + ring[0], row["tan_phi"] + ring[1]
 
 
@@ -304,6 +316,7 @@ def _sensors(campaign: Campaign) -> Markup:
         )
         for run in campaign.runs
     ]
+
     head = ("channel", "runs", "rate [Hz]", "gaps", "longest [ms]")
     note = f"A gap is more than {LATE:g} times the usual distance of two readings."
     return section(
@@ -317,6 +330,7 @@ def _sensors(campaign: Campaign) -> Markup:
 def _channels(runs: Sequence[LabRun]) -> list[list[str]]:
     """A row for each channel, and for each state of it that runs have in common."""
     alike: dict[tuple[str, ...], list[str]] = {}
+
     for run in runs:
         for topic in run.summary.topics:
             name = topic.topic.removeprefix("/raw/")
@@ -324,6 +338,7 @@ def _channels(runs: Sequence[LabRun]) -> list[list[str]]:
                 longest = f"{topic.longest * 1e3:.0f}"
                 state = (name, f"{topic.rate:.4g}", str(topic.gaps), longest)
                 alike.setdefault(state, []).append(run.name)
+
     return [
         [state[0], "all" if len(names) == len(runs) else ", ".join(names), *state[1:]]
         for state, names in sorted(alike.items())

@@ -75,6 +75,7 @@ class Comparison:
             "run",
             *(f"{name_of(channel)} [{unit or '–'}]" for channel, (unit, _) in units.items()),
         ]
+
         runs: list[tuple[str, str | None]] = [(run, run) for run in self.runs]
         rows = runs + ([(ALL, None)] if len(runs) > 1 else [])
         return head, [

@@ -89,11 +89,13 @@ def _simulation(diagnosis: Diagnosis) -> Markup | None:
         return None
     runs = {trace.run for trace in diagnosis.traces}
     channels = dict.fromkeys(trace.channel for trace in diagnosis.traces)
+
     drawn = (
         [_one_run(diagnosis)]
         if len(runs) == 1
         else [_channel(diagnosis, channel) for channel in channels]
     )
+
     note = f"{RUNS_HELD if len(runs) >= FEW else THIRDS_HELD} {DRAWN}"
     return section("Simulation against recording", paragraph(note), drawn)
 
@@ -211,11 +213,13 @@ def _fitted(diagnosis: Diagnosis) -> dict[str, str]:
 
 def _caveats(diagnosis: Diagnosis) -> Markup | None:
     caveats = list(diagnosis.caveats)
+
     if diagnosis.baseline:
         caveats.insert(
             0,
             f"The configuration already models {listed([name_of(b) for b in diagnosis.baseline])}",
         )
+
     return (
         section("Caveats", tag("ul", (tag("li", sentence(c)) for c in caveats)))
         if caveats
@@ -255,6 +259,7 @@ def _redo(diagnosis: Diagnosis, name: str) -> Markup:
     ]
     needed = {k: v for k, v in diagnosis.redo.items() if k not in (front.RUNS, front.RIG)}
     noise_table = table(("noise of", "found in the recordings"), noise) if noise else None
+
     return section(
         "To redo it",
         _again(diagnosis, name),

@@ -34,6 +34,7 @@ def _note(name: str) -> Markup:
     effect = EFFECTS[name]
     mark = effect.fingerprint
     where = f"{name_of(mark.channel)} over {name_of(mark.covariate)}: {mark.sentence}"
+
     return tag(
         "div",
         tag("p", tag("b", name_of(name)), f". {effect.sentence()}"),

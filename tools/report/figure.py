@@ -46,9 +46,11 @@ def draw(path: Path, ticks: Rows, title: str, truth: Mapping[str, float] | None 
     figure = Figure(figsize=SIZE, dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.04))
     left, right = figure.subfigures(1, 2, squeeze=False)[0]
     figure.suptitle(title, fontsize=13)
+
     seconds = (ticks["stamp"] - ticks["stamp"][0]) / NS
     _signals(left.subplots(len(SIGNALS), 1, sharex=True), ticks, seconds)
     _learned(right.subplots(len(SOUGHT) + 1, 1, sharex=True), ticks, seconds, truth or {})
+
     figure.savefig(path)
 
 

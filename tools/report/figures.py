@@ -99,10 +99,12 @@ def traces(of: Sequence[Trace], most: int) -> Markup:
     ranked = sorted(range(len(of)), key=lambda i: -np.nan_to_num(rms(of[i], "before")))
     first, rest = sorted(ranked[:most]), sorted(ranked[most:])
     seen = panels(trace_panel(of[i]) for i in first)
+
     if not rest:
         return seen
     summary = tag("summary", f"{counted(len(rest), 'more run')}, with smaller errors")
     more = tag("details", summary, panels(trace_panel(of[i]) for i in rest), class_=_printed(of))
+
     return tag("div", seen, more)
 
 
@@ -301,8 +303,10 @@ def soil(of: SoilFit) -> Markup:
     """
     known = ("known before", of.prior, "prior")
     rows = [known, ("fitted without", of.before, "before"), ("fitted with", of.after, "after")]
+
     if of.before == of.after:
         rows = [known, ("fitted", of.after, "after")]
+
     return panels(
         panel(
             name_of(key),

@@ -62,6 +62,7 @@ def tag(name: str, /, *children: Child, **attributes: str | float | None) -> Mar
         for key, value in attributes.items()
         if value is not None
     )
+
     return Markup(
         f"<{name}{written}/>" if name in VOID else f"<{name}{written}>{join(*children)}</{name}>"
     )

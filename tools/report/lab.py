@@ -226,8 +226,10 @@ def with_runs(
     recordings = read_all(paths)
     if is_drive(recordings):
         return diagnosis
+
     settings = configuration.settings
     given = ((settings_of_run(without_absent(settings, r), r.run), r) for r in recordings)
     runs = lab_runs(list(bed_runs(given, settings.bed.repeatability)))
+
     told = {front.RIG: settings.testbed, front.RUNS: records_of(runs)}
     return replace(diagnosis, redo={**diagnosis.redo, **told})

@@ -78,6 +78,7 @@ def limits(
     every = every[np.isfinite(every)]
     if keep is not None:
         every = np.append(every, keep)
+
     low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
     room = margin * (high - low) or 0.05 * abs(high) or 0.5
     return low - room, high + room

@@ -25,6 +25,7 @@ def content(redo: Mapping[str, Any]) -> list[Markup]:
         key: value for key, value in others.items() if not _tabular(value) and not _long(value)
     }
     rows = [(_name(key), tag("span", _words(value), class_="code")) for key, value in short.items()]
+
     parts = [tag("pre", _command(command), class_="command")] if command else []
     parts += [_files(key, value) for key, value in others.items() if _tabular(value)]
     return parts + ([table(("what", "as used"), rows)] if rows else [])

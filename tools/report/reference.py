@@ -49,6 +49,7 @@ def given(paths: Sequence[Path], bed: Bed) -> Given:
             verdicts.append(str(earlier["verdict"]))
         else:
             files.append(path)
+
     return Given(tuple(files), bed, verdicts[0] if len(verdicts) == 1 else None)
 
 
@@ -66,6 +67,7 @@ def with_reference(diagnosis: Diagnosis, rig: Rig, reference: Given) -> Diagnosi
     files = tuple(str(path) for path in reference.files)
     kept = Reference(files, reference.verdict, reference.bed, covered.share, covered.outside)
     caveats = diagnosis.caveats
+
     if covered.share < WELL:
         caveats = (
             *caveats,

@@ -24,11 +24,13 @@ def campaigns(diagnosis: Diagnosis) -> Markup | None:
     """The section; None where there was no reference."""
     if diagnosis.reference is None or not diagnosis.traces:
         return None
+
     head = ["channel", *SIDES, f"{SIDES[1]}, with {front.explanation(diagnosis)}", "noise"]
     rows = [
         _row(diagnosis, channel) for channel in dict.fromkeys(t.channel for t in diagnosis.traces)
     ]
     legend = figures.legend({"mean": "mean", "band": "± 2σ of the noise"})
+
     drawn = [
         figures.figure(_caption(scatter), _pictures(diagnosis, scatter), legend=legend, small=True)
         for scatter in _along_conditions(diagnosis.scatters)
@@ -67,8 +69,8 @@ def _referred(diagnosis: Diagnosis) -> int:
 
 def _along_conditions(scatters: Sequence[Scatter]) -> Iterator[Scatter]:
     """One of each channel and covariate; run by run both campaigns are in one picture already."""
-    found = {(s.channel, figures.drawn_against(s)): s for s in reversed(scatters)}
-    yield from (s for (_, against), s in reversed(found.items()) if against != "run")
+    latest = {(s.channel, figures.drawn_against(s)): s for s in reversed(scatters)}
+    yield from (s for (_, against), s in reversed(latest.items()) if against != "run")
 
 
 def _caption(scatter: Scatter) -> str:

@@ -50,10 +50,12 @@ class BedOfRun:
         """Keep what the run added; a line that says so, or why it adds nothing."""
         if reason := self._nothing_learnt(daemon):
             return f"bed {self.bed.name!r}: this run adds nothing: {reason}"
+
         assert daemon.loop.estimate is not None
         after = bed_file.after(
             self.bed, self.settings, daemon.loop.estimate, self.began, time.time()
         )
+
         try:
             bed_file.save(self.folder, after)
         except BedError as error:
@@ -63,9 +65,11 @@ class BedOfRun:
     def _nothing_learnt(self, daemon: Daemon) -> str:
         if daemon.loop.estimate is None or daemon.loop.latest is None:
             return "it had no tick"
+
         settings = settings_of_run(daemon.configuration.settings, daemon.run)
         if fingerprint(settings) != fingerprint(self.settings):
             return "prior, calibration, filter or effects changed on the way"
+
         tick = daemon.loop.latest[0]
         if not tick[UPDATES]:
             return "the filter was never updated"

@@ -85,6 +85,7 @@ def _connected(path: Path) -> socket.socket:
     """Raises CommandError."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     connection.settimeout(PATIENCE)
+
     try:
         connection.connect(os.fsencode(path))
     except OSError as error:
@@ -122,6 +123,7 @@ def _parsed(line: bytes) -> Report:
         report = json.loads(line)
     except (ValueError, RecursionError):
         report = None
+
     if isinstance(report, dict) and isinstance(reason := report.get(REFUSED), str):
         raise CommandError(f"the daemon is busy: {visible(reason):.100}")
     if (

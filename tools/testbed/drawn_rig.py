@@ -17,6 +17,7 @@ def drawn_rig(settings: Settings, rng: np.random.Generator) -> Settings:
     }
     wrench = settings.wrench and _drawn_wrench(settings.wrench, rng)
     constant = drawn(settings.drive.torque_constant, rng)
+
     return replace(
         settings,
         channels=channels,

@@ -181,11 +181,13 @@ def shares(change: Array, by: dict[str, Array]) -> dict[str, float]:
     total = float(np.mean(change**2))
     if total == 0.0:
         return dict.fromkeys(("constant", *by), 0.0)
+
     spread = max(float(np.var(change)), 1e-9 * total)
     explained = {
         name: _periodic(change, x) if name == "wheel_angle" else _binned(change, x)
         for name, x in by.items()
     }
+
     return {"constant": float(np.mean(change) ** 2) / total} | {
         n: s / spread for n, s in explained.items()
     }

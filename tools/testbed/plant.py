@@ -42,12 +42,14 @@ def schedule(seconds: float) -> Schedule:
     """
     each = (seconds - REST) / len(LOADS)
     count = max(1, min(len(SLIPS), max(round(each / USUAL), min(2, int(each / SHORTEST)))))
+
     driven = [
         Segment(each / count, load, slip, speed)
         for load, speed in zip(LOADS, SPEEDS, strict=True)
         for slip in SLIPS[:count]
     ]
     driven[-1] = replace(driven[-1], duration=each / count + RAMP)
+
     first, last = Segment(REST, LOADS[0], SLIPS[0], 0.0), Segment(TAIL, LOADS[-1], SLIPS[0], 0.0)
     return Schedule((first, *driven, last), RAMP)
 
@@ -81,6 +83,7 @@ def respond(plant: PlantKind, settings: Settings, soil: Soil, motion: Motion) ->
     """What the wheel does on this soil."""
     if plant == "linear":
         return linear_response(settings, soil, motion)
+
     constant, acting = settings.drive.torque_constant.value, configured(settings.effects)
     return simulate_arrays(
         settings.wheel,

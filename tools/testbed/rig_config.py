@@ -35,9 +35,11 @@ def write(
         document["devices"][name].update(_address(device))
         if device.dbc:
             document["devices"][name]["dbc"] = _copied(Path(device.dbc), folder)
+
     if plant == "linear":
         document["effects"].pop(LINEARISATION, None)
     document["logging"]["directory"] = str(folder)
+
     path = folder / NAME
     path.write_text(dumped(document), encoding="utf-8")
     return path

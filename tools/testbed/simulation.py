@@ -31,6 +31,7 @@ def simulate_run(
 ) -> Run:
     """Drive a motion (evenly sampled) and read every configured channel at each of its samples."""
     constant = settings.drive.torque_constant.value
+
     response = simulate_arrays(
         settings.wheel,
         soil,
@@ -51,6 +52,7 @@ def soil_of(settings: Settings, changed: Mapping[str, float] | None = None) -> S
     """The configured soil, with some of its values replaced; modulus_factor multiplies K."""
     prior, changed = settings.soil, dict(changed or {})
     factor = changed.pop("modulus_factor", 1.0)
+
     soil = Soil(
         cohesion=prior.cohesion.value,
         tan_phi=prior.tan_phi.value,

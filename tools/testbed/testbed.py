@@ -82,6 +82,7 @@ def experiment(
     settings = configuration.settings
     soil = plant.drawn_soil(settings, np.random.default_rng(seed))
     motion = motion_of(plant.schedule(seconds), settings.wheel.radius, settings.rates.tick)
+
     return Experiment(
         configuration, soil, plant.drive(kind, settings, soil, motion, seed + 1), kind, seed
     )
@@ -95,6 +96,7 @@ def in_transit(readings: Iterable[Reading], seed: int) -> list[Reading]:
     rng = np.random.default_rng(seed)
     delays = np.minimum(rng.exponential(JITTER, len(sent)), LONGEST_JITTER) * NS
     zero = START
+
     moved = [
         Reading(r.stamp - zero, r.channel, r.value, r.received - zero + int(delay))
         for r, delay in zip(sent, delays, strict=True)

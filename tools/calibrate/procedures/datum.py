@@ -32,30 +32,30 @@ def touches(recorded: Recording, settings: Settings, contact: float) -> list[flo
     known = settings.wrench.load
     load = force * known.scale.value + known.offset.value
 
-    found = [
+    volts = [
         height
         for instant in _rises(time + start, load, contact)
         if (height := _at(pot_time, pot, instant)) is not None
     ]
-    if not found:
+    if not volts:
         raise CommandError(
             f"{recorded.path}: found no touch; expected the load to rise above {contact:g} N after "
             f"{FREE:g} s without it",
             DAMAGED,
         )
-    return found
+    return volts
 
 
 def _rises(time: Array, load: Array, contact: float) -> list[float]:
     """Instants [s] at which a load rises above the contact force after hanging free."""
-    found, free_since = [], float(time[0])
+    rises, free_since = [], float(time[0])
     for before, now, weight in zip(time[:-1], time[1:], load[1:], strict=True):
         if weight < contact:
             continue
         if before - free_since >= FREE:
-            found.append(float(now))
+            rises.append(float(now))
         free_since = float(now)
-    return found
+    return rises
 
 
 def _at(time: Array, volts: Array, instant: float) -> float | None:
@@ -86,8 +86,8 @@ def outcome(volts: Sequence[float], settings: Settings) -> Outcome:
         f"touch {number}: {v:.5g} V, {1e3 * (h - offset.value):+.3f} mm from the mean"
         for number, (v, h) in enumerate(zip(volts, heights, strict=True), start=1)
     ]
-    found = Found(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
-    return Outcome((found,), ("channels", "sinkage_pot"), tuple(rows), tuple(warnings))
+    datum = Found(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
+    return Outcome((datum,), ("channels", "sinkage_pot"), tuple(rows), tuple(warnings))
 
 
 def _few(count: int) -> float:

@@ -38,9 +38,9 @@ def outcome(
     CommandError.
     """
     points = [_rounded(point) for point in source.points(procedure.signal, known)]
-    found = procedure.of_line(fitted(points), 1.0 / pulley_radius)
-    scale = replace(found.found[0], shown="mrad/count")
-    return replace(found, found=(scale, *found.found[1:]))
+    fit = procedure.of_line(fitted(points), 1.0 / pulley_radius)
+    scale = replace(fit.found[0], shown="mrad/count")
+    return replace(fit, found=(scale, *fit.found[1:]))
 
 
 def _rounded(point: Point) -> Point:

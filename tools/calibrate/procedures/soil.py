@@ -48,12 +48,14 @@ def read(path: Path) -> Press:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise CommandError(f"{path}: {(error.strerror or '').lower()}", USAGE) from None
+
     diameter = DIAMETER.search(text)
     if diameter is None:
         raise CommandError(
             f"{path}: found no plate diameter; expected a line such as 'Plate Diameter: 4.50cm'",
             DAMAGED,
         )
+
     pairs = [m.groups() for line in text[diameter.end() :].splitlines() if (m := PAIR.match(line))]
     rows = np.array(pairs, dtype=float).reshape(-1, 2)
     return of_rows(path.name, float(diameter[1]) * METRES[diameter[2].lower()] / 2, rows)
@@ -63,6 +65,7 @@ def of_rows(name: str, radius: float, rows: Array) -> Press:
     """Rows of force [N] and sinkage [mm], (n, 2), up to the largest force. Raises CommandError."""
     rows = rows[: int(np.argmax(rows[:, 0])) + 1] if rows.size else rows
     depth, pressure = rows[:, 1] * 1e-3, rows[:, 0] / (np.pi * radius**2)
+
     used = (depth > SHALLOW) & (pressure > 0.0)
     if used.sum() < FEWEST:
         raise CommandError(
@@ -70,6 +73,7 @@ def of_rows(name: str, radius: float, rows: Array) -> Press:
             f"expected {FEWEST} or more",
             DAMAGED,
         )
+
     return Press(name, radius, depth[used], pressure[used])
 
 
@@ -77,8 +81,8 @@ def exponent(press: Press) -> float:
     """n of one test."""
     weight, x = press.pressure, np.log(press.depth)
     design = np.column_stack([np.ones_like(x), x]) * weight[:, None]
-    found = np.linalg.lstsq(design, weight * np.log(press.pressure), rcond=None)[0]
-    return float(found[1])
+    coefficients = np.linalg.lstsq(design, weight * np.log(press.pressure), rcond=None)[0]
+    return float(coefficients[1])
 
 
 def modulus(press: Press, n: float) -> float:
@@ -106,13 +110,13 @@ def outcome(tests: Sequence[Press], settings: Settings) -> Outcome:
         warnings.append(f"{len(tests) - len(good)} tests are left out: no power law fits them")
 
     at_width = k_c / width + k_phi
-    found = (
+    values = (
         Found(("soil", "exponent"), n, ""),
         Found(("soil", "k_c"), _rounded(k_c, 4), "Pa/m^(n-1)", "kN/m^(n+1)"),
         Found(("soil", "k_phi"), _rounded(k_phi, 4), "Pa/m^n", "kN/m^(n+2)"),
         Found(("soil", "modulus_sigma"), _rounded(min(sigma / at_width, 1.0), 2), "", "%"),
     )
-    return Outcome(found, lines=tuple(_rows(good, moduli, each)), warnings=tuple(warnings))
+    return Outcome(values, lines=tuple(_rows(good, moduli, each)), warnings=tuple(warnings))
 
 
 def _moduli(radius: Array, moduli: Array, width: float) -> tuple[float, float, float, list[str]]:
@@ -127,17 +131,19 @@ def _moduli(radius: Array, moduli: Array, width: float) -> tuple[float, float, f
         return 0.0, mean, alone, [_untold(sizes, "are too alike to tell k_c")]
 
     design = np.column_stack([1.0 / radius, np.ones_like(radius)])
-    found, *_ = np.linalg.lstsq(design, moduli, rcond=None)
-    left = moduli - design @ found
+    coefficients, *_ = np.linalg.lstsq(design, moduli, rcond=None)
+    left = moduli - design @ coefficients
     variance = float((left**2).sum() / max(moduli.size - 2, 1))
     covariance = variance * np.linalg.inv(design.T @ design)
     at = np.array([1.0 / width, 1.0])
 
-    told = abs(found[0]) > SURE * float(np.sqrt(covariance[0, 0])) and at @ found > 0.0
+    told = (
+        abs(coefficients[0]) > SURE * float(np.sqrt(covariance[0, 0])) and at @ coefficients > 0.0
+    )
     if not told:
         return 0.0, mean, alone, [_untold(sizes, "do not tell k_c from 0")]
     spread = float(np.sqrt(variance + at @ covariance @ at))
-    return float(found[0]), float(found[1]), spread, []
+    return float(coefficients[0]), float(coefficients[1]), spread, []
 
 
 def _rounded(value: float, digits: int) -> Uncertain:

@@ -85,7 +85,7 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
     constant = settings.drive.torque_constant.value
     before = settings.channels["motor_shunt"].calibration.offset.value
     offset = Uncertain(before - values[2] / constant, spread[2] / constant)
-    found = (
+    constants = (
         Found(("effects", "coulomb_friction", "loss"), _positive(values, spread, 0), "N·m"),
         Found(
             ("effects", "viscous_friction", "damping"), _positive(values, spread, 1), "N·m·s/rad"
@@ -104,7 +104,7 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
         f"residual {rest:+.4f} N*m"
         for s, rest in zip(spins, left.tolist(), strict=True)
     ]
-    return Outcome(found, ("channels", "motor_shunt"), tuple(rows), tuple(warnings))
+    return Outcome(constants, ("channels", "motor_shunt"), tuple(rows), tuple(warnings))
 
 
 def _positive(values: Array, spread: Array, at: int) -> Uncertain:
@@ -116,11 +116,11 @@ def _weighted(design: Array, values: Array, sigma: Array) -> tuple[Array, Array,
     much the residuals exceed what is expected.
     """
     covariance = np.linalg.inv(design.T @ (design / sigma[:, None] ** 2))
-    found = covariance @ design.T @ (values / sigma**2)
-    freedom = values.size - found.size
-    left = (values - design @ found) / sigma
+    coefficients = covariance @ design.T @ (values / sigma**2)
+    freedom = values.size - coefficients.size
+    left = (values - design @ coefficients) / sigma
     excess = float(np.sqrt((left**2).sum() / freedom)) if freedom > 0 else 0.0
-    return found, np.sqrt(np.diag(covariance)) * max(excess, 1.0), excess
+    return coefficients, np.sqrt(np.diag(covariance)) * max(excess, 1.0), excess
 
 
 def _spins(recorded: Recording, settings: Settings) -> list[Spin]:

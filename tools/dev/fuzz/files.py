@@ -54,6 +54,7 @@ def checked(path: Path, written: Sequence[str], prefix: bool) -> str:
         messages = [repr(message) for message in recording.messages()]
     except RecordingError as error:
         return "" if "\n" not in str(error) else f"more than one line: {error}"
+
     if prefix and messages != written[: len(messages)]:
         return "not a prefix"
     if not set(messages) <= set(written):

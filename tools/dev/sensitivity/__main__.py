@@ -64,9 +64,11 @@ def _parser() -> argparse.ArgumentParser:
         "--only", nargs="+", default=[], metavar="NAME", help="campaigns, in this order"
     )
     parser.add_argument("--fields", nargs="+", default=[], metavar="ROOM.FIELD", help="numbers")
+
     parser.add_argument("--jobs", type=int, default=1, help="diagnoses at once")
     parser.add_argument("--minutes", type=float, default=math.inf, help="end after so long")
     parser.add_argument("--out", type=Path, default=Path("docs/sensitivity.md"), metavar="FILE")
+
     return parser
 
 

@@ -91,6 +91,7 @@ class Forks:
 
     def run(self, diagnose: Diagnose, folder: Path) -> None:
         """Ends when all children have ended; ends them if it is interrupted."""
+
         with watched(self._first_read) as self._change:
             try:
                 outcome = self._run(diagnose, folder)

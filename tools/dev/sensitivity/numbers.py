@@ -50,10 +50,10 @@ def every_field() -> list[Field]:
 
 def named(text: str) -> Field:
     """The number ROOM.NAME. Raises ValueError if there is none."""
-    found = next((f for f in every_field() if str(f) == text), None)
-    if found is None:
+    field = next((f for f in every_field() if str(f) == text), None)
+    if field is None:
         raise ValueError(f"found no number {text}")
-    return found
+    return field
 
 
 def changed(value: Any, unit: str, factor: float) -> Any:
@@ -64,6 +64,7 @@ def changed(value: Any, unit: str, factor: float) -> Any:
         return {name: changed(each, unit, factor) for name, each in value.items()}
     if isinstance(value, tuple):
         return tuple(changed(each, unit, factor) for each in value)
+
     if isinstance(value, int):
         return max(math.floor(value * factor + 0.5), 1)
     if unit == "quantile" and value > 0.5:

@@ -69,6 +69,7 @@ def diagnosed(folder: Path, handed: Handed = lambda *_: None) -> Outcome:
     """
     files = sorted(folder.glob("*.mcap"))
     (configuration,) = folder.glob("*.yaml")
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)

@@ -50,6 +50,7 @@ def page(
         "|---|---|--:|---|---|--:|--:|",
         *(_row(f, runs) for f in asked),
     ]
+
     parts = [
         HEAD,
         _extent(runs, only, campaigns, of),
@@ -66,12 +67,14 @@ def _extent(runs: Runs, only: Collection[str], campaigns: Collection[str], of: s
     cases = runs.cases(only)
     done, fresh = len(runs.moved), sum(runs.seconds[c.campaign] for c in runs.moved) / 3600.0
     kind = "complete" if done == len(cases) else f"partial: {done} of {len(cases)} diagnoses"
+
     lines = [
         f"This table is {kind}. {of}".strip(),
         f"The diagnoses took {sum(runs.spent.values()) / 60.0:.0f} min of a core; each from its"
         f" beginning would have taken {fresh:.1f} h.",
         "",
     ]
+
     for name in runs.campaigns():
         own = [c for c in cases if c.campaign == name]
         outcome = runs.before[name]
@@ -80,6 +83,7 @@ def _extent(runs: Runs, only: Collection[str], campaigns: Collection[str], of: s
             f" {sum(c in runs.moved for c in own)} of {len(own)} diagnoses,"
             f" {len(runs.read[name])} numbers read, {runs.seconds[name]:.0f} s for one"
         )
+
     if rest := [name for name in campaigns if name not in runs.read]:
         lines += ["", f"Not begun: {', '.join(f'`{name}`' for name in rest)}."]
     return "\n".join(lines)
@@ -88,15 +92,18 @@ def _extent(runs: Runs, only: Collection[str], campaigns: Collection[str], of: s
 def _summary(runs: Runs) -> str:
     """Which numbers decide most, and which nothing."""
     flips = Counter(c.field for c, m in runs.moved.items() if m.verdict or m.names)
+
     most = [f"`{f}` ({n})" for f, n in flips.most_common() if n >= DECISIVE]
     run = {c.field for c in runs.moved}
     touched = {c.field for c, m in runs.moved.items() if not m.nothing}
     still = [f for f in every_field() if f in run and f not in touched]
+
     changes = sum(m.verdict or m.names for m in runs.moved.values())
     lines = [
         f"Of {len(run)} numbers, {len(flips)} change a verdict or its names somewhere:"
         f" {changes} of {len(runs.moved)} diagnoses."
     ]
+
     if most:
         lines += ["", f"In {DECISIVE} diagnoses or more: {', '.join(most)}."]
     if still:
@@ -112,6 +119,7 @@ def _summary(runs: Runs) -> str:
 
 def _row(f: Field, runs: Runs) -> str:
     moved = {case: m for case, m in runs.moved.items() if case.field == f}
+
     cells = [
         f"`{f}`",
         _number(f.value),

@@ -119,6 +119,7 @@ class Kept:
                 runs.seconds[name] = line["seconds"]
             else:
                 _add_case(runs, line)
+
         return runs
 
     @property

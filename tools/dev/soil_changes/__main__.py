@@ -34,6 +34,7 @@ def set_number(text: str) -> None:
             # frozen for everybody else
             object.__setattr__(tuning, name, float(value))
             return
+
     raise CommandError(f"--number {name}: found no such number in estimator/filter/tuning.py")
 
 
@@ -46,12 +47,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     drives = (arguments.plant, arguments.rate)
 
     with Progress("changes", arguments.cases) as progress:
-        found = []
+        judgements = []
         for each in verdicts(settings, range(first, first + arguments.cases), *drives):
-            found.append(each)
+            judgements.append(each)
             progress.advance()
-    if found:
-        print(table(found), flush=True)
+    if judgements:
+        print(table(judgements), flush=True)
 
     runs = round(arguments.hours * 3600.0 / UNCHANGED)
     with Progress("runs without a change", runs) as progress:

@@ -54,6 +54,7 @@ def packaged_rig() -> Settings:
     settings = config.load(packaged()).settings
     assert settings.wrench is not None
     channels = {name: replace(each, stale_after=1.0) for name, each in settings.channels.items()}
+
     return replace(
         settings,
         channels=channels,
@@ -74,17 +75,20 @@ def case(
     if seed % 4 == 1:
         settings = replace(settings, wrench=None)
     seconds = UNCHANGED if kind == "none" else BEFORE + 10.0 + AFTER
+
     motion = motion_of(_schedule(rng, seconds, varied), settings.wheel.radius, rate)
     begins = BEFORE + rng.uniform(0.0, 10.0)
     share, settled = _change(kind, motion, begins, rng)
     soil = _changed(_soil(settings, rng), share, rng)
     if of == "linear":
         settings = replace(settings, effects=())
+
     rig, driven = drawn_rig(settings, rng), motion
     if settings.wrench is None:
         settings, driven = _weighed(settings, motion, rng)
     response = plant.respond(of, settings, soil, driven)
     seen = _windows(settings, sent(rig, driven, response, rng))
+
     at = (np.array([snapshot.evaluated for snapshot in seen]) - START) / NS
     time = np.asarray(motion.time)
     c, tan_phi = (np.interp(at, time, values) for values in (soil.cohesion, soil.tan_phi))
@@ -131,12 +135,14 @@ def _change(
     over [s].
     """
     time, place = np.asarray(motion.time), np.asarray(motion.carriage_position)
+
     if kind == "none":
         return np.zeros(time.size), float(time[-1])
     if kind == "step":
         return np.where(time >= begins, 1.0, 0.0), begins
     if kind == "ramp":
         return np.clip((time - begins) / RAMP, 0.0, 1.0), begins + RAMP
+
     start = float(np.interp(begins, time, place))
     end = start + rng.uniform(0.15, 0.5)
     share = 0.5 * (np.tanh((place - start) / EDGE) - np.tanh((place - end) / EDGE))
@@ -153,6 +159,7 @@ def _windows(settings: Settings, channels: Mapping[str, Sent]) -> list[Snapshot]
     """What the loop's windows see of what the channels send."""
     last = min(int(each.stamps[-1]) for each in channels.values())
     ticks = np.arange(START, last, round(NS / settings.rates.tick))
+
     streams = {
         name: Stream(
             each.stamps,
@@ -162,5 +169,6 @@ def _windows(settings: Settings, channels: Mapping[str, Sent]) -> list[Snapshot]
         )
         for name, each in channels.items()
     }
+
     ends = window_ends(ticks, round(NS / settings.rates.update))
     return list(snapshots(settings, RecordedStreams(ticks, streams), ends))

@@ -38,6 +38,7 @@ def followed(case: Case) -> Course:
     """The filter over a case."""
     tracker = Tracker(case.settings)
     state, rows = tracker.start(), []
+
     for number, snapshot in enumerate(case.snapshots):
         state, account = tracker.step(state, snapshot)
         if account.status not in UPDATED:
@@ -59,6 +60,7 @@ def followed(case: Case) -> Course:
                 bool(account.flags & TOLD),
             )
         )
+
     return Course(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -78,6 +80,7 @@ def judged(case: Case, course: Course) -> Verdict:
     step = 1.0 / case.settings.rates.update
     after = course.time >= case.begins
     silent = after & ~course.told
+
     return Verdict(
         driven=step * float(np.sum(after)),
         beyond=step * float(np.sum(silent & (course.away > 3.0))),

@@ -22,19 +22,21 @@ def verdicts(
         yield each, judged(each, followed(each))
 
 
-def table(found: Sequence[tuple[Case, Verdict]]) -> str:
+def table(judgements: Sequence[tuple[Case, Verdict]]) -> str:
     """One line a kind, and one for all."""
     head = (
         f"{'change':18}{'cases':>6}{'beyond 3σ':>11}{'beyond 5σ':>11}{'flagged':>9}"
         f"{'2σ in 15 s':>12}{'median':>9}{'90 %':>8}{'NEES':>7}"
     )
+
     groups: list[tuple[str, list[Verdict]]] = [
         (f"{kind}, {'loads vary' if varied else 'one load'}", kept)
         for kind in KINDS
         for varied in (True, False)
-        if (kept := [v for c, v in found if (c.kind, c.varied) == (kind, varied)])
+        if (kept := [v for c, v in judgements if (c.kind, c.varied) == (kind, varied)])
     ]
-    groups.append(("all", [verdict for _, verdict in found]))
+
+    groups.append(("all", [verdict for _, verdict in judgements]))
     return "\n".join([head, *(_line(name, group) for name, group in groups)])
 
 
@@ -65,6 +67,7 @@ def quiet(courses: Sequence[Course]) -> str:
     within = np.concatenate([course.away <= 2.0 for course in courses])
     nees = [course.nees[-1] for course in courses]
     sigma_c, sigma_t = np.median([course.sigma[-1] for course in courses], axis=0)
+
     return (
         f"unchanged, {hours:.1f} h: {sum(flags)} flags in {sum(f > 0 for f in flags)} of"
         f" {len(courses)} runs, {sum(flags) / hours:.2f} an hour; beyond 3σ without a flag"

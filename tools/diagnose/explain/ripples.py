@@ -95,6 +95,7 @@ def _place(rig: Rig, group: Sequence[Line]) -> str:
     first = group[0]
     sizes = ", ".join(f"{x.channel} ± {x.size:.2g} {rig.units[x.channel]}" for x in group)
     low, high = first.frequency
+
     if first.axis == "time":
         return f"{first.at:.2f} Hz ({sizes})"
     hertz = (

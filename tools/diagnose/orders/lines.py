@@ -158,6 +158,7 @@ class _Channel:
     ) -> tuple[Amplitude | None, ...]:
         """Of each run, its parts together, as they were before the line was taken."""
         place = min(round(at / self.places[axis].spacing), self.places[axis].count - 1)
+
         of_runs: list[list[Amplitude]] = [[] for _ in range(runs)]
         for part, s in zip(before, self.spectra[axis], strict=True):
             if np.isfinite(s.level[place]):

@@ -71,6 +71,7 @@ def read_log(path: Path) -> dict[str, Array]:
     """
     table = read_table(path, COLUMNS)
     log = {name: numbers(path, table, name) for name in COLUMNS}
+
     settled = log["t"] >= TOUCHED
     if settled.sum() < 100:
         raise RigFileError(

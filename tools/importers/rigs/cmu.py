@@ -244,6 +244,7 @@ def _row(name: str, condition: Condition) -> str:
 def _loads(path: Path) -> dict[str, float]:
     """Load [N] by log, from the table row it is known to belong to."""
     table = read_table(path, ("file", "W_N", "match_resid"))
+
     return {
         name: finite_number(path, f"{name}: W_N", load)
         for name, load, residual in zip(
@@ -314,6 +315,7 @@ def _import_pressed(tests: list[tuple[Path, str, str]], output: Path) -> Path:
             f"{test.name},{test.body},{depth:.3f},{force:.2f}"
             for depth, force in zip(test.depth[::5], test.force[::5], strict=True)
         ]
+
     path = output / "penetration.csv"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path

@@ -155,6 +155,7 @@ def _wheel(trials: Sequence[Trial]) -> dict[str, str]:
             f"{other.name}: found a wheel of radius {other.rig.radius:g} m beside one of "
             f"{radius:g} m; expected one wheel an import"
         )
+
     ground = radius == RADIUS
     return {
         "radius": f"{1e3 * radius:g}",
@@ -198,6 +199,7 @@ def _read_rig(path: Path, date: str) -> Rig:
     clock = increasing(path, "timestamp", _times(path, table["timestamp"]))
     counted = numbers(path, table, "sinkage")
     rim_speed = numbers(path, table, "maxon_velmes") * 1e-3
+
     return Rig(
         start=_midnight(path, date) + round(clock[0] * 1e9),
         t=clock - clock[0],
@@ -216,6 +218,7 @@ def _radius(path: Path, rim_speed: Array) -> float:
     values = np.unique(rim_speed.round(7))
     if values.size < 3:
         return RADIUS  # too few to tell a step
+
     told = RADIUS * float(np.min(np.diff(values))) / QUANTUM
     known = [radius for radius in RADII if abs(told / radius - 1.0) < ALIKE]
     if not known:
@@ -223,6 +226,7 @@ def _radius(path: Path, rim_speed: Array) -> float:
             f"{path}: maxon_velmes: found steps of {1e3 * np.min(np.diff(values)):.4g} mm/s, as of "
             f"a wheel of radius {told:.3g} m; expected one of {RADII[0]:g} or {RADII[1]:g} m"
         )
+
     return known[0]
 
 

@@ -143,11 +143,13 @@ def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[s
         for run in runs
         if run.repeated
     ]
+
     unstated = [run.info.name for run in runs if run.info.nominal_load is None]
     if unstated and mapped.named("load") is None:
         notes.append(
             f"note: {unstated[0]} states no load; taken is {usual:g} N, load.nominal of csv.yaml"
         )
+
     if not any(mapped.named(axis) for axis in AXES):
         notes.append("note: no force is measured; only the torque can tell of the soil")
     return notes

@@ -148,12 +148,14 @@ def _told(name: str, table: Table, sigma: Mapping[str, float]) -> str:
     """A group, and the errors its values are taken to have, in two lines."""
     loads = np.array([float(text) for text in table["vertical_load_n"]])
     without = "" if TORQUE in table else ", no torque"
+
     units = {channel: unit for channel, (unit, _, _) in MEASURED_ERRORS.items()}
     taken = ", ".join(
         f"{channel} {value:.2g} {units.get(channel, 'N')}"
         for channel, value in sigma.items()
         if channel != "torque" or TORQUE in table
     )
+
     return (
         f"{name}: {loads.size} steady states, mean load {loads.mean():.1f} N, radius "
         f"{table['wheel_radius_m'][0]} m, {table['soil_simulant'][0]}{without}\n"
@@ -213,12 +215,12 @@ def errors(table: Table, args: argparse.Namespace) -> dict[str, float]:
     condition differ, and at least what reading a printed figure leaves open.
     """
     stated = vars(args)
-    found = {
+    sigmas = {
         channel: stated[f"{channel.replace('-', '_')}_sigma"]
         or max(repeat_scatter(table, column) if column in table else 0.0, least)
         for channel, (_, column, least) in MEASURED_ERRORS.items()
     }
-    return found | {"load": args.load_sigma or load_scatter(table["vertical_load_n"])}
+    return sigmas | {"load": args.load_sigma or load_scatter(table["vertical_load_n"])}
 
 
 def repeat_scatter(table: Table, column: str) -> float:
@@ -227,6 +229,7 @@ def repeat_scatter(table: Table, column: str) -> float:
         np.array([float(text) for text in table[name]])
         for name in ("vertical_load_n", "slip", column)
     )
+
     left, squares, freedom = np.ones(values.size, dtype=bool), 0.0, 0
     for load, slip in zip(loads, slips, strict=True):
         one = left & (np.abs(loads - load) <= ALIKE * load) & (np.abs(slips - slip) <= SAME_SLIP)
@@ -234,6 +237,7 @@ def repeat_scatter(table: Table, column: str) -> float:
             squares += float(((values[one] - values[one].mean()) ** 2).sum())
             freedom += int(one.sum()) - 1
         left &= ~one
+
     return math.sqrt(squares / freedom) if freedom else 0.0
 
 

@@ -57,27 +57,28 @@ def _content(path: Path) -> dict[str, Any]:
     scipy_io = import_module("scipy.io")
     try:
         _check_size(path, sum(math.prod(shape) for _, shape, _ in scipy_io.whosmat(path)))
-        found: dict[str, Any] = scipy_io.loadmat(path, squeeze_me=True, simplify_cells=True)
+        content: dict[str, Any] = scipy_io.loadmat(path, squeeze_me=True, simplify_cells=True)
     except RigFileError:
         raise
     except Exception as error:  # scipy raises a different one for each kind of damage
         raise _unreadable(path, error, "a MATLAB file, version 7 or older") from None
-    return found
+    return content
 
 
 def _vectors(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
     """Vectors of a structure, and the columns of its matrices as `name[1]`, `name[2]` …"""
-    found: dict[str, Any] = {}
+    vectors: dict[str, Any] = {}
     for name, value in content.items():
         if name.startswith("__"):
             continue
         if isinstance(value, Mapping):
-            found |= _vectors(f"{prefix}{name}.", value)
+            vectors |= _vectors(f"{prefix}{name}.", value)
         elif isinstance(value, np.ndarray) and value.ndim == 1:
-            found[f"{prefix}{name}"] = value
+            vectors[f"{prefix}{name}"] = value
         elif isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[0] > value.shape[1]:
-            found |= {f"{prefix}{name}[{at + 1}]": column for at, column in enumerate(value.T)}
-    return found
+            vectors |= {f"{prefix}{name}[{at + 1}]": column for at, column in enumerate(value.T)}
+
+    return vectors
 
 
 def _unreadable(path: Path, error: Exception, expected: str) -> RigFileError:

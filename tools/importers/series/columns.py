@@ -60,6 +60,7 @@ class SeriesTable:
         """Marks rows (n,) that are the row before once more, in every column."""
         again = np.ones(self.rows, dtype=bool)
         again[:1] = False
+
         for column in self.columns.values():
             if column.words is not None:
                 words = np.array(column.words, dtype=object)
@@ -67,6 +68,7 @@ class SeriesTable:
             else:
                 now, before = column.numbers[1:], column.numbers[:-1]
                 again[1:] &= (now == before) | (np.isnan(now) & np.isnan(before))
+
         return again
 
     def names(self) -> str:

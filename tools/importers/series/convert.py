@@ -94,6 +94,7 @@ def _used(mapped: SeriesMap) -> dict[str, str]:
                 f"{' or '.join(choices)}",
                 USAGE,
             )
+
     return used
 
 
@@ -168,12 +169,14 @@ def _axes(
 
     weights = Uncertain(0.0, settings.load.nominal.sigma)
     absent = {axis: weights if axis == "load" else Uncertain(0.0, UNKNOWN) for axis in AXES}
-    found = {axis: Calibrated(Uncertain(1.0), offset, 0.0) for axis, offset in absent.items()}
+    calibrations = {
+        axis: Calibrated(Uncertain(1.0), offset, 0.0) for axis, offset in absent.items()
+    }
     for axis, name in named.items():
         column = mapped.columns[name]
         noise = _noise(runs, mapped, name) * column.per_unit
-        found[axis] = Calibrated(column.factor, column.offset, noise)
-    return found
+        calibrations[axis] = Calibrated(column.factor, column.offset, noise)
+    return calibrations
 
 
 # --- streams ---
@@ -189,21 +192,21 @@ def _streams(
 ) -> list[Stream]:
     """The readings of one run; where a cell is empty there is none."""
     at = stamps(start, run.seconds - run.seconds[0])
-    found = []
+    streams = []
     for channel, name in used.items():
         column, numbers = mapped.columns[name], run.table.column(name).numbers
         known = np.isfinite(numbers)
         if channel in quanta:
             seconds = run.seconds[known]
             whole = encoders.counted(seconds, numbers[known], column, quanta[channel])
-            found.append(Stream(channel, at[known], whole))
+            streams.append(Stream(channel, at[known], whole))
         else:
-            found.append(Stream(channel, at[known], numbers[known]))
+            streams.append(Stream(channel, at[known], numbers[known]))
 
     if any(mapped.named(axis) for axis in AXES):
         weights = run.info.nominal_load or settings.load.nominal.value
-        found.append(_wrench(run, at, mapped, weights))
-    return [stream for stream in found if stream.stamps.size]
+        streams.append(_wrench(run, at, mapped, weights))
+    return [stream for stream in streams if stream.stamps.size]
 
 
 def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float) -> Stream:

@@ -55,6 +55,7 @@ def _layout(path: Path, text: Sequence[str]) -> tuple[str, int]:
             fields, below = text[at].count(separator), _fields_below(text[at + 1], separator)
             if fields in below and fields and _is_header(text[at]):
                 return separator, at
+
     if text and len(text) <= PREAMBLE and _is_header(text[-1]) and re.search(r"[,;\t]", text[-1]):
         raise RigFileError(f"{path}: found no rows; expected data under {text[-1].strip()[:80]}")
     raise RigFileError(

@@ -31,14 +31,16 @@ def quantum(runs: Sequence[SeriesRun], name: str, column: Mapped) -> float:
     """
     if column.channel in COUNTED:
         return 1.0
-    found = []
+
+    steps = []
     for run in runs:
         values = run.table.column(name)
         step = values.resolution or spacing(values.numbers)
         time = run.interval if column.channel in SPEEDS else 1.0
         span = float(np.nanmax(np.abs(values.numbers), initial=0.0)) * time
-        found.append(max(step * time, span * FINEST, LEAST_COUNT / column.per_unit))
-    return min(found)
+        steps.append(max(step * time, span * FINEST, LEAST_COUNT / column.per_unit))
+
+    return min(steps)
 
 
 def calibrated(

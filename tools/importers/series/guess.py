@@ -134,6 +134,7 @@ def _moving(words: set[str], unit: str) -> str | None:
     count = bool(words & {"count", "counts", "ticks", "encoder", "enc"}) and not unit
     if words & {"torque", "current", "force", "load", "temperature", "slip", "sinkage"}:
         return None
+
     if words & WHEEL:
         rim = "rim_speed" if unit and _fits("rim_speed", unit) else "wheel_speed"
         return "wheel_count" if count else rim if speed else "wheel_angle"
@@ -165,12 +166,14 @@ def _unit(table: SeriesTable, name: str) -> str:
     bracket = re.search(r"[\[(]([^\])]+)[\])]\s*$", name)
     ending = re.search(r"[_ .]([A-Za-zµ°%]+)$", name)
     rate = RATE.search(name)
+
     options = (
         told,
         bracket[1] if bracket else "",
         f"{rate[1]}/s" if rate else "",
         ending[1] if ending else "",
     )
+
     for text in options:
         for way in (text, _usual_case(text)):
             try:

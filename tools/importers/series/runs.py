@@ -46,8 +46,8 @@ class SeriesRun:
 
 def runs_of(tables: Sequence[SeriesTable], mapped: SeriesMap) -> list[SeriesRun]:
     """All runs of the files. Raises RigFileError."""
-    found = [run for table in tables for run in _of_table(table, mapped)]
-    names = [run.info.name for run in found]
+    runs = [run for table in tables for run in _of_table(table, mapped)]
+    names = [run.info.name for run in runs]
 
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -57,7 +57,7 @@ def runs_of(tables: Sequence[SeriesTable], mapped: SeriesMap) -> list[SeriesRun]
         raise RigFileError(
             f"runs: found {unknown!r}, which is no run; expected one of {', '.join(names)}", USAGE
         )
-    return found
+    return runs
 
 
 def _of_table(table: SeriesTable, mapped: SeriesMap) -> Iterator[SeriesRun]:
@@ -96,11 +96,13 @@ def _run(table: SeriesTable, seconds: Array, name: str, mapped: SeriesMap) -> Se
         raise RigFileError(
             f"{table.path}: {name}: found {seconds.size} rows; expected {LEAST} or more"
         )
+
     again = table.repeated()
     table, seconds = table.at(~again), seconds[~again]
     if np.any(np.diff(seconds) <= 0.0):
         at = int(np.argmax(np.diff(seconds) <= 0.0))
         raise RigFileError(f"{table.path}: {name}: {_fallen(seconds[at], seconds[at + 1])}")
+
     run = SeriesRun(_info(table, name, mapped), table, seconds, repeated=int(again.sum()))
     return run if mapped.resample is None else _resampled(run, mapped.resample)
 
@@ -117,6 +119,7 @@ def _info(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
     told = {_stem(key): info for key, info in mapped.runs.items()}.get(name, RunInfo())
     load = told.nominal_load or _constant(table, mapped, "nominal_load") or mapped.load
     start, number = (_constant(table, mapped, key) for key in ("start", "pass"))
+
     return replace(
         told,
         name=name,
@@ -135,12 +138,13 @@ def _constant(table: SeriesTable, mapped: SeriesMap, channel: str) -> float | No
     name = mapped.named(channel)
     if name is None:
         return None
+
     values = table.column(name).numbers
     known = values[np.isfinite(values)]
     if not known.size or np.ptp(known) > 0.0:
-        found = f"{known.min():g} to {known.max():g}" if known.size else "no number"
+        told = f"{known.min():g} to {known.max():g}" if known.size else "no number"
         raise RigFileError(
-            f"{table.path}: {name}: found {found}; expected one {channel} for the whole run"
+            f"{table.path}: {name}: found {told}; expected one {channel} for the whole run"
         )
     return float(known[0]) * mapped.columns[name].per_unit
 
@@ -172,17 +176,19 @@ def _seconds(table: SeriesTable, mapped: SeriesMap) -> Array:
 
 def _clock(table: SeriesTable, name: str, words: Sequence[str]) -> Array:
     """Seconds of dates, as UTC where they name no zone, or of times of day."""
-    found = np.empty(len(words))
+    instants = np.empty(len(words))
+
     for at, word in enumerate(words):
         try:
-            found[at] = _instant(word.strip())
+            instants[at] = _instant(word.strip())
         except ValueError:
             raise RigFileError(
                 f"{table.path}: row {table.first + at}: {name}: found {word[:40]!r}; "
                 "expected a date such as 2026-11-22T14:03:05.250 or a time such as 14:03:05.250"
             ) from None
-    past_midnight = np.concatenate(([0.0], np.cumsum(np.diff(found) < -0.5 * DAY)))
-    return found + DAY * past_midnight
+
+    past_midnight = np.concatenate(([0.0], np.cumsum(np.diff(instants) < -0.5 * DAY)))
+    return instants + DAY * past_midnight
 
 
 def _instant(word: str) -> float:

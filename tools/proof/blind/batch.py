@@ -38,6 +38,7 @@ class Batch:
     def specs(self, keep: bool = False, diagnose: tuple[str, ...] = trial.DIAGNOSE) -> list[Spec]:
         rng = np.random.default_rng(_number(self.secret, "assignments"))
         drawn = strata.assignments(self.cases, rng, self.strata, self.worlds)
+
         return [
             Spec(
                 number,
@@ -68,10 +69,12 @@ def started(
     """
     if (output / BATCH).exists():
         raise CommandError(f"{output}: found a batch; expected a new folder, or --resume", USAGE)
+
     secret = secrets.token_hex(32) if seed is None else f"seed {seed}"
     told = {"cases": cases, "strata": list(chosen), "worlds": list(worlds)}
     sealed = seal.close(output / SECRET, {"secret": secret, **told})
     (output / "answers").chmod(0o700)
+
     public = {**told, "seal": sealed}
     (output / BATCH).write_text(json.dumps(public, indent=1), encoding="utf-8")
     return Batch(output, cases, chosen, worlds, secret, sealed)
@@ -85,9 +88,11 @@ def resumed(output: Path) -> Batch:
         raise CommandError(
             f"{output}: found no batch; expected one that was begun without --resume", USAGE
         ) from None
+
     if "worlds" not in public:
         reason = "found a batch of an earlier version, whose cases this one cannot draw"
         raise CommandError(f"{output}: {reason}; expected one of this version", USAGE)
+
     answers = seal.opened(output / SECRET, public["seal"])
     return Batch(
         output,

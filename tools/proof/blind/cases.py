@@ -69,6 +69,7 @@ class Case:
     def answers(self) -> dict[str, Any]:
         """As JSON types."""
         world, before = self.trial.world, self.reference
+
         return {
             "case": self.number,
             "seed": self.seed,
@@ -110,12 +111,14 @@ def drawn(number: int, seed: int, assignment: Assignment) -> Case:
     rng = np.random.default_rng(seed)
     wanted = detect.LIMIT * LEVELS.get(assignment.level, 0.0)
     best: Case | None = None
+
     for _ in range(ATTEMPTS if assignment.effects else 1):
         case = _attempt(number, seed, assignment, wanted, rng)
         if best is None or min(case.single, default=0.0) > min(best.single, default=0.0):
             best = case
         if min(best.single, default=wanted) > 0.9 * wanted:
             break
+
     assert best is not None
     return _judged(best, rng)
 
@@ -162,6 +165,7 @@ def _trials(
     family, trial = _trial(habits, assignment, rng)
     if not assignment.pair:
         return family, trial, None
+
     runs = _runs(trial.world.rig, trial.world.ground, habits, rng)
     reference = replace(trial, runs=runs)
     if assignment.bed == "prepared":
@@ -180,11 +184,13 @@ def _trial(
         runs = campaign.campaign(rig, ground, habits, rng)
         if _drivable(rig, ground, runs):
             break
+
     heaviest = max(run.weight for run in runs)
     known = knowledge.knowledge_drawn(rig, ground, heaviest, bool(habits.wrench), rng)
     rig = knowledge.fitted(rig, heaviest, known.torque_constant, rng)
     bed, own = worlds.drawn(assignment.world, rng, worlds.Size(heaviest, rig.radius))
     chain = knowledge.chain_drawn(known, rng)
+
     if assignment.noise == "slow":
         chain = knowledge.slowed(chain)
     return family, Trial(World(rig, ground, bed=bed, habits=own), known, chain, runs)

@@ -68,10 +68,12 @@ class Detector:
         self._trial = trial
         self._motions = [_motion(run, trial) for run in trial.runs]
         bare = trial.world.with_effects()
+
         self._bare = responses([(bare, motion) for motion in self._motions], damped=False)
         self._roots = [noise_roots(trial.chain, felt) for felt in self._bare]
         self._own = self._misfit(())  # a leaking sensor misleads without concealed effects, too
         self._nuisance = [*self._soil_and_weights(), *self._calibration()]
+
         self._columns = np.stack([self._whitened(column) for column in self._nuisance], axis=1)
         self._factor = np.linalg.cholesky(
             self._columns.T @ self._columns + np.eye(self._columns.shape[1])
@@ -158,6 +160,7 @@ class Detector:
                 name: np.where(inside, 0.0, values) for name, values in column[run].items()
             }
             kept.append(self._whitened(rest))
+
         known = np.stack(kept, axis=1)
         return np.asarray(np.linalg.inv(known.T @ known + np.eye(known.shape[1])), dtype=float)
 
@@ -210,9 +213,11 @@ class Detector:
             replace(ground, **{name: float(getattr(ground, name)) + SMALL * stated.sigma})
             for name, stated in known.soil.items()
         ]
+
         half = known.weight_share / float(np.sqrt(2.0))
         carriage = known.instruments["carriage_encoder"].scale
         faster = carriage.sigma / carriage.value
+
         moved = [(soil, 0.0, 0.0) for soil in soils]
         moved += [(ground, SMALL * half, 0.0), (ground, 0.0, SMALL * faster)]
         *separate, alike, driven = (scaled(change, 1.0 / SMALL) for change in self._moved(moved))
@@ -241,6 +246,7 @@ class Detector:
                     np.hypot(gain, known.torque_constant.sigma / known.torque_constant.value)
                 )
             columns += [self._only(name, instrument.offset.sigma, 0.0), self._only(name, 0.0, gain)]
+
         return columns
 
     def _only(self, channel: str, offset: float, gain: float) -> Signals:
@@ -293,6 +299,7 @@ def strengthened(detector: Detector, effect: Effect, wanted: float) -> tuple[Eff
     reached = detector.detectability([effect])
     if reached <= wanted:
         return effect, reached
+
     for _ in range(6):
         effect = replace(effect, strength=effect.strength * min(wanted / max(reached, 1e-9), 3.0))
         reached = detector.detectability([effect])

@@ -74,6 +74,7 @@ def write(case: Case, campaigns: Sequence[Driven], folder: Path) -> list[Path]:
     text = configuration(case.stated(), case.trial.runs[0].weight)
     (folder / CONFIGURATION).write_text(text, encoding="utf-8")
     shutil.copyfile(packaged("testbed.dbc"), folder / "testbed.dbc")
+
     rng = np.random.default_rng((case.seed, 1))
     return [
         _record(case, one, number, text, folder / one.folder, rng)

@@ -23,6 +23,7 @@ def errors(
     sums: dict[str, list[np.ndarray[Any, Any]]] = {}
     prefix = NEW if answers["bed"] else "run"
     begins = {f"{prefix}-{n}": run["begins"] for n, run in enumerate(answers["runs"], start=1)}
+
     for trace in result.get("traces") or ():
         path = spec.answers.with_name(f"{spec.name}.{trace['run']}.npz")
         if path.exists():
@@ -30,6 +31,7 @@ def errors(
                 if trace["channel"] in truth:
                     told = begins[trace["run"]] + truth["time"], truth[trace["channel"]]
                     sums.setdefault(trace["channel"], []).append(_squares(trace, *told))
+
     return {channel: _roots(np.concatenate(parts, axis=1)) for channel, parts in sums.items()}
 
 

@@ -181,6 +181,7 @@ def chain_drawn(known: Knowledge, rng: np.random.Generator) -> Chain:
     made = {
         name: _converter(name, instrument, rng) for name, instrument in known.instruments.items()
     }
+
     wrench = (made["drawbar_pull"], made["load"], made["torque"]) if "load" in made else None
     simple = tuple(
         made[name] for name in ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt")

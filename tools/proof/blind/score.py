@@ -28,6 +28,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
     effects = [row for row in home if row.truth]
     singles = [row for row in effects if row.stratum in ("single", "absorbed")]
     detectable = [row for row in singles if row.detectable]
+
     return {
         "cases": len(rows),
         "failed": counted(row.verdict == "failed" for row in rows),
@@ -118,6 +119,7 @@ def _two(rows: Sequence[Row]) -> dict[str, Any]:
 def unlisted(rows: Sequence[Row]) -> dict[str, Any]:
     """Of campaigns with physics outside the list that one who knows all else would see."""
     seen = [row for row in rows if row.detectable]
+
     return {
         "recall": counted(row.verdict == "unlisted" for row in seen),
         "recall of those alarmed": counted(

@@ -46,6 +46,7 @@ def foreign(rows: Sequence[Row]) -> dict[str, Any]:
 def _foreign(rows: Sequence[Row]) -> dict[str, Any]:
     spoken = [row for row in rows if row.first is not None]
     verdicts = ("consistent", "explained", "unlisted", "insufficient", "failed")
+
     return {
         "verdicts": {
             verdict: counted(row.verdict == verdict for row in rows) for verdict in verdicts
@@ -73,6 +74,7 @@ def _pairs(rows: Sequence[Row]) -> dict[str, Any]:
     nothing = [row for row in rows if not row.truth and row.verdict != "failed"]
     listed = [row for row in rows if row.detectable and row.truth[0] in LISTED]
     strange = [row for row in rows if row.detectable and row.truth[0] not in LISTED]
+
     return {
         "failed": counted(row.verdict == "failed" for row in rows),
         "false alarms": counted(row.alarmed for row in nothing),

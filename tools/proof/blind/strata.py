@@ -106,6 +106,7 @@ def _of(
         return _in_worlds("foreign", count, foreign, FOREIGN_KINDS, rng)
     if stratum == "pair":
         return [_paired(one, rng) for one in _in_worlds("pair", count, worlds, PAIR_KINDS, rng)]
+
     names = {"single": tuple(LISTED), "absorbed": ABSORBED, "unlisted": tuple(UNLISTED)}[stratum]
     leveled = _at_levels(names, count, tuple(LEVELS), rng)
     return [Assignment(stratum, (name,), level) for name, level in leveled]
@@ -158,6 +159,7 @@ def _in_worlds(
         "listed": _at_levels(tuple(LISTED), 2 * count, PLAIN, rng),
         "unlisted": _at_levels(tuple(UNLISTED), 2 * count, PLAIN, rng),
     }
+
     assigned = []
     for world, kind in _shuffled(product(worlds, kinds), count, rng):
         fixed = (("second_pass", False),) if world == "strips" else ()
@@ -166,6 +168,7 @@ def _in_worlds(
             name, level = _next(waiting[kind], world)
             one = replace(one, effects=(name,), level=level)
         assigned.append(one)
+
     return assigned
 
 

@@ -34,6 +34,7 @@ def all_tables(score: Mapping[str, Any]) -> dict[str, Table]:
         "Campaigns alone in foreign worlds": foreign(score["foreign"]),
         "Soil in foreign worlds": coverage({n: of["soil"] for n, of in score["foreign"].items()}),
     }
+
     return {heading: table for heading, table in tables.items() if len(table) > 1}
 
 
@@ -87,6 +88,7 @@ def _alarms(alarms: Mapping[str, Any]) -> Table:
 def _named(score: Mapping[str, Any]) -> Table:
     singles, two, unlisted = score["detectable_singles"], score["two"], score["unlisted"]
     first, companions, sure = singles["first"], score["companions"], score["accepted"]
+
     return [
         ("detectable single effects: detected", share_text(singles["detected"])),
         ("  first name right", share_text(first["name"])),
@@ -131,6 +133,7 @@ def strata(score: Mapping[str, Any]) -> Table:
         "first, stated group",
         "three, fixed groups",
     )
+
     rows = [
         (name, *(share_text(cell) for cell in _cells(of))) for name, of in score["strata"].items()
     ]
@@ -147,6 +150,7 @@ def reliability(score: Mapping[str, Any]) -> Table:
     was right.
     """
     by_name, by_group = (score["calibration"][by]["table"] for by in ("name", "engine"))
+
     rows = [
         (
             f"{one['from']:.1f}-{one['to']:.1f}",
@@ -170,6 +174,7 @@ def accepted(of: Mapping[str, Any]) -> Table:
         )
         for bins in zip(*kinds, strict=True)
     ]
+
     head = ("stated probability", "mean", "name right", "fixed groups", "stated group")
     return [head, *rows]
 
@@ -225,6 +230,7 @@ def pairs(groups: Mapping[str, Any]) -> Table:
         "outside the list: called unlisted",
         "over truth",
     )
+
     return [head, *((name, *_new(of)) for name, of in groups.items())]
 
 
@@ -252,6 +258,7 @@ def foreign(groups: Mapping[str, Any]) -> Table:
         "further name not there",
         "concealed effect first",
     )
+
     return [head, *((name, *_alone(of)) for name, of in groups.items())]
 
 

@@ -65,10 +65,12 @@ def prepare(spec: Spec) -> str:
     """
     if spec.seal.exists():
         return spec.seal.read_text(encoding="utf-8").strip()
+
     shutil.rmtree(spec.folder, ignore_errors=True)
     case = cases.drawn(spec.number, spec.seed, spec.assignment)
     campaigns = handover.driven(case)
     handover.write(case, campaigns, spec.folder / GIVEN)
+
     sealed = seal.close(spec.answers, case.answers(), _truth(spec, campaigns[-1]))
     spec.seal.write_text(sealed + "\n", encoding="utf-8")
     return sealed

@@ -151,6 +151,7 @@ def row(spec: Spec) -> Row:
     answers = seal.opened(spec.answers, spec.seal.read_text(encoding="utf-8").strip())
     outcome = json.loads((spec.folder / OUTCOME).read_text(encoding="utf-8"))
     result, trouble = _result(spec.folder / RESULT, outcome)
+
     return Row(
         number=spec.number,
         stratum=answers["stratum"],
@@ -196,6 +197,7 @@ def _hypotheses(result: Mapping[str, Any]) -> tuple[Hypothesis, ...]:
         )
         for h in result.get("hypotheses", ())
     ]
+
     return tuple(sorted(hypotheses, key=lambda s: (not s.accepted, -s.probability)))
 
 
@@ -236,6 +238,7 @@ def _parameters(result: Mapping[str, Any], answers: Mapping[str, Any]) -> dict[s
         for hypothesis in _hypotheses(result)
         if hypothesis.accepted
     }
+
     errors = {}
     for effect in answers["concealed"]:
         for name, true in effect["coinciding"].items():

@@ -59,6 +59,7 @@ def case_of(
     true of the rig itself, which are neither asked for nor wrong.
     """
     right = [_true(w["names"], [] if stranger else truth, held) for w in weighed]
+
     return Case(
         np.array([w["evidence"] for w in weighed]),
         np.array([len(w["names"]) for w in weighed]),
@@ -139,6 +140,7 @@ def _batch(folder: Path) -> list[Case]:
             cases.append(
                 case_of(diagnosis["explanations"], answers["effects"], stranger, count, held)
             )
+
     return cases
 
 

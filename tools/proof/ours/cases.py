@@ -143,6 +143,7 @@ def _errors(settings: Settings, rng: np.random.Generator) -> dict[str, tuple[flo
             "load": wrench.load,
             "axle_torque": wrench.torque,
         }
+
     return {
         name: (
             float(_relative(c.scale) * rng.standard_normal()),
@@ -213,6 +214,7 @@ def rig_of(
     """The rig of a case, its ripples told at full rate. reference: runs in which nothing is new."""
     every = [*reference, *record_fully(plan, acting)]
     signals, full = zip(*every, strict=True)
+
     reads = [lambda read=read: read for read in full]
     constant, count = plan.settings.drive.torque_constant.value, len(reference)
     beside, lines = beside_lines(signals, reads, constant, count)
@@ -335,4 +337,5 @@ def scaled(effect: type[Effect], size: float, rng: np.random.Generator) -> Effec
             values[p.name] = float(
                 np.clip(p.centre + 0.4 * p.sigma * rng.uniform(-1, 1), p.low, p.high)
             )
+
     return effect(**values)

@@ -49,6 +49,7 @@ def _rows(
 ) -> list[tuple[str, str]]:
     alarmed = [r for r in one if r["verdict"] in ("explained", "unlisted")]
     absorbed = [r for r in one if _error(r, 1) > 2.0]
+
     return [
         ("detected at 3-5 times the limit", _rate(len(alarmed), len(one))),
         ("right name first, or in its group", _rate(sum(_first(r) for r in one), len(one))),

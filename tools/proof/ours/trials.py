@@ -80,6 +80,7 @@ def cases(
 ) -> Iterator[Case]:
     """Strata in turn: a sixth without effect, effects, other forms, pairs, unlisted effects."""
     rng = np.random.default_rng(seed)
+
     for number in range(count):
         stratum = ORDER[number % len(ORDER)]
         truth: tuple[str, ...] = ()
@@ -91,6 +92,7 @@ def cases(
             truth = (COUSINS[int(rng.integers(len(COUSINS)))].__name__,)
         elif stratum == "pair":
             truth = PAIRS[int(rng.integers(len(PAIRS)))]
+
         if only and stratum not in only and not set(only) & set(truth):
             continue
         yield Case(stratum, truth, int(rng.integers(1 << 31)), strength, lack)

@@ -73,11 +73,13 @@ class Bench:
         self.step(f"diagnosing {name}")
         result = self.folder / f"{name}.json"
         began = time.monotonic()
+
         given = [str(p.relative_to(self.folder)) for p in sorted(recordings)]
         if reference:
             given += ["--reference", *(str(p.relative_to(self.folder)) for p in sorted(reference))]
         given += ["--config", str(configuration.relative_to(self.folder))]
         outputs = ("--json", result.name, "--apply", f"{name}.yaml")
+
         printed = self._gritd("diagnose", *given, *outputs, "--jobs", "1")
         read = json.loads(result.read_text(encoding="utf-8"))
         return DiagnosisRun(self.commands[-1], printed.rstrip(), read, time.monotonic() - began)
@@ -108,6 +110,7 @@ def _environment() -> dict[str, str]:
         for k, v in os.environ.items()
         if k in ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "VIRTUAL_ENV")
     }
+
     return kept | {
         "PYTHONPATH": str(ROOT),
         "OPENBLAS_NUM_THREADS": "1",

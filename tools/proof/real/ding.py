@@ -61,6 +61,7 @@ def _table(columns: list[Array]) -> Table:
             *(_four(np.array([0.0, *(rms(m - c[1]) for m in c[2:])])) for c in columns),
         ]
     )
+
     four = "measured / soil as published / as fitted, no effect / with what was found"
     return Table((f"slip; {four}", *(label for label, _ in CHANNELS.values())), rows)
 

@@ -128,10 +128,12 @@ def stated(diagnosis: DiagnosisRun) -> Array:
     gain = config.loads(
         diagnosis.result["redo"]["configuration"], "emps.yaml"
     ).settings.drive.torque_constant.value
+
     constants = diagnosis.result["nuisance"]
     asymmetry = diagnosis.values("asymmetric_friction").get("difference", 0.0)
     offset = gain * diagnosis.values("current_offset").get("offset", 0.0)
     coulomb = diagnosis.values("coulomb_friction").get("loss", 0.0)
+
     return np.array(
         [constants["inertia"]["value"], constants["damping"]["value"], coulomb, asymmetry + offset]
     )

@@ -33,6 +33,7 @@ def _drawn(ax: Axes, panel: Panel) -> None:
             ax.plot(x, values, mark, color=colour, ms=6, mew=1.4, fillstyle="none", label=label)
         else:
             ax.plot(x, values, color=colour, lw=1.0, label=label)
+
     ax.set_title(panel.title, fontsize=9)
     ax.set_xlabel(panel.x_label, fontsize=8)
     ax.set_ylabel(panel.y_label, fontsize=8)

@@ -86,6 +86,7 @@ class Judge:
                 [np.nanmean(s[n][inside & (number == k)]) for s in series]
                 for k in np.unique(number[inside])
             ]
+
         return np.array(parts).T
 
     def covariate(self, name: str) -> list[Array]:

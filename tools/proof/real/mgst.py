@@ -159,6 +159,7 @@ def _names(diagnosis: DiagnosisRun, what: str, wanted: Sequence[str], reason: st
 def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str) -> Check:
     before, after = (rms(np.array(e)) for e in zip(*(h.errors for h in held), strict=True))
     better = sum(h.errors[1] < h.errors[0] for h in held)
+
     return Check(
         "Is the freed channel nearer to the concealed one, on trials that were held out?",
         f"in all {len(held)}, error more than halved",

@@ -74,6 +74,7 @@ def _missed(checks: Sequence[Check]) -> Iterator[str]:
         reasons.setdefault(flowing(a.reason) or "The reason was not found.", []).append(
             f"*{a.question}*"
         )
+
     if reasons:
         yield "**Missed.** " + " ".join(
             f"{' '.join(questions)} {why}" for why, questions in reasons.items()

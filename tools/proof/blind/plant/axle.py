@@ -23,6 +23,7 @@ def balance(load_at: Callable[[Array], Array], weight: Array, guess: Array) -> A
     old = np.log(np.clip(guess, SHALLOWEST, DEEPEST))
     new = np.log(np.clip(1.02 * np.exp(old), SHALLOWEST, 0.999 * DEEPEST))
     miss_old = _miss(load_at, old, wanted)
+
     for _ in range(STEPS):
         miss = _miss(load_at, new, wanted)
         if (
@@ -33,6 +34,7 @@ def balance(load_at: Callable[[Array], Array], weight: Array, guess: Array) -> A
             < CLOSE
         ):
             break
+
         run = new - old
         slope = np.where(
             np.abs(run) > 1e-13, (miss - miss_old) / np.where(run == 0.0, 1.0, run), 2.0
@@ -40,6 +42,7 @@ def balance(load_at: Callable[[Array], Array], weight: Array, guess: Array) -> A
         step = -miss / np.clip(slope, 0.5, 12.0)
         old, miss_old = new, miss
         new = np.clip(new + np.clip(step, -1.5, 1.5), np.log(SHALLOWEST), np.log(DEEPEST))
+
     return np.exp(new)
 
 
@@ -55,8 +58,10 @@ def settled(target: Array, moving: Array, step: float, lag: float) -> Array:
     gain = 1.0 - np.exp(-step / lag)
     depth = float(target[0])
     path = []
+
     for goal, free in zip(target.tolist(), moving.tolist(), strict=True):
         gap = goal - depth
         depth += gain * (gap if gap > 0.0 else gap * free)
         path.append(depth)
+
     return np.array(path)

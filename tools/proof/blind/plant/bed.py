@@ -67,11 +67,13 @@ def _balanced(scene: Scene, radius: float, weight: Array) -> Array:
     every = every_of(scene.motion.time, COARSE)
     time, width, ratio = scene.motion.time, scene.rig.width, scene.ratio[::every]
     ground, rim = thinned(scene.ground, every), thinned(scene.rim, every)
+
     known = scene.theta_1[::every] if scene.theta_1.size else np.zeros(ratio.size)
     guess = np.where(known > 0.01, known, 0.4)
     theta_1 = balance(
         lambda t: reaction(ground, rim, radius, width, ratio, t).load, weight[::every], guess
     )
+
     return np.interp(time, time[::every], theta_1)
 
 

@@ -99,6 +99,7 @@ def reaction(
     ground, held = columned(ground), columned(rim)
     parts = [_zone(ground, held, radius, ratio, zone) for zone in zones]
     along, down, turning, pressing, across = (a + b for a, b in zip(*parts, strict=True))
+
     arc = theta_1 + exit_angle(rim, theta_1)
     area = radius * width
     return Reaction(
@@ -134,11 +135,13 @@ def _nodes(entry: Array, turned: Array, shadow: Array | None, width: Array) -> Z
     up, along = np.sin(half), np.cos(half)
     gap = 2.0 * up * (sine * up + cosine * along)
     drop = 2.0 * up * (sine * along - cosine * up)
+
     if shadow is not None:
         dip = np.sin(0.5 * shadow)
         mirrored = 2.0 * dip * (sine * np.cos(0.5 * shadow) - cosine * dip)
     else:
         mirrored = drop
+
     return Zone(turned, cosine + drop, sine - gap, gap, mirrored, width)
 
 
@@ -148,11 +151,13 @@ def _zone(
     """∫(τ cos − σ sin), ∫(σ cos + τ sin), ∫τ, ∫σ, ∫τ across, over one zone."""
     sigma = _normal(ground, radius, zone.drop)
     jay = radius * (zone.turned - column(ratio) * zone.gap)  # Eq. (6)
+
     sliding = None
     if np.any(rim.skew):
         along = 1.0 - column(ratio) * zone.cosine
         sliding = Sliding(along, column(ratio) * np.asarray(rim.skew) + 0.0 * along)
     tau, across = sheared(ground, rim, sigma, jay, sliding)
+
     cosine, sine, weight = zone.cosine, zone.sine, zone.width
     return (
         ((tau * cosine - sigma * sine) * weight).sum(axis=1),
@@ -183,6 +188,7 @@ def sheared(
     gripped = 1.0 - rim.polish * sigma / (sigma + LIGHT)
     strength = (ground.cohesion + sigma * ground.tan_phi) * rim.strength * gripped
     tau = strength * mobilised(jay / ground.shear_modulus, rim)
+
     if sliding is None:
         return tau, np.zeros((1, 1))
     speed = np.hypot(*sliding) + TINY
@@ -200,10 +206,12 @@ def mobilised(x: Array, rim: Rim) -> Array:
     far = np.abs(x)
     fading = np.exp(-far)
     share = 1.0 - fading + rim.overshoot * np.e * far * fading
+
     if np.any(rim.brittle):
         share = share + 4.0 * rim.brittle * np.tanh(2.0 * far) * fading**2 / (1.0 + fading**4)
     if np.any(rim.sliding):
         share = np.minimum(share, np.where(rim.sliding > 0.0, 1.0 - rim.sliding, np.inf))
+
     signed: Array = np.sign(x) * share
     return signed
 

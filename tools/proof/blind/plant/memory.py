@@ -26,11 +26,13 @@ def mean_before(values: Array, path: Array, length: float) -> Array:
     """
     if length < 1e-6:
         return values
+
     area = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(path))))
     start = np.maximum(path - length, path[0])
     place = np.clip(np.searchsorted(path, start, "right") - 1, 0, path.size - 1)
     begun = area[place] + 0.5 * (values[place] + np.interp(start, path, values)) * (
         start - path[place]
     )
+
     lacking = np.maximum(path[0] - (path - length), 0.0) * values[0]
     return np.asarray((area - begun + lacking) / length)

@@ -176,10 +176,12 @@ def _sensed(world: World, scene: Scene) -> Felt:
         (np.asarray(effect.loss(scene)) for effect in world.acting),
         start=np.zeros(scene.torque.size),
     )
+
     motor = scene.torque + loss + world.rig.wheel.inertia * scene.motion.alpha
     current = motor / world.rig.torque_constant
     for effect in world.acting:
         current = effect.drawn_current(current, scene)
+
     felt = Felt(
         scene,
         motor,
@@ -191,6 +193,7 @@ def _sensed(world: World, scene: Scene) -> Felt:
         scene.motion.travel,
         scene.side,
     )
+
     for effect in world.acting:
         felt = effect.sensed(felt)
     return felt

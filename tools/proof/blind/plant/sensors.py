@@ -93,11 +93,13 @@ def readings(
         "motor_shunt": felt.current,
         "motor_temperature": 21.0 + 0.02 * time,
     }
+
     sent: list[Reading] = []
     for converter in chain.converters:
         sent += _channel(chain, converter, time, signals[converter.channel], begins, rng)
     if chain.wrench is not None:
         sent += _wrench(chain, chain.wrench, time, felt, begins, rng)
+
     return sorted(sent, key=lambda reading: (reading.received, reading.channel))
 
 
@@ -128,6 +130,7 @@ def _channel(
     raw: NDArray[np.int64] | Array = converter.raw(time, at, signal, rng)
     if converter.channel.endswith("_encoder"):
         raw = raw.astype(np.int64)
+
     moments = _stamped(converter, at, begins, rng)
     return [
         Reading(s, converter.channel, v, r) for (s, r), v in zip(moments, raw.tolist(), strict=True)
@@ -147,8 +150,10 @@ def _wrench(
         axis.raw(time, at, signal, rng)
         for axis, signal in zip(axes, (felt.pull, felt.load, felt.torque), strict=True)
     )
+
     fy, tx, tz = (axes[k].noise.drawn(rng, at.size, 1.0 / axes[k].rate) for k in (0, 2, 2))
     fy = fy + np.interp(at, time, felt.side)
+
     six = np.stack((fx, fy, fz, tx, ty, tz), axis=1).tolist()
     moments = _stamped(axes[0], at, begins, rng)
     return [Reading(s, "wrench", tuple(row), r) for (s, r), row in zip(moments, six, strict=True)]

@@ -33,6 +33,7 @@ def follow(servo: Servo, wanted: Array, against: Array, step: float, substeps: i
     integral_gain = servo.gain / servo.reset
     divisor = servo.inertia / h + servo.gain + integral_gain * h
     speed, integral = float(wanted[0]), float(against[0]) / integral_gain
+
     speeds = []
     for goal, force in zip(wanted.tolist(), against.tolist(), strict=True):
         for _ in range(substeps):
@@ -40,6 +41,7 @@ def follow(servo: Servo, wanted: Array, against: Array, step: float, substeps: i
             speed = (servo.inertia / h * speed + drive) / divisor
             integral += h * (goal - speed)
         speeds.append(speed)
+
     return np.array(speeds)
 
 

@@ -61,6 +61,7 @@ def _answered(scene: Scene, weight: Array, felt: Felt, lane: int, steps: Array) 
     sinkage, torque, pull, side, pressure = (
         np.interp(scene.motion.time, steps, values[: steps.size, lane]) for values in felt
     )
+
     down, radius = weight > LIFTED, float(scene.radius.mean())
     return replace(
         scene,
@@ -183,6 +184,7 @@ class _Strips:
         """
         leap, weight = LEAP * self._radius, np.maximum(now.weight, LIFTED)
         high, deep = np.full_like(self._sinkage, -np.inf), np.full_like(self._sinkage, np.inf)
+
         for _ in range(most):
             upward, rise = self._load(now, under)
             miss = weight - upward
@@ -190,6 +192,7 @@ class _Strips:
                 break
             high = np.where(miss > 0.0, np.maximum(high, self._sinkage), high)
             deep = np.where(miss < 0.0, np.minimum(deep, self._sinkage), deep)
+
             aimed = self._sinkage + np.clip(miss / np.maximum(rise, 1.0), -leap, leap)
             inside = (aimed > high) & (aimed < deep)
             known = np.isfinite(high) & np.isfinite(deep)

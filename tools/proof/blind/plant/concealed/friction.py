@@ -29,6 +29,7 @@ def lugre(omega: Array, level: Array, step: float) -> Array:
         fading = float(np.exp(-abs(speed) * step / BRISTLE))
         bent = fading * bent + (1.0 - fading) * (1.0 if speed > 0.0 else -1.0)
         shares.append(bent)
+
     return np.asarray(level * np.array(shares))
 
 

@@ -48,10 +48,12 @@ class Lugs(Effect, ABC):
             torque += push * (scene.rig.radius + 0.5 * self.strength)
             pull += push * np.cos(theta)
             lift += push * np.sin(theta)
+
         sign = scene.direction * scene.moving
         # dW/dz of a wheel
         stiffness = 2.0 * np.maximum(scene.carried, 1.0) / np.maximum(scene.sinkage, 1e-3)
         raised = np.where(scene.sinkage > 0.0, lift / stiffness - self.depth(scene), 0.0)
+
         return replace(
             scene,
             torque=scene.torque + torque * sign,
@@ -77,10 +79,12 @@ class Blades(Lugs):
         entered = np.clip((scene.theta_1 - theta) / 0.1, 0.0, 1.0) * np.clip(
             (theta + 0.3) / 0.3, 0.0, 1.0
         )
+
         coefficient = passive(scene.ground.tan_phi)
         pressure = 0.5 * WEIGHT * ((root + height) ** 2 - root**2) * coefficient
         pressure = pressure + 2.0 * scene.ground.cohesion * height * np.sqrt(coefficient)
         pressure = pressure + coefficient * scene.pressure * height
+
         swept = np.maximum(scene.theta_1 - theta, 0.0)
         jay = radius * (swept - scene.ratio * (np.sin(scene.theta_1) - np.sin(theta)))
         mobilised = 1.0 - np.exp(-np.maximum(jay, 0.0) / scene.ground.shear_modulus)

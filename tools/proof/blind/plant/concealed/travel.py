@@ -25,6 +25,7 @@ def relaxed(scene: Scene, follow: Callable[[Array], Array]) -> Scene:
     way, down = scene.direction * scene.moving, scene.carried > 1.0
     torque, pull = _held(scene.torque, way), _held(scene.pull, way)
     depth = np.maximum(scene.sinkage, 0.0)
+
     return replace(
         scene,
         torque=scene.torque + (follow(torque) - torque) * way,

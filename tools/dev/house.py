@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 WIDE = 100  # columns
+LONG = 12  # lines from which a function has steps to tell apart
 PLAIN = {0, 1, 2, -1, 0.5}  # numbers that need no name
 ARRAY = re.compile(r"\b(Array|Bools|Index|NDArray)\b")
 SHAPE = re.compile(r"\((?:[A-Za-z\d][^(),]{0,12},)[^()]{0,12}\)")  # (N,), (n, m), (1 + draws,)
@@ -46,6 +47,9 @@ def counted(tree: Path, folder: str) -> dict[str, str]:
         "lines of the longest file": str(max(len(t.splitlines()) for t in texts.values())),
         "lines of a function: median, 90 %": f"{statistics.median(lengths):.0f},"
         f" {lengths[int(0.9 * len(lengths))]}",
+        f"functions of {LONG} lines or more with a blank line between steps": _share(
+            [f for path, p in parsed.items() for f in _stepped(p, texts[path].splitlines())]
+        ),
         f"lines over {WIDE} columns": f"{wide} of {len(lines)} ({wide / len(lines):.1%})",
         "numbers with a name in a room's module": str(sum(_named(p) for p in rest)),
         "numbers without a name": str(sum(_inline(p) for p in rest)),
@@ -54,6 +58,20 @@ def counted(tree: Path, folder: str) -> dict[str, str]:
         ),
         "public functions on arrays that state shapes": f"{stated} of {len(arrays)}",
     }
+
+
+def _stepped(module: ast.Module, lines: list[str]) -> Iterator[bool]:
+    """Of every long function with more than one statement, whether a blank line stands in it."""
+    for node in ast.walk(module):
+        if isinstance(node, Function) and (node.end_lineno or 0) - node.lineno + 1 >= LONG:
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            if len(body) > 1:
+                own = lines[body[0].lineno - 1 : node.end_lineno]
+                yield not all(line.strip() for line in own)
+
+
+def _share(marks: list[bool]) -> str:
+    return f"{sum(marks)} of {len(marks)} ({sum(marks) / max(len(marks), 1):.0%})"
 
 
 def _room(path: Path, home: Path) -> str:

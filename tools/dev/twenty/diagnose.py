@@ -15,6 +15,7 @@ from typing import Any
 from gritd.tools.dev.twenty.process import environment
 
 TIMES = "times.json"
+PROGRESS = ".progress"  # what is said on the way: it follows the clock
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ class Spent:
 
 
 def diagnose(folder: Path, out: Path, gritd: Path, jobs: int, only: Sequence[str]) -> int:
-    """OUT/NAME.json and what was printed, OUT/NAME.txt. 1 if one could not be diagnosed."""
+    """OUT/NAME.json, what was printed (.txt), and what was said on the way (.progress). 1 if one
+    could not be diagnosed.
+    """
     campaigns = [f for f in sorted(folder.iterdir()) if f.is_dir() and (not only or f.name in only)]
     if missing := set(only) - {f.name for f in campaigns}:
         raise SystemExit(f"{folder}: found no campaign {', '.join(sorted(missing))}")
@@ -54,11 +57,13 @@ def _diagnosed(campaign: Path, out: Path, gritd: Path) -> Spent:
     command = [str(gritd), "diagnose", *files, *settled, "--json", str(result)]
 
     began = time.monotonic()
-    with (out / f"{campaign.name}.txt").open("wb") as printed:
+    text, progress = (out / f"{campaign.name}{end}" for end in (".txt", PROGRESS))
+    with text.open("wb") as printed, progress.open("wb") as rest:
         process = subprocess.Popen(
-            command, cwd=campaign, env=environment(), stdout=printed, stderr=subprocess.STDOUT
+            command, cwd=campaign, env=environment(), stdout=printed, stderr=rest
         )
         _, status, used = os.wait4(process.pid, 0)
+
     process.returncode = os.waitstatus_to_exitcode(status)
     wall = time.monotonic() - began
     return Spent(round(wall, 2), round(used.ru_utime + used.ru_stime, 2), process.returncode)

@@ -14,9 +14,7 @@ from gritd.estimator.config.configuration import Configuration
 from gritd.interface.runs import Place, Run, configured
 from gritd.tools.commands.diagnose import of_files
 from gritd.tools.commands.diagnose_text import text
-from gritd.tools.diagnose.explain.provenance import check_rig
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.report import lab
 from gritd.tools.report import reference as references
 
@@ -98,11 +96,10 @@ def diagnose(
 
     given = references.given([_file(each) for each in reference], bed)
     files, configuration = [_file(run) for run in runs], configured(config)
-    if not other_rig:
-        check_rig(read_all([*files, *given.files]), configuration.settings, configuration.source)
-
-    diagnosis, damage = of_files(files, configuration, seed, step, jobs, "", given, quick)
-    return Result(lab.with_runs(diagnosis, files, configuration), tuple(damage))
+    found, damage = of_files(
+        files, configuration, seed, step, jobs, "", given, quick, own_rig=not other_rig
+    )
+    return Result(lab.with_runs(found, files, configuration), tuple(damage))
 
 
 def _file(run: Run | Place) -> Path:

@@ -29,13 +29,13 @@ from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.apply import is_known, rewritten
-from gritd.tools.diagnose.explain.innovations import with_innovations
+from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_innovations
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
 )
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, read_all
+from gritd.tools.diagnose.rig.signals import distinct, one_by_one, read_all
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -74,9 +74,6 @@ def main(argv: Sequence[str]) -> int:
 
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     reference = references.given(arguments.reference, arguments.bed)
-    if not arguments.other_rig:
-        given = read_all([*arguments.files, *reference.files])
-        provenance.check_rig(given, configuration.settings, configuration.source)
 
     named = [*map(str, arguments.files)]
     if arguments.reference:
@@ -95,6 +92,7 @@ def main(argv: Sequence[str]) -> int:
             command,
             reference,
             arguments.quick,
+            own_rig=not arguments.other_rig,
         )
 
     _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
@@ -263,12 +261,19 @@ def of_files(
     command: str = "",
     reference: references.Given = references.NONE,
     quick: bool = False,
+    own_rig: bool = False,
 ) -> tuple[Diagnosis, list[str]]:
-    """The diagnosis, and what was damaged in the files. Raises CommandError."""
+    """The diagnosis, and what was damaged in the files. Raises CommandError.
+
+    own_rig: recordings of another testbed than the configuration's are refused.
+    """
+    settings = configuration.settings
     recordings, known = read_all(files), read_all(reference.files)
+    if own_rig:
+        provenance.check_rig([*recordings, *known], settings, configuration.source)
 
     hashes = distinct([*files, *reference.files])
-    rig, rate = rig_of(recordings, configuration.settings, known, reference.bed)
+    rig, rate = rig_of(recordings, settings, known, reference.bed)
     if not rig.channels:
         raise CommandError(
             f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
@@ -283,24 +288,25 @@ def of_files(
         "grid_hz": rate,
         "versions": versions(),
     }
+    damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
+    remarks = [
+        *provenance.remarks(recordings, settings),
+        *(f"Damaged: {line}" for line in damage),
+    ]
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
+        soil = any(constant.soil for constant in rig.constants)
+        before = Filtered() if quick else filtered(configuration, recordings, soil)
+        del recordings, known  # long ones are large; they are read again where they are needed
         each = step if callable(step) else lambda _: None
         diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
         if not quick:
-            diagnosis = with_innovations(
-                diagnosis, configuration, recordings, soil=diagnosis.soil is not None
-            )
+            again = one_by_one(files)
+            diagnosis = with_innovations(diagnosis, configuration, before, again)
 
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)
-
-    damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
-    remarks = [
-        *provenance.remarks(recordings, configuration.settings),
-        *(f"Damaged: {line}" for line in damage),
-    ]
     return replace(diagnosis, caveats=(*diagnosis.caveats, *remarks)), damage
 
 

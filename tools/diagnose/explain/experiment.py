@@ -20,6 +20,7 @@ from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import NextExperiment
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Foreseen
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
@@ -194,9 +195,10 @@ def _unseen_shown(search: Search) -> dict[str, float]:
 def _not_shown(search: Search) -> list[str]:
     """Effects whose signature, at their expected size, is below the alarm."""
     projection, screen = search.base.fitted.projection(), search.first
+    noise = search.problem.noise
     size = {
-        name: float(np.trace(projection.project(w.columns)[0]))
-        for name, w in screen.best.items()
+        name: float(np.trace(projection.project(whiten(noise, likeliest.columns))[0]))
+        for name, likeliest in screen.best.items()
         if isinstance(name, str)
     }
     return [name for name, squared in size.items() if 0.5 * squared < screen.threshold]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,31 +24,57 @@ NO_UPDATE = (
 NOTHING_NEW = "Nothing was accepted, so the on-line filter stays as it is."
 
 
+@dataclass(frozen=True)
+class Filtered:
+    """Root mean square of the filter's normalised innovations, per component; `note` says why there
+    is none.
+    """
+
+    innovations: dict[str, float] | None = None
+    note: str = ""
+
+
+def filtered(
+    configuration: config.Configuration, recordings: Sequence[Recording], soil: bool
+) -> Filtered:
+    """By the given configuration; soil: whether the rig has any."""
+    if not soil:
+        return Filtered(note=NO_FILTER)
+
+    try:
+        found = innovations(configuration.settings, recordings)
+    except (RecordingError, config.ConfigError) as error:
+        return Filtered(note=_failed(error))
+    return Filtered(found) if found else Filtered(note=NO_UPDATE)
+
+
 def with_innovations(
     diagnosis: Diagnosis,
     configuration: config.Configuration,
-    recordings: Sequence[Recording],
-    soil: bool = True,
+    before: Filtered,
+    recordings: Iterable[Recording],
 ) -> Diagnosis:
-    """The result with the filter's normalised innovations by the given configuration and by the
-    improved one.
+    """The result with the filter's normalised innovations by the given configuration, `before`, and
+    by the improved one.
 
-    Where there are none, or no improved one, `innovation_note` says why.
+    recordings: asked for only where there is an improved one. Where there is none `innovation_note`
+    says why.
     """
-    if not soil:
-        return _noted(diagnosis, NO_FILTER)
+    if before.innovations is None:
+        return _noted(diagnosis, before.note)
+    if not diagnosis.accepted and diagnosis.law is None:
+        return _noted(diagnosis, NOTHING_NEW, before.innovations, before.innovations)
 
     try:
-        before = innovations(configuration.settings, recordings)
-        if not before:
-            return _noted(diagnosis, NO_UPDATE)
-        if not diagnosis.accepted and diagnosis.law is None:
-            return _noted(diagnosis, NOTHING_NEW, before, before)
-
         improved = config.loads(applied(configuration, diagnosis), "improved configuration")
-        return _noted(diagnosis, "", before, innovations(improved.settings, recordings))
+        after = innovations(improved.settings, recordings)
+        return _noted(diagnosis, "", before.innovations, after)
     except (RecordingError, config.ConfigError) as error:
-        return _noted(diagnosis, f"The on-line filter could not run: {error}.")
+        return _noted(diagnosis, _failed(error))
+
+
+def _failed(error: Exception) -> str:
+    return f"The on-line filter could not run: {error}."
 
 
 def _noted(
@@ -63,7 +89,7 @@ def _noted(
     return replace(diagnosis, fit=fit)
 
 
-def innovations(settings: Settings, recordings: Sequence[Recording]) -> dict[str, float]:
+def innovations(settings: Settings, recordings: Iterable[Recording]) -> dict[str, float]:
     """Root mean square of innovation over its stated standard deviation, per component; 1 where
     they are true.
 

@@ -45,13 +45,12 @@ class Surrogates:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Whitened columns (n, m) on consecutive values `rows`, and their products with the surrogates
-    (m, draws), of which there are many: seven digits are enough for what noise alone shows.
+    """Whitened columns (n, m) on consecutive values `rows`, of which there are many: seven digits
+    are enough for what is searched.
     """
 
     rows: slice
-    columns: Array
-    surrogates: NDArray[np.float32]
+    columns: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -142,15 +141,15 @@ class Projection:
         """Of a block of columns taken one by one: squares (m,), coordinates in the model's
         directions (q, m), b (m, 1 + draws).
         """
-        jacobian = self.jacobian[block.rows]
+        columns, jacobian = block.columns.astype(float), self.jacobian[block.rows]
         acting = np.any(jacobian != 0.0, axis=0)
-        inside = np.zeros((jacobian.shape[1], block.columns.shape[1]))
-        inside[acting] = jacobian[:, acting].T @ block.columns
+        inside = np.zeros((jacobian.shape[1], columns.shape[1]))
+        inside[acting] = jacobian[:, acting].T @ columns
         inside = self._solved(inside)
 
-        nulls = block.surrogates[:, : self._every_pulled.shape[1] - 1].astype(float)
-        own = np.column_stack((block.columns.T @ self.residual[block.rows], nulls))
-        return np.sum(block.columns**2, axis=0), inside, own - inside.T @ self._every_pulled
+        recorded, nulls = self.residual[block.rows], self._nulls.residuals[block.rows]
+        own = np.column_stack((columns.T @ recorded, columns.T @ nulls))
+        return np.sum(columns**2, axis=0), inside, own - inside.T @ self._every_pulled
 
     def _inside(self, columns: Array) -> Array:
         """Coordinates of columns (N, m) in the model's directions (q, m)."""

@@ -119,9 +119,7 @@ def _level(sizes: list[Array], powers: list[Array], near: Array) -> Array:
 # ---- what is searched --------------------------------------------------------------------------
 
 
-def families(
-    stack: Stack, noise: Noise, surrogates: Surrogates, acting: Bools | None = None
-) -> tuple[Family, ...]:
+def families(stack: Stack, noise: Noise, acting: Bools | None = None) -> tuple[Family, ...]:
     """Of every channel, on the values (N,) where they may act: those that may hold something new,
     unless others are given.
     """
@@ -131,9 +129,9 @@ def families(
     for channel in stack.rig.channels:
         for axis in lines.AXES:
             every = lines.frequencies(stack, channel, axis)
-            searched.append(waves(stack, noise, surrogates.residuals, channel, axis, every, acting))
+            searched.append(waves(stack, noise, channel, axis, every, acting))
             at = places(stack, channel, axis)
-            searched.append(steps(stack, noise, surrogates.residuals, channel, axis, at, acting))
+            searched.append(steps(stack, noise, channel, axis, at, acting))
 
     return tuple(family for family in searched if family.blocks and family.at.size)
 
@@ -141,13 +139,12 @@ def families(
 def waves(
     stack: Stack,
     noise: Noise,
-    nulls: Array,
     channel: str,
     axis: str,
     frequencies: Array,
     acting: Bools | None = None,
 ) -> Family:
-    """Waves of some frequencies (f,) [1/s, 1/m]; nulls (N, draws) whitened surrogates."""
+    """Waves of some frequencies (f,) [1/s, 1/m]."""
     size, x = np.sqrt(2.0) * size_of(stack, channel), stack.covariate(axis)
     blocks = []
     stretches = _stretches(stack, channel, stack.new if acting is None else acting)
@@ -155,7 +152,7 @@ def waves(
         rows = noise.touched(int(index[0]), int(index[-1]) + 1)
         raw = np.zeros((rows.stop - rows.start, frequencies.size, 2))
         raw[index - rows.start] = size * lines.waves(x[index], frequencies)
-        blocks.append(_block(noise, nulls, rows, raw))
+        blocks.append(_block(noise, rows, raw))
 
     near = lines.neighbours(x, stretches, frequencies) if blocks else None
     return Family(Shape(channel, (axis,), "wave"), frequencies, tuple(blocks), near)
@@ -169,20 +166,19 @@ def _stretches(stack: Stack, channel: str, acting: Bools) -> list[Index]:
 def steps(
     stack: Stack,
     noise: Noise,
-    nulls: Array,
     channel: str,
     axis: str,
     at: Array,
     acting: Bools | None = None,
 ) -> Family:
-    """Steps at some places (f,) [s, m]; nulls (N, draws) whitened surrogates."""
+    """Steps at some places (f,) [s, m]."""
     shape = Shape(channel, (axis,), "step")
     if not at.size:
         return Family(shape, at, ())
     rows = _rows(stack.of(channel))
 
     raw = size_of(stack, channel) * _risen(stack, rows, axis, at, acting)[:, :, None]
-    return Family(shape, at, (_block(noise, nulls, rows, raw),))
+    return Family(shape, at, (_block(noise, rows, raw),))
 
 
 def places(stack: Stack, channel: str, axis: str) -> Array:
@@ -219,9 +215,9 @@ def _rows(own: Bools) -> slice:
     return slice(int(index[0]), int(index[-1]) + 1)
 
 
-def _block(noise: Noise, nulls: Array, rows: slice, raw: Array) -> Block:
+def _block(noise: Noise, rows: slice, raw: Array) -> Block:
     white = np.asarray(noise.whitener[rows, rows] @ raw.reshape(len(raw), -1))
-    return Block(rows, white, (white.T @ nulls[rows]).astype(np.float32))
+    return Block(rows, white.astype(np.float32))
 
 
 # ---- those that stand out ----------------------------------------------------------------------
@@ -258,8 +254,7 @@ def _refined(
     near = family.at[place] + np.linspace(-1.0, 1.0, TUNING.screen.frequencies_near_best) * (
         family.at[1] - family.at[0] if family.at.size > 1 else 0.0
     )
-    none = np.zeros((problem.stack.size, 0))
-    finer = waves(problem.stack, problem.noise, none, family.shape.channel, family.axis, near)
+    finer = waves(problem.stack, problem.noise, family.shape.channel, family.axis, near)
     return float(near[int(np.argmax(finer.in_phase(beside, shared)[:, 0]))])
 
 
@@ -285,8 +280,7 @@ def in_step(
     )
     tried = shape.at + reach * np.linspace(-1.0, 1.0, count)
 
-    none = np.zeros((stack.size, 0))
-    finer = waves(stack, problem.noise, none, shape.channel, "time", tried)
+    finer = waves(stack, problem.noise, shape.channel, "time", tried)
     value = finer.in_phase(beside, True)[:, 0] - np.log(count)
     best = int(np.argmax(value))
     if value[best] < finer.in_phase(beside, False)[:, 0].max():

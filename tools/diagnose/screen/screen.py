@@ -12,8 +12,9 @@ largest of *all* these surprises in every null, however many were tried and howe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -54,7 +55,7 @@ class Screen:
 
     evidence: dict[Candidate, float]
     usual: dict[Candidate, tuple[float, float]]
-    best: dict[Candidate, WhitenedSignature]
+    best: dict[Candidate, Signature]
     fixed: dict[Candidate, list[dict[str, float]]]
     nulls: Array
     chance: dict[Candidate, float] = field(default_factory=dict)
@@ -157,65 +158,87 @@ def tail_chance(values: Array, value: float) -> float:
     return min(counted, max(fitted, TUNING.screen.trusted_tail * least))
 
 
-def whitened(noise: Noise, signatures: Sequence[Signature]) -> list[WhitenedSignature]:
-    """All columns whitened, some at a time."""
-    ready = []
-    for some in _some(signatures):
-        columns = whiten(noise, np.column_stack([s.columns for s in some]))
-        ends = np.cumsum([len(s.sign) for s in some])
-        ready += [
-            WhitenedSignature(s, columns[:, end - len(s.sign) : end].copy())
-            for s, end in zip(some, ends, strict=True)
-        ]
-    return ready
-
-
 Taken = TypeVar("Taken")
 
 
-def _some(every: Sequence[Taken]) -> Iterator[Sequence[Taken]]:
-    """So many at a time that their columns are not all in memory twice."""
-    for first in range(0, len(every), TUNING.screen.at_once):
-        yield every[first : first + TUNING.screen.at_once]
+def some_of(every: Iterable[Taken]) -> Iterator[list[Taken]]:
+    """So many at a time that their columns are not all in memory at once."""
+    taken = iter(every)
+    while some := list(islice(taken, TUNING.screen.at_once)):
+        yield some
+
+
+def whitened(noise: Noise, signatures: Iterable[Signature]) -> Iterator[WhitenedSignature]:
+    """Each in its turn, some whitened at a time."""
+    for some in some_of(signatures):
+        columns = whiten(noise, np.column_stack([s.columns for s in some]))
+        ends = np.cumsum([len(s.sign) for s in some])
+        for s, end in zip(some, ends, strict=True):
+            yield WhitenedSignature(s, columns[:, end - len(s.sign) : end].copy())
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What is kept of a signature: its log Bayes factor (1 + draws,), the recordings' first; its
+    other parameters; its log share among all that were tried of the same candidate.
+    """
+
+    evidence: Array
+    fixed: dict[str, float]
+    prior: float
+
+    @property
+    def recorded(self) -> float:
+        return float(self.evidence[0])
 
 
 def screen_signatures(
     projection: Projection,
-    signatures: Sequence[WhitenedSignature],
+    signatures: Iterable[WhitenedSignature],
     searched: Mapping[Shape, Array] | None = None,
 ) -> Screen:
     """Evidence of each candidate (averaged over its signatures) and its largest in every surrogate.
 
     searched: shapes that were tried elsewhere (scans.py), with their averages (1 + draws,).
     """
-    if not signatures:
+    weighed: dict[Candidate, list[Weighed]] = {}
+    best: dict[Candidate, tuple[float, Signature]] = {}
+    for some in some_of(signatures):
+        for s, evidence in zip(some, _evidence(projection, some), strict=True):
+            of, value = s.signature.of, float(evidence[0])
+            weighed.setdefault(of, []).append(
+                Weighed(evidence, s.signature.fixed, s.signature.prior)
+            )
+            if of not in best or value > best[of][0]:
+                best[of] = value, s.signature
+
+    if not weighed:
         return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
+    return _ranked(weighed, {of: s for of, (_, s) in best.items()}, searched or {})
 
-    weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]] = {}
-    for some in _some(signatures):
-        projected = projection.project_all(np.column_stack([s.columns for s in some]))
-        ends = np.cumsum([s.columns.shape[1] for s in some])
-        for s, end in zip(some, ends, strict=True):
-            own = slice(end - s.columns.shape[1], end)
-            value = log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
-            weighed.setdefault(s.signature.of, []).append((value, s))
 
-    return _ranked(weighed, searched or {})
+def _evidence(projection: Projection, some: Sequence[WhitenedSignature]) -> Iterator[Array]:
+    """Log Bayes factor (1 + draws,) of every signature."""
+    projected = projection.project_all(np.column_stack([s.columns for s in some]))
+    ends = np.cumsum([s.columns.shape[1] for s in some])
+    for s, end in zip(some, ends, strict=True):
+        own = slice(end - s.columns.shape[1], end)
+        yield log_evidence(projected.a[own, own], projected.b[own], s.signature.sign)
 
 
 def _ranked(
-    weighed: dict[Candidate, list[tuple[Array, WhitenedSignature]]], searched: Mapping[Shape, Array]
+    weighed: Mapping[Candidate, Sequence[Weighed]],
+    best: dict[Candidate, Signature],
+    searched: Mapping[Shape, Array],
 ) -> Screen:
-    """From the log Bayes factors of every signature (1 + draws,), the recordings' first."""
-    best: dict[Candidate, WhitenedSignature] = {}
+    """From every signature that was weighed, and the likeliest of each candidate."""
     fixed: dict[Candidate, list[dict[str, float]]] = {}
     means: dict[Candidate, Array] = {shape: mean for shape, mean in searched.items()}
-    for candidate, tried in weighed.items():
-        tried.sort(key=lambda item: -item[0][0])
-        fixed[candidate] = [s.signature.fixed for _, s in tried]
-        best[candidate] = tried[0][1]
-        prior = np.array([s.signature.prior for _, s in tried])[:, None]
-        means[candidate] = log_sum(np.stack([v for v, _ in tried]) + prior)
+    for candidate, every in weighed.items():
+        tried = sorted(every, key=lambda one: -one.recorded)
+        fixed[candidate] = [one.fixed for one in tried]
+        prior = np.array([one.prior for one in tried])[:, None]
+        means[candidate] = log_sum(np.stack([one.evidence for one in tried]) + prior)
 
     usual = {of: _usual(mean[1:]) for of, mean in means.items()}
     surprises = [(mean[1:] - usual[of][0]) / usual[of][1] for of, mean in means.items()]

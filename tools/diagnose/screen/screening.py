@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from gritd.estimator.effects.base import Effect
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom
@@ -74,7 +76,7 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
         base.model,
         base.forms,
         smooth_signatures(stack),
-        families(stack, noise, drawn, judged),
+        families(stack, noise, judged),
         judged,
         drawn,
     )
@@ -86,14 +88,19 @@ def screen_of_base(screening: Screening) -> Screen:
     if problem.stack.referred:
         return replace(_screen_beside_reference(screening, model), ripple=_ripple(problem))
     effects = _signatures(problem, model)
-    signatures = [*effects, *screening.functions, *_strains(problem, model)]
-    beside = without_harmonics(problem, model.fitted, drawn)
-    searched = {family.shape: family.average(beside) for family in screening.families}
+    signatures = chain(effects, screening.functions, _strains(problem, model))
+    searched = _averages(screening, model)
     projection = model.fitted.projection(drawn)
     screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
     return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
+
+
+def _averages(screening: Screening, model: Model) -> dict[Shape, Array]:
+    """Log Bayes factor (1 + draws,) of every family of waves or steps beside a model."""
+    beside = without_harmonics(screening.problem, model.fitted, screening.surrogates)
+    return {family.shape: family.average(beside) for family in screening.families}
 
 
 def _ripple(problem: Problem) -> float:
@@ -108,7 +115,8 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     problem, stack = screening.problem, screening.problem.stack
     projection = model.fitted.projection(screening.surrogates)
     effects = _signatures(problem, model, everywhere=True)
-    both = whitened(problem.noise, [*effects, *smooth_signatures(stack, everywhere=True)])
+    smooth = smooth_signatures(stack, everywhere=True)
+    both = list(whitened(problem.noise, chain(effects, smooth)))
 
     alone = projection.of_rows(~stack.new)  # what is new must not tell what is usual
     usual = habits(alone, both, stack)
@@ -121,7 +129,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     searched = {family.shape: family.average(beside) for family in screening.families}
     screen = screen_signatures(projection, both, searched)
 
-    of_reference = families(stack, problem.noise, screening.surrogates, ~stack.new)
+    of_reference = families(stack, problem.noise, ~stack.new)
     rest = beside.of_rows(~stack.new)
     shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
     return screen.beside_reference({**shapes, **usual})
@@ -186,7 +194,7 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
     }
 
     chosen = [
-        screen.best[of].signature if of in screen.best else peaks[of]
+        screen.best[of] if of in screen.best else peaks[of]
         for of in standing
         if of in screen.best or of in peaks
     ]

@@ -34,7 +34,7 @@ class Screen:
     counted: float = tuned(10.0, "nulls", "that must reach a value for its chance to be counted")
     trusted_tail: float = tuned(0.1, "-", "of the least chance that can be counted", TAIL)
 
-    at_once: int = tuned(24, "signatures", "whitened and projected at once", "memory")
+    at_once: int = tuned(12, "signatures", "whitened and projected at once", "memory")
 
     # --- screening.py ---
     nulls: int = tuned(300, "draws", "of noise alone", "run time")

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
@@ -170,9 +171,9 @@ def power(search: Search, screen: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size."""
     projection = search.base.fitted.projection()
     seen = []
-    for name, ready in screen.best.items():
+    for name, likeliest in screen.best.items():
         if isinstance(name, str):
-            a, _ = projection.project(ready.columns)
+            a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
             seen.append(screen.surprise(name, float(gain)) > screen.threshold)
     return float(np.mean(seen)) if seen else 0.0

@@ -69,7 +69,7 @@ def _chosen(screening: Screening, model: Model) -> tuple[list[Signature], float]
     if not functions:
         return [], 0.0
     projection = without_harmonics(screening.problem, model.fitted)
-    ready = whitened(screening.problem.noise, functions)
+    ready = list(whitened(screening.problem.noise, functions))
     a, b = projection.project(np.column_stack([w.columns for w in ready]))
     ends = np.cumsum([w.columns.shape[1] for w in ready])
     parts = [np.arange(end - w.columns.shape[1], end) for w, end in zip(ready, ends, strict=True)]

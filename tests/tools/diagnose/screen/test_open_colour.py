@@ -76,7 +76,7 @@ def test_a_friction_stands_out_of_noise_of_any_colour() -> None:
         search = begun(plan(slow=slow, slow_time=1.0), "coulomb_friction", axle=False)
         found = search.first
         assert found.alarmed
-        friction = found.best["coulomb_friction"].signature
+        friction = found.best["coulomb_friction"]
         gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
         assert gain > max(0.5 * found.evidence["coulomb_friction"], TUNING.screen.sure)
 
@@ -85,6 +85,6 @@ def test_a_loss_of_the_drive_that_is_read_off_stands_out_too() -> None:
     """A steady loss could in part be slow noise of the two torques' difference: never all."""
     search = begun(plan(slow=0.3), "coulomb_friction")
     assert search.first.alarmed
-    friction = search.first.best["coulomb_friction"].signature
+    friction = search.first.best["coulomb_friction"]
     gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
     assert gain > 20.0 * TUNING.screen.sure

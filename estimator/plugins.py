@@ -39,8 +39,8 @@ def _loaded(entry: EntryPoint) -> Any:
     try:
         return entry.load()
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
-        raise refused(entry.group, entry.name, f"cannot be loaded: {said}") from error
+        cause = f"{type(error).__name__}: {error}"
+        raise refused(entry.group, entry.name, f"cannot be loaded: {cause}") from error
 
 
 def refused(group: str, name: str, why: str) -> PluginError:

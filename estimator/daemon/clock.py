@@ -52,8 +52,8 @@ def _ns(moment: datetime) -> int:
 
 
 def _notice(wall: int) -> str:
-    said = EPOCH + timedelta(seconds=wall // NS)
+    date = EPOCH + timedelta(seconds=wall // NS)
     return (
-        f"the wall clock says {said:%Y-%m-%d %H:%M:%S}, which is not believed: stamps are the time "
+        f"the wall clock says {date:%Y-%m-%d %H:%M:%S}, which is not believed: stamps are the time "
         f"since the computer started, counted from {FALLBACK:%Y-%m-%d}"
     )

@@ -43,14 +43,14 @@ class Feed:
             self.unfed = f"{status.name} {', '.join(wrong)}".rstrip()
 
     def _begun(self, wrong: Mapping[str, str], now: float) -> tuple[Notice, ...]:
-        said = []
+        notices = []
         for what in (STALE, STUCK):
             known = {name for name, (word, _) in self._troubled.items() if word == what}
             names = [name for name, word in wrong.items() if word == what and name not in known]
             self._troubled.update({name: (what, now) for name in names})
             if names:
-                said.append(Notice(f"{_channels(names)}: {what}"))
-        return tuple(said)
+                notices.append(Notice(f"{_channels(names)}: {what}"))
+        return tuple(notices)
 
     def _ended(self, wrong: Mapping[str, str], now: float) -> tuple[Notice, ...]:
         names = [name for name in self._troubled if name not in wrong]

@@ -20,7 +20,7 @@ from gritd.tools.cli.workers import workers
 One = Callable[[Path], int]  # replays a recording; its exit code
 
 
-class Said(NamedTuple):
+class Printed(NamedTuple):
     """What came of a recording."""
 
     code: int
@@ -34,7 +34,7 @@ def each(paths: Sequence[Path], one: One, jobs: int) -> int:
     can be pickled.
     """
     with workers(min(jobs, len(paths)), None) as (pool, _):
-        waiting = [pool.submit(_said, one, path) for path in paths]
+        waiting = [pool.submit(_printed, one, path) for path in paths]
         try:
             return _told(waiting)
         finally:
@@ -42,24 +42,24 @@ def each(paths: Sequence[Path], one: One, jobs: int) -> int:
                 future.cancel()
 
 
-def _told(waiting: Sequence[Future[Said]]) -> int:
+def _told(waiting: Sequence[Future[Printed]]) -> int:
     """Print what is said in order, up to the first error."""
     code = DONE
 
     with Progress("replaying", len(waiting)) as progress:
         for future in waiting:
-            said = future.result()
+            result = future.result()
             progress.advance()
-            sys.stdout.write(said.output)
-            sys.stderr.write(said.complaints)
-            if said.failed:
-                return said.code
-            code = max(code, said.code)
+            sys.stdout.write(result.output)
+            sys.stderr.write(result.complaints)
+            if result.failed:
+                return result.code
+            code = max(code, result.code)
 
     return code
 
 
-def _said(one: One, path: Path) -> Said:
+def _printed(one: One, path: Path) -> Printed:
     """A recording in this process."""
     Progress.shown = False
     output, complaints, returned = StringIO(), StringIO(), list[int]()
@@ -70,4 +70,4 @@ def _said(one: One, path: Path) -> Said:
 
     with redirect_stdout(output), redirect_stderr(complaints):
         code = guarded(run)
-    return Said(code, output.getvalue(), complaints.getvalue(), not returned)
+    return Printed(code, output.getvalue(), complaints.getvalue(), not returned)

@@ -134,11 +134,11 @@ def _line(one: Mapping[str, Any]) -> str:
         f"{kind}: c {end['c']['off']:+.1f}, tan φ {end['tan_phi']['off']:+.1f} σ"
         for kind, end in every.items()
     ]
-    said = " then ".join(
+    verdicts = " then ".join(
         f"{told['verdict']} ({', '.join(told['names']) or 'no name'})"
         for told in (one, one["then"])
     )
-    return f"{one['world']} {one['seed']} {said}; {'; '.join(parts)}"
+    return f"{one['world']} {one['seed']} {verdicts}; {'; '.join(parts)}"
 
 
 def summary(told: Sequence[Mapping[str, Any]]) -> Iterator[str]:

@@ -308,7 +308,7 @@ def _outline(row: np.void) -> tuple[Array, Array]:
 
 def _sensors(campaign: Campaign) -> Markup:
     """Rate, gaps and longest silence of every channel, over all runs; what the filter said."""
-    said = [
+    lines = [
         tag(
             "li",
             f"{run.name}: updated in {percent(_tracked(run))} of its windows, "
@@ -321,7 +321,7 @@ def _sensors(campaign: Campaign) -> Markup:
     note = f"A gap is more than {LATE:g} times the usual distance of two readings."
     return section(
         "The sensors and the filter",
-        tag("ul", said),
+        tag("ul", lines),
         table(head, _channels(campaign.runs), numbers=2),
         tag("p", note, class_="note"),
     )

@@ -152,8 +152,8 @@ def _rounded(value: float, digits: int) -> Uncertain:
 
 
 def _untold(sizes: Array, why: str) -> str:
-    plates = ", ".join(f"{2e3 * size:g}" for size in sizes.tolist())
-    return f"plates of {plates} mm {why}; it is written as 0"
+    diameters = ", ".join(f"{2e3 * size:g}" for size in sizes.tolist())
+    return f"plates of {diameters} mm {why}; it is written as 0"
 
 
 def _rows(tests: Sequence[Press], moduli: Array, each: Array) -> Iterable[str]:

@@ -36,8 +36,8 @@ def main(argv: Sequence[str]) -> int:
 
     def write(runs: Runs) -> None:
         of = f"It was begun on {Kept(given.results).begun}."
-        said = by_hand(given.out.read_text(encoding="utf-8")) if given.out.exists() else ""
-        given.out.write_text(page(runs, given.fields, folders, of, said), encoding="utf-8")
+        shown = by_hand(given.out.read_text(encoding="utf-8")) if given.out.exists() else ""
+        given.out.write_text(page(runs, given.fields, folders, of, shown), encoding="utf-8")
         print(f"{given.out}: {len(runs.moved)} diagnoses of {len(runs.cases(given.fields))}")
 
     for runs in run(chosen, given.results, given.fields, given.jobs, given.minutes):

@@ -41,9 +41,9 @@ def page(
     only: Collection[str] = (),
     campaigns: Collection[str] = (),
     of: str = "",
-    said: str = "",
+    shown: str = "",
 ) -> str:
-    """campaigns: all of the folder; of: what the table was made of; said: the part by hand."""
+    """campaigns: all of the folder; of: what the table was made of; shown: the part by hand."""
     asked = [f for f in every_field() if any(c.field == f for c in runs.moved)]
     table = [
         "| number | value | runs | verdicts | names | Δp | Δtan φ |",
@@ -54,7 +54,7 @@ def page(
     parts = [
         HEAD,
         _extent(runs, only, campaigns, of),
-        said,
+        shown,
         TABLE,
         _summary(runs),
         "\n".join(table),

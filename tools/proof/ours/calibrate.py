@@ -75,11 +75,11 @@ def _true(names: Sequence[str], truth: Sequence[str], held: Collection[str]) -> 
     """
     asked = {alike(name) for name in truth}
     own = {alike(name) for name in held}
-    said = {alike(name) for name in names}
-    said = {group for group in said if group in asked or group not in own}
-    if not said or not asked:
-        return float(not said and not asked)
-    return len(said & asked) / len(said | asked)
+    named = {alike(name) for name in names}
+    named = {group for group in named if group in asked or group not in own}
+    if not named or not asked:
+        return float(not named and not asked)
+    return len(named & asked) / len(named | asked)
 
 
 def log_truth(case: Case, by: Calibration) -> float:

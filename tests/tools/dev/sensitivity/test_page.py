@@ -61,7 +61,7 @@ def test_what_a_person_wrote_stays(tmp_path: Path) -> None:
     runs = finished(tmp_path)
     written = page(runs).replace("## The table", "## What it shows\n\nMuch.\n\n## The table")
     assert by_hand(page(runs)) == ""
-    assert page(runs, said=by_hand(written)) == written
+    assert page(runs, shown=by_hand(written)) == written
 
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:

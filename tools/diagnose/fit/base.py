@@ -13,7 +13,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
-from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model
+from gritd.tools.diagnose.fit.marginal import Chosen
+from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
@@ -81,6 +82,14 @@ def refit_beside(rough: BaseFit, noise: Noise, more: Sequence[Freedom]) -> BaseF
     start = (rough.fitted.u, np.zeros(0))
     model = fit_model(problem, forms, (), (), start, tuple(0 for _ in forms))
     return BaseFit(problem, model, forms)
+
+
+def sized_beside(start: BaseFit, noise: Noise, more: Sequence[Freedom], sizes: Chosen) -> BaseFit:
+    """The same with given sizes of all freedoms."""
+    problem = in_noise(start, noise)
+    forms = (*form_freedoms(problem.stack, noise), *more)
+    begins = (start.fitted.u, np.zeros(0))
+    return BaseFit(problem, sized_model(problem, forms, begins, sizes), forms)
 
 
 def in_noise(rough: BaseFit, noise: Noise) -> Problem:

@@ -26,7 +26,7 @@ def form_freedoms(stack: Stack, noise: Noise) -> tuple[Freedom, ...]:
         columns = _columns(stack, source)
         if columns.shape[1]:
             sizes = _drive_sizes() if source.drive else _form_sizes()
-            freedoms.append(freedom(source.name, columns, noise, sizes))
+            freedoms.append(freedom(source.name, columns, noise, sizes, of_form=not source.drive))
     return tuple(freedoms)
 
 

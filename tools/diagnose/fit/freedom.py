@@ -33,6 +33,7 @@ class Freedom:
     """Columns (N, m) for a size of 1, in the channels' units and in those of independent noise.
 
     least: the number of the smallest size that counts for the uncertainty of the constants.
+    of_form: whether it is what the equations of a wheel in soil miss of some channel.
     """
 
     name: str
@@ -40,8 +41,16 @@ class Freedom:
     whitened: Array
     sizes: Sizes
     least: int = 0
+    of_form: bool = False
 
 
-def freedom(name: str, columns: Array, noise: Noise, sizes: Sizes, least: int = 0) -> Freedom:
+def freedom(
+    name: str,
+    columns: Array,
+    noise: Noise,
+    sizes: Sizes,
+    least: int = 0,
+    of_form: bool = False,
+) -> Freedom:
     """The freedom of columns (N, m) in the channels' units."""
-    return Freedom(name, columns, whiten(noise, columns), sizes, least)
+    return Freedom(name, columns, whiten(noise, columns), sizes, least, of_form)

@@ -141,12 +141,20 @@ class Marginal:
         """The sizes about the likeliest ones that count for what is not known, and their
         probabilities.
         """
-        about = tuple(max(n, f.least) for n, f in zip(chosen, self.freedoms, strict=True))
+        least = self._least(chosen)
+        about = tuple(max(n, low) for n, low in zip(chosen, least, strict=True))
         every = {about, *(c for n in range(len(about)) for c in self._along(about, n))}
-        least = [f.least for f in self.freedoms]
         ordered = sorted(c for c in every if all(n >= low for n, low in zip(c, least, strict=True)))
         values = np.array([self.log_evidence(c) for c in ordered])
         return ordered, np.asarray(np.exp(values - log_sum(values)))
+
+    def _least(self, chosen: Chosen) -> Chosen:
+        """The smallest sizes that count for what is not known. Where the equations miss one channel
+        by much, no other one is right to the last digit: the soil would be bent until it seems so.
+        """
+        of_form = [n for n, f in zip(chosen, self.freedoms, strict=True) if f.of_form]
+        alike = max(of_form, default=0) - TUNING.fit.form_apart
+        return tuple(max(f.least, alike) if f.of_form else f.least for f in self.freedoms)
 
     def _posterior(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
         """Mean (w,) and covariance of some unknowns for given sizes, times their scale."""

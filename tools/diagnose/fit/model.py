@@ -95,6 +95,15 @@ def fit_model(
     return Model(final, names, evidence, sizes, shapes, marginal, chosen)
 
 
+def sized_model(
+    problem: Problem, forms: Sequence[Freedom], start: tuple[Array, Array], sizes: Chosen
+) -> Model:
+    """Without effects, the forms of given sizes."""
+    fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend((), (), *start)
+    marginal = Marginal(fitted, problem.tolerance, forms)
+    return Model(fitted, (), marginal.log_evidence(sizes), sizes, (), marginal, sizes)
+
+
 def plain_model(problem: Problem, fitted: Fitted) -> Model:
     """A fit without freedoms."""
     names = tuple(effect.name for effect in fitted.acting)

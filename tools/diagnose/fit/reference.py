@@ -4,14 +4,20 @@ The reference has three things of its own that no explanation is asked for: a di
 the library's effects in both campaigns (shared.py), and noise. Noise is what the reference leaves
 beside the other two as they were *fitted*: what their priors do not let them follow counts as
 noise.
+
+All three are told by the reference alone. A size that the new campaign may raise takes what is new
+for what is usual: some effects of both campaigns that cancel where the reference drove are never
+amiss in it.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.base import BaseFit, refit_beside
+from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.shared import rippling_columns, shared_columns, shared_freedoms
 from gritd.tools.diagnose.noise.colour import Noise
@@ -27,19 +33,27 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     shared = shared_columns(stack, rough.fitted.u, rough.fitted.predicted)
     none = np.zeros((stack.size, 0))
     noise = _least_noise(rough, shared, none, rng)
-    first = refit_beside(rough, noise, shared_freedoms(noise, shared, none))
+    first = _of_reference(rough, noise, shared, none)
 
     ripples = rippling_columns(stack, left(first))
     again = first
     if ripples.shape[1]:
         noise = _least_noise(rough, shared, ripples, rng)
-        again = refit_beside(first, noise, shared_freedoms(noise, shared, ripples))
+        again = _of_reference(first, noise, shared, ripples)
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
-    estimated = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
-    noise = restless(louder(noise, estimated), stack.measured - predicted)
-    return refit_beside(again, noise, shared_freedoms(noise, shared, ripples))
+    found = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
+    noise = restless(louder(noise, found), stack.measured - predicted)
+
+    usual = _of_reference(again, noise, shared, ripples)
+    return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)
+
+
+def _of_reference(start: BaseFit, noise: Noise, shared: Array, ripples: Array) -> BaseFit:
+    """The reference alone, fitted with all its freedoms: the new campaign says nothing."""
+    blind = replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
+    return refit_beside(start, blind, shared_freedoms(blind, shared, ripples))
 
 
 def left(base: BaseFit) -> Array:

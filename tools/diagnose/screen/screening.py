@@ -24,6 +24,7 @@ from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.screen.covered import covered
 from gritd.tools.diagnose.screen.habit import habits
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
+from gritd.tools.diagnose.screen.open_form import gain_with_form_open
 from gritd.tools.diagnose.screen.ripples import loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
 from gritd.tools.diagnose.screen.screen import (
@@ -86,7 +87,8 @@ def screen_of_base(screening: Screening) -> Screen:
     """Evidence for an effect, and for a misfit without a name, beside the base model."""
     problem, model, drawn = screening.problem, screening.base, screening.surrogates
     if problem.stack.referred:
-        return replace(_screen_beside_reference(screening, model), ripple=_ripple(problem))
+        screen = _screen_beside_reference(screening, model)
+        return replace(screen, open=_open_form(screening, model, screen), ripple=_ripple(problem))
     effects = _signatures(problem, model)
     signatures = chain(effects, screening.functions, _strains(problem, model))
     searched = _averages(screening, model)
@@ -123,7 +125,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
 
     elsewhere = ~screening.judged
     for s in both:  # in their place: together they are large
-        s.signature.columns[elsewhere] = 0.0
+        s.signature.columns[~stack.new] = 0.0
         s.columns[elsewhere] = 0.0
     beside = without_harmonics(problem, model.fitted, screening.surrogates)
     searched = {family.shape: family.average(beside) for family in screening.families}
@@ -187,17 +189,7 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
     """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
     the search.
     """
-    standing = screen.stands_out[: TUNING.screen.weighed]
-    searched = [family for family in screening.families if family.shape in standing]
-    peaks: dict[Candidate, Signature] = {
-        s.shape.family: s for s in reversed(candidates(searched, screening.problem, model.fitted))
-    }
-
-    chosen = [
-        screen.best[of] if of in screen.best else peaks[of]
-        for of in standing
-        if of in screen.best or of in peaks
-    ]
+    chosen = _standing_out(screening, model, screen)
     if not chosen:
         return np.inf
 
@@ -207,3 +199,28 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
         if most > TUNING.screen.sure:
             break
     return most
+
+
+def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
+    """The evidence of what is new with the sizes of what the rig does anyway open [nats]."""
+    if not screen.stands_out:
+        return np.inf
+    every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
+    return gain_with_form_open(screening.problem, model, every)
+
+
+def _standing_out(screening: Screening, model: Model, screen: Screen) -> list[Signature]:
+    """The most surprising candidates, each as it is likeliest."""
+    every = {**screen.best, **_peaks(screening, model, screen)}
+    return [every[of] for of in _most_surprising(screen) if of in every]
+
+
+def _peaks(screening: Screening, model: Model, screen: Screen) -> dict[Candidate, Signature]:
+    """Of the waves and steps among these each where it is likeliest."""
+    searched = [f for f in screening.families if f.shape in _most_surprising(screen)]
+    peaks = candidates(searched, screening.problem, model.fitted)
+    return {s.shape.family: s for s in reversed(peaks)}
+
+
+def _most_surprising(screen: Screen) -> list[Candidate]:
+    return screen.stands_out[: TUNING.screen.weighed]

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
-from gritd.tools.diagnose.fit.projection import ResizedProjections
+from gritd.tools.diagnose.fit.settings import Settings, settings_of
 from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
@@ -142,17 +142,6 @@ class Promise:
     sizes: Chosen
 
 
-@dataclass(frozen=True)
-class Settings:
-    """A model with several sizes of its forms; costs: log evidence that the model alone loses by
-    each [nats].
-    """
-
-    sizes: Sequence[Chosen]
-    costs: Sequence[float]
-    projections: ResizedProjections
-
-
 def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
     """With fits of the model and one more effect each."""
     candidates = [p for p in promises(search, model) if p.gain > TUNING.search.promising]
@@ -169,7 +158,7 @@ def promises(search: Search, model: Model) -> list[Promise]:
     so it may do better than linear algebra by a share.
     """
     effects = search.problem.stack.rig.effects
-    settings, habit = _settings(search, model), search.first.habit
+    settings, habit = settings_of(search.problem, model), search.first.habit
 
     promised = []
     for name in (n for n in effects if n not in model.names and n in search.first.fixed):
@@ -180,34 +169,6 @@ def promises(search: Search, model: Model) -> list[Promise]:
             promised.append(replace(best, gain=best.gain - usual))
 
     return sorted(promised, key=lambda promise: -promise.gain)
-
-
-def _settings(search: Search, model: Model) -> Settings:
-    """The model as it is, then with smaller forms."""
-    marginal, bends, fitted = model.marginal, model.chosen[len(model.sizes) :], model.fitted
-    if marginal is None:
-        as_it_is = np.ones(fitted.penalty.size)
-        return Settings([model.sizes], [0.0], fitted.resized([as_it_is]))
-
-    freedoms = marginal.freedoms
-    every = fitted.allowed(search.problem.with_freedoms(freedoms, [1.0] * len(freedoms)).allowance)
-    own = np.ones(every.penalty.size - sum(f.columns.shape[1] for f in freedoms))
-
-    smaller = _smaller(model.sizes)
-    costs, factors = [], []
-    for chosen in ((*sizes, *bends) for sizes in smaller):
-        values = [f.sizes.values[n] for f, n in zip(freedoms, chosen, strict=True)]
-        sized = [np.full(f.columns.shape[1], v) for f, v in zip(freedoms, values, strict=True)]
-        factors.append(np.concatenate((own, *sized)))
-        costs.append(marginal.log_evidence(model.chosen) - marginal.log_evidence(chosen))
-    return Settings(smaller, costs, every.resized(factors))
-
-
-def _smaller(sizes: Chosen) -> list[Chosen]:
-    """Sizes as they are, all smaller by steps, and each alone at its smallest."""
-    steps = [tuple(max(n - k, 0) for n in sizes) for k in range(max(sizes, default=0) + 1)]
-    alone = [(*sizes[:i], 0, *sizes[i + 1 :]) for i in range(len(sizes))]
-    return list(dict.fromkeys([*steps, *alone]))
 
 
 def _tried(
@@ -222,8 +183,7 @@ def _tried(
             continue
 
         columns = whiten(problem.noise, made.columns)
-        projected = settings.projections.project(columns)
-        for sizes, cost, (a, b) in zip(settings.sizes, settings.costs, projected, strict=True):
+        for sizes, cost, a, b in settings.project(columns):
             gain = (1.0 + TUNING.search.curved) * float(log_evidence(a, b, made.sign)) - cost
             yield Promise(gain, effect, _start(effect, made, a, b), sizes)
 

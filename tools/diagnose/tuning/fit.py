@@ -72,6 +72,12 @@ class Fit:
         "judgement",
     )
     form_left_out: float = tuned(3e-3, "-", "variance of the discrepancy that may be left out")
+    form_apart: int = tuned(
+        2,
+        "sizes",
+        "by which the discrepancies of two channels may differ where the soil is told: ten times",
+        PUBLISHED,
+    )
     form_turn: float = tuned(
         0.2, "-", "size of what goes with the wheel's angle, in that of the discrepancy"
     )

@@ -40,6 +40,7 @@ def plan(
     seed: int = 1,
     reverse: bool = False,
     stop: bool = False,
+    pace: float = 1.0,
 ) -> Plan:
     """One run a load; three slips and speeds each, in another order each run."""
     motions = []
@@ -47,7 +48,7 @@ def plan(
         order = np.roll(SLIPS, number)
         each = seconds / len(order)
         rest = [Segment(2.0, load, 0.2, 0.0)] if standstill else []
-        speeds = np.roll((0.015, 0.03, 0.022), number // 2)
+        speeds = pace * np.roll((0.015, 0.03, 0.022), number // 2)
         driven = [
             Segment(each, load, float(s), float(v)) for s, v in zip(order, speeds, strict=True)
         ]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gritd.estimator.effects import make
 from gritd.estimator.effects.base import Effect
@@ -31,6 +32,14 @@ def rig_of(habits: Sequence[Effect], new: Sequence[Effect]) -> WheelRig:
     """A reference campaign with habits, and one with something new beside them."""
     before = record(plan(seed=3, seconds=24.0, wrench=False), habits)
     after = record(plan(seed=4, seconds=24.0, wrench=False), (*habits, *new))
+    moved = [replace(s, name=f"new-{s.name}") for s in after]
+    return WheelRig([*before, *moved], settings(), len(before), "same")
+
+
+def elsewhere(new: Sequence[Effect]) -> WheelRig:
+    """A rig as the library has it; the new campaign is driven at two thirds of the speed."""
+    before = record(plan(seed=3), ())
+    after = record(plan(seed=4, pace=0.66), new)
     moved = [replace(s, name=f"new-{s.name}") for s in after]
     return WheelRig([*before, *moved], settings(), len(before), "same")
 
@@ -61,3 +70,24 @@ def test_the_reference_tells_what_its_single_runs_show() -> None:
     loud = max(screen.evidence, key=lambda of: screen.evidence[of])
     raised = screen.beside_reference({loud: screen.evidence[loud]})
     assert raised.surprise(loud) < 0.0 < screen.surprise(loud)
+
+
+def test_friction_that_is_new_is_not_taken_for_one_that_the_reference_hides() -> None:
+    """Frictions of both campaigns that cancel at the reference's speeds could explain any other
+    loss at others. The reference shows none, and that counts.
+    """
+    base = fit_base(elsewhere((make("coulomb_friction", {"loss": 0.12}),)), _rng())
+    both = next(n for n, f in enumerate(base.forms) if f.name == "effects in both")
+    assert base.model.sizes[both] == 0
+
+    screen = screen_of_base(prepare_screening(base, _rng()))
+    assert screen.alarmed
+    assert screen.surprise("coulomb_friction") > screen.threshold
+    assert not screen_of_base(prepare_screening(fit_base(elsewhere(()), _rng()), _rng())).alarmed
+
+
+def test_the_new_campaign_does_not_tell_the_noise_or_the_sizes() -> None:
+    quiet, loud = (fit_base(elsewhere(new), _rng()) for new in ((), (NEW,)))
+    assert quiet.model.sizes == loud.model.sizes
+    for one, other in zip(quiet.problem.noise.colours, loud.problem.noise.colours, strict=True):
+        assert other.sigma == pytest.approx(one.sigma, rel=0.2)

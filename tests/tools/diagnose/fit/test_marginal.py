@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -67,3 +68,20 @@ def test_the_evidence_is_the_density_of_the_recordings() -> None:
     prior = sum(SIZES.log_prior[number] for number in chosen)
     expected = density + 0.5 * N * np.log(2.0 * np.pi) + prior
     assert marginal.log_evidence(chosen) == pytest.approx(expected)
+
+
+def test_the_soil_is_told_with_no_channel_exact_beside_one_missed_by_much() -> None:
+    """Where the equations miss one channel by its largest size, the smallest of another counts for
+    the evidence, and not for what is known of the soil.
+    """
+    marginal, _ = _marginal(0)
+    loose, _ = _marginal(0)
+    sizes = Sizes((0.0, 0.003, 0.01, 0.03, 0.1, 0.3), (1.0,) * 6)
+    for one, of_form in ((marginal, True), (loose, False)):
+        one.freedoms = tuple(replace(f, sizes=sizes, of_form=of_form) for f in one.freedoms)
+
+    chosen = (5, 0)
+    assert marginal._least(chosen) == (3, 3)
+    assert loose._least(chosen) == (0, 0)
+    assert marginal.log_evidence(chosen) == loose.log_evidence(chosen)
+    assert all(min(sizes) >= 3 for sizes in marginal._weighed(chosen)[0])

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.effects import make
+from gritd.tools.diagnose.fit.settings import _smaller, settings_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import _bare, _settings, _smaller, _tried, begin, promises
+from gritd.tools.diagnose.search.search import _bare, _tried, begin, promises
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -36,7 +37,7 @@ def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
     bare = _bare(search, search.base)
     assert max(bare.sizes) > 0
 
-    kind, every = rig.effects["bulldozing"], _settings(search, bare)
+    kind, every = rig.effects["bulldozing"], settings_of(search.problem, bare)
     assert (every.sizes[0], every.costs[0]) == (bare.sizes, 0.0)
     tried = list(_tried(search, bare, kind, every))
     as_it_is = max(p.gain for p in tried if p.sizes == bare.sizes)

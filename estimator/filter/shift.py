@@ -112,7 +112,7 @@ def true_integrals(
     wheel: Wheel, soil: Soil, effects: tuple[Effect, ...], theta_1: Array, slip: Array
 ) -> Integrals:
     """A₁ … C₃ over θ₁ of the original stresses with the contact effects; θ₁, i and the results have
-    one shape.
+    one shape (n,).
 
     Forces are linear in c and σₘ, so three evaluations with unit soils pick the integrals out.
     """

@@ -155,8 +155,8 @@ def _slope(slope: Array, step: Array, change: Array) -> Array:
 
 
 def bekker_entry_angle(wheel: Wheel, soil: Soil, load: Array) -> Array:
-    """First guess of θ₁ [rad] without shear: z = [3W/((3 − n) b K √(2r))]^(2/(2n + 1)), Bekker
-    (1969).
+    """First guess of θ₁ (n,) [rad] under a load (n,) [N], without shear: z = [3W/((3 − n) b K
+    √(2r))]^(2/(2n + 1)), Bekker (1969).
     """
     n = np.minimum(soil.exponent, 2.5)
     carried = (3.0 - n) * wheel.width * np.asarray(soil.modulus) * np.sqrt(2.0 * wheel.radius)

@@ -221,7 +221,7 @@ def normal_stress(theta_1: Scalar, theta_m: Scalar, sigma_m: Scalar, theta: Scal
 def triangular_shear_stress(
     theta_1: Scalar, theta_m: Scalar, tau_m: Scalar, tau_0: Scalar, theta: Scalar
 ) -> Array:
-    """Triangular τ [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom
+    """Triangular τ (n,) [Pa], Eqs. (13) and (14): from 0 at θ₁ to τₘ at θₘ, and on to τ₀ at bottom
     dead centre.
 
     The authors' 2004 paper takes τ₀ = c. (20)-(22) do not use this triangle but (c + σ tan φ) g

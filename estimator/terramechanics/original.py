@@ -86,7 +86,9 @@ def arc(theta_1: Scalar, theta: Scalar) -> Arc:
 
 
 def front_stress(wheel: Wheel, soil: Soil, front: Arc) -> Array:
-    """Normal stress σ [Pa] between θₘ and θ₁, Eq. (3): K rⁿ (cos θ − cos θ₁)ⁿ; zero ahead of θ₁."""
+    """Normal stress σ (2·order, n) [Pa] between θₘ and θ₁, Eq. (3): K rⁿ (cos θ − cos θ₁)ⁿ; zero
+    ahead of θ₁.
+    """
     stress: Array = soil.modulus * (wheel.radius * np.maximum(front.drop, 0.0)) ** soil.exponent
     return stress
 
@@ -114,7 +116,7 @@ def shear_displacement(wheel: Wheel, slip: Scalar, points: Arc) -> Array:
 
 
 def lateral_displacement(wheel: Wheel, slip: Scalar, points: Arc, side_slip: Scalar) -> Array:
-    """Displacement of the soil across the wheel [m]: r (v/rω)(θ₁ − θ) tan β.
+    """Displacement (2·order, n) of the soil across the wheel [m]: r (v/rω)(θ₁ − θ) tan β.
 
     side_slip is tan β, β the angle between wheel and travel. Shear stress acts along the resultant
     of both displacements: Ishigami et al. (2007), J. Field Robotics 24, 233-250.
@@ -124,8 +126,8 @@ def lateral_displacement(wheel: Wheel, slip: Scalar, points: Arc, side_slip: Sca
 
 
 def janosi(x: Array) -> Array:
-    """Share of the shear strength mobilised at x = j/k, Eq. (2): 1 − e^(−x); odd, so that τ has the
-    sign of j.
+    """Share of the shear strength mobilised at x = j/k (2·order, n), Eq. (2): 1 − e^(−x); odd, so
+    that τ has the sign of j.
 
     Janosi and Hanamoto (1961).
     """
@@ -135,7 +137,7 @@ def janosi(x: Array) -> Array:
 def shear_stress(
     soil: Soil, sigma: Array, displacement: Array, mobilisation: Mobilisation = janosi
 ) -> Array:
-    """Shear stress τ [Pa], Eqs. (2) and (7): (c + σ tan φ)(1 − e^(−j/k))."""
+    """Shear stress τ (2·order, n) [Pa], Eqs. (2) and (7): (c + σ tan φ)(1 − e^(−j/k))."""
     stress: Array = (soil.cohesion + sigma * soil.tan_phi) * mobilisation(
         displacement / soil.shear_modulus
     )

@@ -40,7 +40,7 @@ def mean_of(values: Array) -> Uncertain:
 
 
 def between(seconds: Array, values: Array, begin: float, end: float) -> Plateau | None:
-    """The readings from `begin` to `end` [s]; None where there are fewer than ten."""
+    """The readings (n,) from `begin` to `end` [s]; None where there are fewer than ten."""
     inside = (seconds >= begin) & (seconds <= end)
     return Plateau(begin, end, mean_of(values[inside])) if inside.sum() >= 10 else None
 

@@ -276,7 +276,7 @@ def _levels(at: plot.Axes, of: Scatter, values: Array) -> list[Markup]:
 
 
 def some(x: Array, y: Array) -> tuple[Array, Array]:
-    """As many dots as a picture can show."""
+    """Of dots at x, y (n,) as many as a picture can show."""
     step = max(1, -(-len(x) // SCATTERED))
     return x[::step], y[::step]
 

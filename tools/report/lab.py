@@ -56,7 +56,7 @@ class Beside:
         return float(np.mean(np.abs(computed[good] - measured[good])) / size)
 
     def at(self, index: NDArray[np.intp]) -> Beside:
-        """Some of the windows."""
+        """Some of the windows (n,)."""
         forces = (self.measured, self.original, self.closed)
         chosen = ({name: values[index] for name, values in each.items()} for each in forces)
         return Beside(self.slip[index], self.load[index], *chosen)

@@ -29,7 +29,7 @@ class Course(NamedTuple):
 
     @property
     def away(self) -> Array:
-        """Error of c or of tan φ, whichever is the larger in its σ."""
+        """Error of c or of tan φ (n,), whichever is the larger in its σ."""
         worst: Array = np.max(np.abs(self.error) / self.sigma, axis=1)
         return worst
 

@@ -167,7 +167,7 @@ class DriveRig:
         return np.zeros(predicted.shape)
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> None:
-        """The menu of experiments is a wheel's."""
+        """None: the menu of experiments is a wheel's. Constants u (q,) in prior σ."""
 
     def _run(self, motion: DriveMotion, name: str) -> Run:
         velocity, torque, angle = (

@@ -62,8 +62,8 @@ class Family:
         return (False,) if self.axis == "time" else (False, True)
 
     def evidence(self, beside: Projection, near: Array | None = None) -> Array:
-        """Log Bayes factor (phases, f, 1 + draws) of every shape beside a model; with neighbours,
-        by what it stands out of them.
+        """Log Bayes factor (p, f, 1 + draws) of every shape, p phases, beside a model; with
+        neighbours, by what it stands out of them.
         """
         projected = [beside.project_block(block) for block in self.blocks]
         return np.stack([_weighed(projected, self.at.size, one, near) for one in self.phases])

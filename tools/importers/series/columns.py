@@ -24,7 +24,7 @@ class Column:
     resolution: float = 0.0
 
     def at(self, chosen: NDArray[np.bool_]) -> Column:
-        """The rows that are chosen."""
+        """The rows that are marked (n,)."""
         words = None
         if self.words is not None:
             words = [word for word, keep in zip(self.words, chosen, strict=True) if keep]
@@ -75,6 +75,6 @@ class SeriesTable:
         return ", ".join(self.columns)
 
     def at(self, chosen: NDArray[np.bool_]) -> SeriesTable:
-        """The rows that are chosen."""
+        """The rows that are marked (n,)."""
         columns = {name: column.at(chosen) for name, column in self.columns.items()}
         return SeriesTable(self.path, columns, self.first, self.units)

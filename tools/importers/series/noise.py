@@ -33,7 +33,7 @@ def scatter(seconds: Array, values: Array, resolution: float) -> float:
 
 
 def spacing(values: Array) -> float:
-    """The least step between values that repeat, which are rounded to it; 0 where they do not."""
+    """The least step between values (n,) that repeat, which are rounded to it; 0 where none do."""
     distinct = np.unique(values[np.isfinite(values)])
     if distinct.size < 2 or distinct.size > 0.5 * values.size:
         return 0.0

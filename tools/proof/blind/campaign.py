@@ -182,5 +182,5 @@ def deepest(rig: Rig, ground: Ground, weight: float) -> float:
 
 
 def with_weight(given: Orders, weight: Array) -> Orders:
-    """The same orders under other weights [N]."""
+    """The same orders under other weights (n,) [N]."""
     return replace(given, weight=weight)

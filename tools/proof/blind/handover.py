@@ -115,8 +115,8 @@ def _weight_error(case: Case, weight: float) -> float:
 
 
 def truth(one: Driven, number: int) -> dict[str, Array]:
-    """One run's noiseless channels as the configured calibration shows them, SI, at TRUTH_RATE;
-    time from its start.
+    """One run's noiseless channels (n,) as the configured calibration shows them, SI, at
+    TRUTH_RATE; time from its start.
     """
     felt, known, chain = one.felt[number], one.trial.known, one.trial.chain
     every = round(campaign.RATE / TRUTH_RATE)

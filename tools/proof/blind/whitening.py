@@ -25,7 +25,7 @@ INSTRUMENT = {
 
 
 def channels(felt: Felt, wrench: bool) -> dict[str, Array]:
-    """Every analogue channel that the campaign records; a lifted wheel's sinkage says nothing."""
+    """Every analogue channel (n,) that is recorded; a lifted wheel's sinkage says nothing."""
     down = felt.scene.motion.weight > 1.0
     read = {"sinkage": felt.sinkage * down, "current": felt.current}
     return read | {"pull": felt.pull, "load": felt.load, "torque": felt.torque} if wrench else read

@@ -78,5 +78,5 @@ def _balanced(scene: Scene, radius: float, weight: Array) -> Array:
 
 
 def every_of(time: Array, step: float) -> int:
-    """How many samples make a step [s]."""
+    """How many samples of times (n,) make a step [s]."""
     return max(1, round(step / float(time[1] - time[0])))

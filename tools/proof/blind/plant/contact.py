@@ -108,8 +108,8 @@ def reaction(
 
 
 def exit_angle(rim: Rim, theta_1: Array) -> Array:
-    """−θ₂: where soil that springs back by a share of the sinkage leaves the rim (Ishigami et al.
-    2007).
+    """−θ₂ (n,): where soil that springs back by a share of the sinkage leaves the rim (Ishigami et
+    al. 2007).
     """
     share = np.clip(rim.rebound, 0.0, 1.0)
     return np.asarray(2.0 * np.arcsin(np.sqrt(share) * np.sin(0.5 * theta_1)))
@@ -179,7 +179,7 @@ def sheared(
     ground: Ground, rim: Rim, sigma: Array, jay: Array, sliding: Sliding | None = None
 ) -> tuple[Array, Array]:
     """Shear stress τ along and across the wheel's plane under normal stress σ and displacement j,
-    Eqs. (2), (7). All broadcast.
+    Eqs. (2), (7). All broadcast to (n, nodes).
 
     The stress of a skewed wheel has the direction in which the rim slides (Coulomb). A smooth rim
     grips 1 − s σ/(σ + σ₀) of the soil's strength: the envelope of sand on steel is bent, and
@@ -196,7 +196,8 @@ def sheared(
 
 
 def mobilised(x: Array, rim: Rim) -> Array:
-    """Share of the residual strength mobilised at x = j/k: Eq. (2), and humps that die out.
+    """Share of the residual strength mobilised at x = j/k (n, nodes): Eq. (2), and humps that die
+    out.
 
     P x e^(1 − x) is of the kind of Oida (1979), J. Terramechanics 16: exponential rise and decay
     to a residual. 2 Q tanh y/cosh y, y = 2x, is that of Kacigin and Guskov (1968), J.
@@ -217,5 +218,5 @@ def mobilised(x: Array, rim: Rim) -> Array:
 
 
 def column(value: Array | float) -> Array:
-    """Samples down, nodes across."""
+    """Values (n,) of samples as a column (n, 1), nodes across."""
     return np.asarray(value, dtype=float).reshape(-1, 1)

@@ -58,7 +58,7 @@ class Effect:
         return float(rng.choice((-1.0, 1.0))) if cls.signed else 1.0
 
     def radius(self, radius: Array, motion: Motion) -> Array:
-        """Radius below the axle."""
+        """Radius below the axle (n,) [m]."""
         return radius
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
@@ -68,7 +68,9 @@ class Effect:
         return rim
 
     def carried(self, weight: Array, scene: Scene) -> Array:
-        """Load on the soil. `scene.sinkage` is that of the round before, or empty."""
+        """Load on the soil (n,) [N], of the weight (n,). `scene.sinkage` is that of the round
+        before, or empty.
+        """
         return weight
 
     def forces(self, scene: Scene) -> Scene:
@@ -76,11 +78,11 @@ class Effect:
         return scene
 
     def loss(self, scene: Scene) -> Array | float:
-        """Torque that the drivetrain or the wheel's own body takes, at the axle."""
+        """Torque that the drivetrain or the wheel's own body takes (n,), at the axle [N·m]."""
         return 0.0
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
-        """True current of the motor from that of an ideal one."""
+        """True current (n,) of the motor from that of an ideal one (n,) [A]."""
         return current
 
     def sensed(self, felt: Felt) -> Felt:

@@ -75,7 +75,7 @@ def lanes(scenes: Sequence[Scene], weights: Sequence[Array], step: float) -> Lan
 
 
 def grid(scene: Scene, step: float) -> Array:
-    """The steps of one scene [s]."""
+    """The steps (k,) of one scene [s]."""
     time = scene.motion.time
     return np.asarray(np.arange(time[0], time[-1] + step, step))
 

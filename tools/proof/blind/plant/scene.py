@@ -49,7 +49,7 @@ class Motion:
 
     @property
     def alpha(self) -> Array:
-        """Angular acceleration [rad/s²]."""
+        """Angular acceleration (n,) [rad/s²]."""
         return np.gradient(self.omega, self.step)
 
 
@@ -75,7 +75,7 @@ class Scene:
 
     @property
     def slip(self) -> Array:
-        """1 − v/(rω) when driving, rω/v − 1 when braking."""
+        """(n,): 1 − v/(rω) when driving, rω/v − 1 when braking."""
         return np.where(
             self.ratio <= 1.0, 1.0 - self.ratio, 1.0 / np.maximum(self.ratio, 1.0) - 1.0
         )
@@ -86,7 +86,7 @@ class Scene:
 
 
 def scene_of(rig: Rig, ground: Ground, motion: Motion, radius: Array | None = None) -> Scene:
-    """Kinematics of one run."""
+    """Kinematics of one run; radius (n,) below the axle [m], if it varies."""
     radius = np.full(motion.time.size, rig.radius) if radius is None else radius
     rim = radius * motion.omega
     fastest = np.maximum(np.abs(rim), np.abs(motion.speed))

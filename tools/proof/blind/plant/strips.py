@@ -38,7 +38,9 @@ class StripBed:
     step: float = 0.05  # [s]
 
     def carry(self, scenes: Sequence[Scene], weights: Sequence[Array], damped: bool) -> list[Scene]:
-        """See `Bed.carry`. The axle is in balance, `damped` or not; the strips hold it back."""
+        """See `Bed.carry`; weights (n,) of each scene. The axle is in balance, `damped` or not; the
+        strips hold it back.
+        """
         felt = _Strips(self, scenes, lanes(scenes, weights, self.step)).felt()
         return [
             _answered(scene, weight, felt, lane, grid(scene, self.step))

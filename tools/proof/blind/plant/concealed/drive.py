@@ -70,7 +70,7 @@ class Play(Effect, ABC):
 
     @abstractmethod
     def taken_up(self, turned: Array) -> Array:
-        """Share of the load that the motor feels, b times `turned` after a reversal."""
+        """Share of the load that the motor feels (n,), b times `turned` (n,) after a reversal."""
 
     def loss(self, scene: Scene) -> Array:
         if not self.strength:

@@ -79,7 +79,7 @@ class InclinedBed(Effect, ABC):
 
     @abstractmethod
     def rise(self, place: Array) -> Array:
-        """Height of the surface over where the bed begins [m]."""
+        """Height of the surface (n,) over where the bed begins [m], at places (n,) [m]."""
 
     def forces(self, scene: Scene) -> Scene:
         climb = scene.carried * np.sin(np.arctan(self.grade(scene.motion.travel)))
@@ -171,7 +171,7 @@ class StickingAxis(Effect, ABC):
         """h after a step of z, given over δ."""
 
     def pressed(self, scene: Scene) -> Array | float:
-        """By how much the guides hold more than F."""
+        """By how much the guides hold more than F (n,)."""
         return 1.0
 
     def carried(self, weight: Array, scene: Scene) -> Array:

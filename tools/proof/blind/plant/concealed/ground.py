@@ -190,7 +190,7 @@ class Stretch(Effect, ABC):
 
     @abstractmethod
     def inside(self, place: Array) -> Array:
-        """w at a place on the bed [m]."""
+        """w (n,) at places on the bed (n,) [m]."""
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
         change = self.strength * self.inside(scene.motion.travel)

@@ -28,16 +28,16 @@ class Lugs(Effect, ABC):
         return cls(cls.most, int(rng.integers(10, 28)), float(rng.uniform(0.0, 2.0 * np.pi)))
 
     def angle(self, scene: Scene, lug: int) -> Array:
-        """Where a lug stands, θ [rad], counted towards the entry."""
+        """Where a lug stands, θ (n,) [rad], counted towards the entry."""
         turned = scene.motion.turn * scene.direction + self.phase + 2.0 * np.pi * lug / self.count
         return np.asarray(np.mod(-turned + np.pi, 2.0 * np.pi) - np.pi)
 
     @abstractmethod
     def push(self, scene: Scene, theta: Array) -> Array:
-        """Force of a lug at θ, along the rim [N]."""
+        """Force (n,) of a lug at θ (n,), along the rim [N]."""
 
     def depth(self, scene: Scene) -> Array | float:
-        """By how much the wheel rides deeper for its lugs [m]."""
+        """By how much the wheel rides deeper for its lugs (n,) [m]."""
         return 0.0
 
     def forces(self, scene: Scene) -> Scene:

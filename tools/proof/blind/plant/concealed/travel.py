@@ -18,7 +18,7 @@ DRIVEN = 0.9  # of `Scene.moving`, below which the soil's forces at rest tell no
 
 
 def relaxed(scene: Scene, follow: Callable[[Array], Array]) -> Scene:
-    """The scene with its forces and its sinkage led through `follow`.
+    """The scene with its forces and its sinkage led through `follow`, (n,) to (n,).
 
     Forces are followed as they are in motion: at rest and through a reversal they keep their size.
     """

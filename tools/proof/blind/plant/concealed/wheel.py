@@ -134,7 +134,7 @@ class OffsetAxle(Effect):
         )
 
     def below(self, radius: Array, turn: Array) -> Array:
-        """Radius below the axle [m]."""
+        """Radius below the axle (n,) [m], at angles `turn` (n,) [rad]."""
         angle = turn + self.phase
         return np.asarray(
             self.strength * np.cos(angle)

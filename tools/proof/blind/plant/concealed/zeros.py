@@ -146,7 +146,9 @@ class Drift(Effect, ABC):
 
     @abstractmethod
     def crept(self, time: Array) -> Array:
-        """Share of `strength` that the zero has crept, at times since the campaign began [s]."""
+        """Share of `strength` that the zero has crept (n,), at times (n,) since the campaign began
+        [s].
+        """
 
     def sensed(self, felt: Felt) -> Felt:
         crept = self.strength * self.crept(felt.scene.motion.time)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.explain.reconciled import reconciled
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted
@@ -80,9 +81,22 @@ def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):
         if constant.soil:
             quantity = _told(rig, constant, mean, spread)
-            sigma = constant.sigma if held else quantity.sigma
-            told[constant.name] = Quantity(quantity.value, sigma, quantity.unit)
+            before = _told(rig, constant, mean, np.eye(len(mean)))
+            own = replace(quantity, sigma=constant.sigma) if held else quantity
+            told[constant.name] = _doubting(constant, own, before.sigma)
     return told
+
+
+def _doubting(known: Constant, fitted: Quantity, before: float) -> Quantity:
+    """With what was known and what the recordings say weighed by how well they agree.
+
+    before: σ of what was known, in the constant's unit, where it was fitted.
+    """
+    u = known.strain(fitted.value)
+    wider = before / known.spread(u, 1.0)  # a bed prepared anew is less known
+    mean, sigma = reconciled(u / wider, fitted.sigma / before)
+    value = known.of(wider * mean)
+    return replace(fitted, value=value, sigma=known.spread(wider * mean, wider * sigma))
 
 
 def _told(rig: Rig, constant: Constant, mean: Array, spread: Array) -> Quantity:

@@ -70,6 +70,20 @@ class Explain:
         2.0, "σ", "of what was known: soil further away contradicts it, and its σ reaches back"
     )
 
+    # --- reconciled.py ---
+    stated_wrong: float = tuned(
+        0.01, "share", "of what is stated of soil is wrong: one in a hundred", "judgement"
+    )
+    stated_far: float = tuned(4.0, "σ", "by which what is wrong is usually off", "judgement")
+    told_freedom: float = tuned(
+        4.0, "-", "independent conditions from which the recordings' own σ is known, about"
+    )
+    told_least: float = tuned(1e-4, "-", "precision in the prior's: less says nothing of the soil")
+    told_most: float = tuned(1e8, "-", "precision in the prior's: more is no measurement")
+    summed_near: float = tuned(5.0, "-", "arsinh of the farthest point about a value", "run time")
+    summed_steps: int = tuned(801, "points", "about each of the two", "run time")
+    summed_far: float = tuned(40.0, "σ", "of the prior: farther is no soil")
+
     # --- law.py ---
     term_pays: float = tuned(3.0, "nats", "a term of a law must gain")
     law_domain: Range = tuned((0.005, 0.995), "quantile", "of a covariate: domain of a law")

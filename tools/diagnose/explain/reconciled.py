@@ -1,0 +1,55 @@
+"""What was known of a constant and what the recordings say of it, where the two may contradict each
+other.
+
+A fit takes both for Gaussian: m = prior and recordings weighed by their σ, however far apart they
+lie. Recordings that tell little of the soil may still pull it far, by what the form of the model
+misses: 15 σ off, each σ twice that of what was known, say. No soil explains that, but Gaussians
+cannot doubt. So both have tails here. What was stated of the soil is wrong in one case of a hundred.
+The recordings' own σ is known from few independent conditions, so that what they say has Student's
+distribution. What contradicts is then doubted, the vaguer of the two first, and two that agree stay
+as they were (O'Hagan and Pericchi 2012, Braz. J. Probab. Stat. 26, 372-401).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.tuning import TUNING
+
+
+def reconciled(mean: float, sigma: float) -> tuple[float, float]:
+    """Mean and σ in units of the prior σ, about the prior's mean, from those of a Gaussian fit."""
+    told = 1.0 / sigma**2 - 1.0 if sigma > 0.0 else np.inf  # by the recordings: precision
+    if not TUNING.explain.told_least < told < TUNING.explain.told_most:
+        return mean, sigma
+    value, own = mean * (1.0 + told) / told, told**-0.5
+
+    at = _points(value, own)
+    density = _prior(at) * _student((at - value) / own)
+    weight = density * np.gradient(at)
+    weight /= weight.sum()
+    middle = float(weight @ at)
+    return middle, float(np.sqrt(weight @ (at - middle) ** 2))
+
+
+def _points(value: float, own: float) -> Array:
+    """Where the densities are summed: fine about both, out to where both have ended."""
+    near, steps = TUNING.explain.summed_near, TUNING.explain.summed_steps
+    unit = np.sinh(np.linspace(-near, near, steps))
+    wide = np.concatenate((unit, value + min(own, 1.0) * unit))
+    return np.unique(wide[np.abs(wide) < TUNING.explain.summed_far])
+
+
+def _prior(at: Array) -> Array:
+    wrong, far = TUNING.explain.stated_wrong, TUNING.explain.stated_far
+    return np.asarray((1.0 - wrong) * _normal(at) + wrong / far * _normal(at / far))
+
+
+def _normal(at: Array) -> Array:
+    return np.exp(-0.5 * at**2)
+
+
+def _student(at: Array) -> Array:
+    freedom = TUNING.explain.told_freedom
+    return np.asarray((1.0 + at**2 / freedom) ** (-0.5 * (freedom + 1.0)))

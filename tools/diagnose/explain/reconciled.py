@@ -4,10 +4,10 @@ other.
 A fit takes both for Gaussian: m = prior and recordings weighed by their σ, however far apart they
 lie. Recordings that tell little of the soil may still pull it far, by what the form of the model
 misses: 15 σ off, each σ twice that of what was known, say. No soil explains that, but Gaussians
-cannot doubt. So both have tails here. What was stated of the soil is wrong in one case of a hundred.
-The recordings' own σ is known from few independent conditions, so that what they say has Student's
-distribution. What contradicts is then doubted, the vaguer of the two first, and two that agree stay
-as they were (O'Hagan and Pericchi 2012, Braz. J. Probab. Stat. 26, 372-401).
+cannot doubt. So both have tails here. What was stated of the soil is wrong in one case of a
+hundred. The recordings' own σ is known from few independent conditions, so that what they say has
+Student's distribution. What contradicts is then doubted, the vaguer of the two first, and two that
+agree stay as they were (O'Hagan and Pericchi 2012, Braz. J. Probab. Stat. 26, 372-401).
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gritd.tools.diagnose.explain.covered import covered
 from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import Stack
-from gritd.tools.diagnose.screen.covered import covered
 from gritd.tools.diagnose.tuning import TUNING
 
 NAMED = ("slip", "load", "speed", "position")

@@ -20,8 +20,6 @@ from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
-from gritd.tools.diagnose.rig.interface import Bools
-from gritd.tools.diagnose.screen.covered import covered
 from gritd.tools.diagnose.screen.habit import habits
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.open_form import gain_with_form_open
@@ -48,7 +46,6 @@ class Screening:
     forms: tuple[Freedom, ...]  # what the form of the model may be off by
     functions: tuple[Signature, ...]  # smooth functions without a name
     families: tuple[Family, ...]  # waves and steps without a name
-    judged: Bools  # (N,) values at which the screen may find something new
     surrogates: Surrogates
 
     def shapes(self, model: Model) -> list[Signature]:
@@ -71,14 +68,12 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     drawn = Surrogates(residuals, rng.standard_normal((unknowns, TUNING.screen.nulls)))
 
     stack = base.problem.stack
-    judged = stack.new & covered(stack) if stack.referred and stack.rig.forms else stack.new
     return Screening(
         base.problem,
         base.model,
         base.forms,
         smooth_signatures(stack),
-        families(stack, noise, judged),
-        judged,
+        families(stack, noise),
         drawn,
     )
 
@@ -123,10 +118,9 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     alone = projection.of_rows(~stack.new)  # what is new must not tell what is usual
     usual = habits(alone, both, stack)
 
-    elsewhere = ~screening.judged
     for s in both:  # in their place: together they are large
         s.signature.columns[~stack.new] = 0.0
-        s.columns[elsewhere] = 0.0
+        s.columns[~stack.new] = 0.0
     beside = without_harmonics(problem, model.fitted, screening.surrogates)
     searched = {family.shape: family.average(beside) for family in screening.families}
     screen = screen_signatures(projection, both, searched)

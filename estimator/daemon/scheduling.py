@@ -14,19 +14,26 @@ SWITCH_INTERVAL = 0.0005  # [s] how soon the loop gets the interpreter back from
 # of SCHED_FIFO, for all threads: for the loop alone it would starve the readers. The loop comes
 # first by one: on the core that it shares with them it would wait for a backlog of theirs.
 PRIORITY, FIRST = 19, 20
+# Collections of younger objects after which all of them are gone through: that takes 1 ms and more,
+# a tick at 1 kHz. By default it comes every 10 s, so every few hours.
+YOUNGER = 10_000
 
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Short switch interval and no garbage collection of what was built at start."""
-    interval = sys.getswitchinterval()
+    """Short switch interval, no garbage collection of what was built at start, and few of all that
+    came since.
+    """
+    interval, (first, second, third) = sys.getswitchinterval(), gc.get_threshold()
     sys.setswitchinterval(SWITCH_INTERVAL)
+    gc.set_threshold(first, second, YOUNGER)
     gc.collect()
     gc.freeze()
     try:
         yield
     finally:
         gc.unfreeze()
+        gc.set_threshold(first, second, third)
         sys.setswitchinterval(interval)
 
 

@@ -193,6 +193,12 @@ class Effect:
         return memory
 
     @classmethod
+    def bears_on_soil(cls) -> bool:
+        """Whether it changes what the soil carries; all others act behind the vertical balance."""
+        stages = ("geometry", "motion", "soil", "contact", "load")
+        return any(getattr(cls, stage) is not getattr(Effect, stage) for stage in stages)
+
+    @classmethod
     def parameters(cls) -> tuple[Parameter, ...]:
         return tuple(_parameter(f.name, f.default, *f.metadata["parameter"]) for f in fields(cls))
 

@@ -16,6 +16,7 @@ from gritd.estimator.terramechanics.soil import Array, Scalar, Soil, Wheel
 # (test_forward.py)
 ORDER = 8
 TOLERANCE = 1e-9  # relative difference of W from the load at which θ₁ is accepted
+FINE = 1e-11  # the same from a solution near by: differences between the two mean something
 CHUNK = 1024  # samples solved together: their nodes stay in the processor's cache
 DEEPEST = 1.5  # [rad] a wheel sunk to its axle is bogged; θ₁ stops here and the sample is flagged
 TOP = np.log(DEEPEST)
@@ -24,6 +25,7 @@ ROUNDS = 60
 
 
 Index = NDArray[np.intp]
+Bools = NDArray[np.bool_]
 
 
 class Contact(NamedTuple):
@@ -39,6 +41,7 @@ class Balance(NamedTuple):
     theta_1: Array  # [rad]
     forces: Forces  # at θ₁, each (n,)
     overloaded: Array  # bool: the load exceeds what the soil carries; forces are those at DEEPEST
+    slope: Array  # d ln W / d ln θ₁ as the steps to θ₁ saw it
 
 
 def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDER) -> Forces:
@@ -63,66 +66,85 @@ def rim_forces(wheel: Wheel, contact: Contact, theta_1: Array, order: int = ORDE
 
 
 def solve(
-    wheel: Wheel, contact: Contact, theta_1: Array | None = None, order: int = ORDER
+    wheel: Wheel, contact: Contact, near: Balance | None = None, order: int = ORDER
 ) -> Balance:
     """θ₁ with W(θ₁) = load at every sample, and the forces there.
 
-    theta_1: (n,) a solution for nearby parameters, to start from.
+    near: a solution for nearby parameters, to start from. Then the last step may be a secant's:
+    forces by a straight line through the last two that were integrated.
     """
     load = np.asarray(contact.load, dtype=float)
     parts = [slice(start, start + CHUNK) for start in range(0, load.size, CHUNK)]
     solved = [
-        _solve_chunk(wheel, _take(contact, s), None if theta_1 is None else theta_1[s], order)
-        for s in parts
+        _solve_chunk(wheel, _take(contact, s), near and part_of(near, s), order) for s in parts
     ]
-    joined = [np.concatenate([part[field] for part in solved]) for field in (0, 2)]
 
     return Balance(
-        joined[0],
-        Forces(*map(np.concatenate, zip(*(part[1] for part in solved), strict=True))),
-        joined[1],
+        np.concatenate([part.theta_1 for part in solved]),
+        Forces(*map(np.concatenate, zip(*(part.forces for part in solved), strict=True))),
+        np.concatenate([part.overloaded for part in solved]),
+        np.concatenate([part.slope for part in solved]),
     )
 
 
-def _solve_chunk(wheel: Wheel, contact: Contact, start: Array | None, order: int) -> Balance:
-    load = np.asarray(contact.load, dtype=float)
-    guess = bekker_entry_angle(wheel, contact.soil, load) if start is None else start
-    theta_1, overloaded = np.zeros(load.size), np.zeros(load.size, dtype=bool)
-    kept = np.zeros((len(Forces._fields), load.size))
+def part_of(near: Balance, at: slice) -> Balance:
+    """Some of the samples of a solution."""
+    forces = Forces(*(force[at] for force in near.forces))
+    return Balance(near.theta_1[at], forces, near.overloaded[at], near.slope[at])
 
+
+def _solve_chunk(wheel: Wheel, contact: Contact, near: Balance | None, order: int) -> Balance:
+    load = np.asarray(contact.load, dtype=float)
+    if near is None:
+        theta_1 = bekker_entry_angle(wheel, contact.soil, load)
+        slope = 2.0 * np.asarray(contact.soil.exponent) + 1.0
+    else:
+        theta_1, slope = near.theta_1, near.slope
+
+    out = np.zeros((3 + len(Forces._fields), load.size))
+    out[-1] = 1.0
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
-        balance = _iterate(
-            wheel, _take(contact, touching), np.broadcast_to(guess, load.shape)[touching], order
-        )
-        theta_1[touching], kept[:, touching], overloaded[touching] = balance
-
-    return Balance(theta_1, Forces(*kept), overloaded)
+        guess, steep = (np.broadcast_to(a, load.shape)[touching] for a in (theta_1, slope))
+        found = _iterate(wheel, _take(contact, touching), guess, steep, order, near is not None)
+        out[:, touching] = np.vstack((found.theta_1, *found.forces, found.overloaded, found.slope))
+    return Balance(out[0], Forces(*out[1:-2]), out[-2] > 0.0, out[-1])
 
 
-def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balance:
+def _iterate(
+    wheel: Wheel, contact: Contact, guess: Array, slope: Array, order: int, near: bool
+) -> Balance:
     """Secant steps on ln W against ln θ₁, which is nearly straight with slope 2n + 1, kept inside a
     bracket.
+
+    near: the last step may be taken without integrating again.
     """
-    solution, overloaded = np.empty(guess.size), np.zeros(guess.size, dtype=bool)
-    kept = np.empty((len(Forces._fields), guess.size))
+    solution, steepness = np.empty(guess.size), np.empty(guess.size)
+    kept, overloaded = np.empty((len(Forces._fields), guess.size)), np.zeros(guess.size, dtype=bool)
     left = np.arange(guess.size)  # samples not yet solved
     x = np.log(np.clip(guess, 10.0 * SHALLOWEST, DEEPEST))
-    slope = np.broadcast_to(2.0 * np.asarray(contact.soil.exponent) + 1.0, x.shape)
 
     low, high = np.full(x.size, np.log(SHALLOWEST)), np.full(x.size, np.inf)
-    before = np.full((2, x.size), np.nan)  # the last x and its miss
+    before = np.full((2 + len(kept), x.size), np.nan)  # the last x, its miss and its forces
     for _ in range(ROUNDS):
         forces = rim_forces(wheel, contact, np.exp(x), order)
         miss = _miss(forces, contact)
-        slope = _slope(slope, x - before[0], miss - before[1])
+        change = x - before[0]
+        slope = _slope(slope, change, miss - before[1])
         low, high = np.where(miss < 0.0, x, low), np.where(miss > 0.0, x, high)
         bogged = low >= TOP
-        solution[left], kept[:, left], overloaded[left] = x, forces, bogged & (miss < -TOLERANCE)
-        rest = np.flatnonzero((np.abs(miss) > TOLERANCE) & (high - low > 1e-15) & ~bogged)
+
+        here, done = np.vstack((x, miss, *forces)), np.abs(miss) <= (FINE if near else TOLERANCE)
+        if near:
+            here, straight = _extrapolated(here, before, slope)
+            done |= straight
+        solution[left], kept[:, left], steepness[left] = here[0], here[2:], slope
+        overloaded[left] = bogged & (miss < -TOLERANCE)
+
+        rest = np.flatnonzero(~done & (high - low > 1e-15) & ~bogged)
         if not rest.size:
             break
-        before = np.stack((x[rest], miss[rest]))
+        before = here[:, rest]
         x = _ahead(before[0] - before[1] / slope[rest], low[rest], high[rest])
         left, contact, slope, low, high = (
             left[rest],
@@ -132,7 +154,20 @@ def _iterate(wheel: Wheel, contact: Contact, guess: Array, order: int) -> Balanc
             high[rest],
         )
 
-    return Balance(np.exp(solution), Forces(*kept), overloaded)
+    return Balance(np.exp(solution), Forces(*kept), overloaded, steepness)
+
+
+def _extrapolated(here: Array, before: Array, slope: Array) -> tuple[Array, Bools]:
+    """x, miss and forces (k, n) a secant's step on, where that is off by less than FINE; and where
+    that is.
+
+    A straight line through two points is off beyond them by half the curvature times the product of
+    the distances; ln W has a curvature of about 1.
+    """
+    change, step = here[0] - before[0], -here[1] / slope
+    done = (np.abs(step) < np.abs(change)) & (np.abs(step * change) < FINE)
+    ratio = np.where(done, step / np.where(done, change, 1.0), 0.0)
+    return here + np.where(done, ratio * (here - before), 0.0), done
 
 
 def _ahead(step: Array, low: Array, high: Array) -> Array:

@@ -51,6 +51,15 @@ class Response:
     sensed: Sensed
 
 
+@dataclass(frozen=True)
+class Carried:
+    """What the soil carries, before axle, testbed, drive and sensors."""
+
+    wheel: Wheel
+    situation: Situation
+    balance: balance.Balance
+
+
 def simulate_arrays(
     wheel: Wheel,
     soil: Soil,
@@ -58,7 +67,6 @@ def simulate_arrays(
     effects: Sequence[Effect] = (),
     *,
     torque_constant: float = 1.0,
-    theta_1: Array | None = None,
     order: int = balance.ORDER,
     correction: Correction | None = None,
 ) -> Response:
@@ -66,9 +74,26 @@ def simulate_arrays(
 
     motion:          measured, arrays (n,) of one run; a field that does not vary may be a float.
     torque_constant: as configured, torque at the axle per ampere [N·m/A].
-    theta_1:         (n,) of an earlier call with nearby parameters: the balance starts there.
     order:           quadrature nodes in each zone of the contact.
     correction:      the discrepancy of form as it was learnt; its mean is added.
+    """
+    solved = carried(wheel, soil, motion, effects, order=order)
+    return responded(solved, effects, torque_constant=torque_constant, correction=correction)
+
+
+def carried(
+    wheel: Wheel,
+    soil: Soil,
+    motion: Motion,
+    effects: Sequence[Effect],
+    *,
+    near: balance.Balance | None = None,
+    order: int = balance.ORDER,
+) -> Carried:
+    """The vertical balance at every sample of a motion; see `simulate_arrays`. Of the effects only
+    those matter that bear on the soil.
+
+    near: of an earlier call with nearby parameters: the balance starts there.
     """
     effects = in_order(effects)
     wheel, situation = prepare(wheel, motion, effects)
@@ -77,14 +102,29 @@ def simulate_arrays(
         situation, cohesion=soil.cohesion, tan_phi=soil.tan_phi, shear_modulus=soil.shear_modulus
     )
     law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
-    solved = _balance(wheel, soil, law, motion, situation, effects, theta_1, order)
-    situation = loaded(situation, wheel, solved.theta_1, solved.forces)
+    solved = _balance(wheel, soil, law, motion, situation, effects, near, order)
+    return Carried(wheel, situation, solved)
+
+
+def responded(
+    solved: Carried,
+    effects: Sequence[Effect],
+    *,
+    torque_constant: float = 1.0,
+    correction: Correction | None = None,
+) -> Response:
+    """What axle, testbed, drive and sensors make of what the soil carries; see
+    `simulate_arrays`.
+    """
+    effects = in_order(effects)
+    found = solved.balance
+    situation = loaded(solved.situation, solved.wheel, found.theta_1, found.forces)
     reaction = corrected_form(react(situation, effects), situation, correction)
     situation, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
 
-    return _response(situation, solved, reaction, motor_torque, effects)
+    return _response(situation, found, reaction, motor_torque, effects)
 
 
 def _response(
@@ -213,27 +253,28 @@ def _balance(
     motion: Motion,
     situation: Situation,
     effects: Sequence[Effect],
-    theta_1: Array | None,
+    near: balance.Balance | None,
     order: int,
 ) -> balance.Balance:
     n = np.broadcast_shapes(
         np.shape(motion.time), np.shape(situation.load), np.shape(situation.slip)
     )
 
-    def solve(situation: Situation, start: Array | None) -> balance.Balance:
-        load = reduce(lambda load, e: e.load(load, situation), effects, situation.load)
-        return balance.solve(
-            wheel, balance.Contact(soil, law, situation.slip, _full(load, n)), start, order
-        )
+    def solve(load: Scalar, start: balance.Balance | None) -> balance.Balance:
+        contact = balance.Contact(soil, law, situation.slip, _full(load, n))
+        return balance.solve(wheel, contact, start, order)
+
+    def felt(situation: Situation) -> Scalar:
+        return reduce(lambda load, e: e.load(load, situation), effects, situation.load)
 
     if motion.sinkage is not None:
-        return solve(replace(situation, sinkage=motion.sinkage), theta_1)
+        return solve(felt(replace(situation, sinkage=motion.sinkage)), near)
     if not any(e.needs_sinkage for e in effects):
-        return solve(situation, theta_1)
-    predicted = balance.solve(
-        wheel, balance.Contact(soil, law, situation.slip, _full(situation.load, n)), theta_1, order
-    )
-    return solve(loaded(situation, wheel, predicted.theta_1, predicted.forces), predicted.theta_1)
+        return solve(felt(situation), near)
+
+    predicted = solve(situation.load, near)
+    load = felt(loaded(situation, wheel, predicted.theta_1, predicted.forces))
+    return predicted if np.all(load == situation.load) else solve(load, predicted)
 
 
 def _full(value: Scalar, shape: tuple[int, ...]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from gritd.estimator.recording.blocks import Damaged, Texts, records
-from gritd.estimator.recording.cdr import CODES, TIME, Codec, Topic, parse_schema
+from gritd.estimator.recording.cdr import CODES, TIME, Codec, Field, Topic, parse_schema
 from gritd.estimator.recording.decoding import Source
 from gritd.estimator.recording.mcapfile import RecordingError
 
@@ -77,16 +78,22 @@ class Definitions:
                 f"channel {channel.id} refers to schema {channel.schema_id}, which is missing"
             )
 
-        fields = None
+        fields, codec = None, None
         if schema and schema.encoding == "ros2msg" and channel.message_encoding == "cdr":
-            fields = parse_schema(schema.data.decode(errors="replace"))
+            fields, codec = _parsed(schema.data)
 
         known = self._known.get(channel.topic)
-        codec = Codec(fields) if fields else None
         if known:
             _require(self._path, known, codec)
         topic = known or Topic(channel.topic, schema.name if schema else "", fields or ())
         return Source(schema, channel, topic, codec)
+
+
+@lru_cache(maxsize=32)  # the recordings of a campaign define the same messages
+def _parsed(text: bytes) -> tuple[tuple[Field, ...] | None, Codec | None]:
+    """The fields of a ros2msg text, and what reads a message of them; None where nothing does."""
+    fields = parse_schema(text.decode(errors="replace"))
+    return fields, Codec(fields) if fields else None
 
 
 def _require(path: Path, known: Topic, codec: Codec | None) -> None:

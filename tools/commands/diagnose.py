@@ -35,7 +35,7 @@ from gritd.tools.diagnose.explain.result import (
 )
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, one_by_one, read_all
+from gritd.tools.diagnose.rig.signals import distinct, read_all
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -297,13 +297,12 @@ def of_files(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         soil = any(constant.soil for constant in rig.constants)
-        before = Filtered() if quick else filtered(configuration, recordings, soil)
+        before = Filtered() if quick else filtered(configuration, recordings, soil, jobs)
         del recordings, known  # long ones are large; they are read again where they are needed
         each = step if callable(step) else lambda _: None
         diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
         if not quick:
-            again = one_by_one(files)
-            diagnosis = with_innovations(diagnosis, configuration, before, again)
+            diagnosis = with_innovations(diagnosis, configuration, before, files, jobs)
 
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)

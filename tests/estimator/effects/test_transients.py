@@ -137,6 +137,23 @@ def test_runs_in_one_array_do_not_touch(name: str) -> None:
     np.testing.assert_allclose(together, np.hstack(apart), rtol=1e-8, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", sorted(ALONE))
+def test_readings_do_not_depend_on_what_was_read_before(name: str) -> None:
+    """What the soil carries is solved once for all effects that do not bear on it."""
+    settings = replace(configuration.load(packaged()).settings, wheel=WHEEL, effects=())
+    motions = [replace(m, load=np.asarray(m.load)) for m in campaign(2, reversing=True)]
+    channels = ("torque", "sinkage", "drawbar_pull", "load")
+    ones = np.ones(sum(np.size(m.time) for m in motions))
+    whole = Campaign(motions, settings, channels)
+    for before in ((), (typical(EFFECTS["slip_sinkage"]),), (typical(EFFECTS["sensor_drift"]),)):
+        whole.readings(SOIL, ones, 1.0, before)
+
+    effects = (typical(EFFECTS[name]),)
+    fresh = Campaign(motions, settings, channels).readings(SOIL, ones, 1.0, effects)
+    found = whole.readings(SOIL, ones, 1.0, effects)
+    np.testing.assert_allclose(found, fresh, rtol=1e-8, atol=1e-9)
+
+
 @given(st.integers(1, 70), st.integers(0, 2**32 - 1))
 def test_following_is_the_recursion(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

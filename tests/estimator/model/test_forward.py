@@ -121,10 +121,22 @@ def test_quadrature_error_is_as_stated(slips: tuple[float, float], error: float)
 def test_warm_start_finds_the_same_balance() -> None:
     slip, load = np.linspace(0.0, 0.8, 40), np.linspace(20.0, 100.0, 40)
     cold = balance.solve(WHEEL, Contact(SOIL, ContactLaw(0.5), slip, load))
-    warm = balance.solve(
-        WHEEL, Contact(SOIL, ContactLaw(0.5), slip, load), 0.5 * cold.theta_1 + 0.3
-    )
+    far = cold._replace(theta_1=0.5 * cold.theta_1 + 0.3, slope=np.full(40, 3.0))
+    warm = balance.solve(WHEEL, Contact(SOIL, ContactLaw(0.5), slip, load), far)
     np.testing.assert_allclose(warm.theta_1, cold.theta_1, rtol=1e-9)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.0 + 1e-6, 1.001, 1.05, 1.5])
+def test_a_solution_near_by_costs_no_digits(factor: float) -> None:
+    """The forces are those that the stresses at θ₁ have, and carry the load."""
+    slip, load = np.linspace(-0.1, 0.8, 40), np.linspace(20.0, 100.0, 40)
+    contact = Contact(SOIL, ContactLaw(0.5), slip, load)
+    stiffer = contact._replace(soil=replace(SOIL, modulus=factor * SOIL.modulus))
+
+    found = balance.solve(WHEEL, stiffer, balance.solve(WHEEL, contact))
+    there = balance.rim_forces(WHEEL, stiffer, found.theta_1)
+    np.testing.assert_allclose(found.forces.load, load, rtol=2e-10)
+    np.testing.assert_allclose(np.array(found.forces), np.array(there), rtol=1e-9, atol=1e-9)
 
 
 def test_samples_do_not_depend_on_their_neighbours() -> None:

@@ -193,7 +193,9 @@ def _unseen_shown(search: Search) -> dict[str, float]:
 
 
 def _not_shown(search: Search) -> list[str]:
-    """Effects whose signature, at their expected size, is below the alarm."""
+    """Effects that change nothing measured, or whose signature, at their expected size, is below
+    the alarm.
+    """
     projection, screen = search.base.fitted.projection(), search.first
     noise = search.problem.noise
     size = {
@@ -201,7 +203,8 @@ def _not_shown(search: Search) -> list[str]:
         for name, likeliest in screen.best.items()
         if isinstance(name, str)
     }
-    return [name for name, squared in size.items() if 0.5 * squared < screen.threshold]
+    effects = search.problem.stack.rig.effects
+    return [name for name in effects if 0.5 * size.get(name, 0.0) < screen.threshold]
 
 
 def _expected(effect: type[Effect]) -> Effect:

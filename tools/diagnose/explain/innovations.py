@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -13,8 +15,11 @@ from gritd.estimator.filter.measurement import COMPONENTS
 from gritd.estimator.offline import batch
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.rig.signals import read_one
+from gritd.tools.diagnose.search.parallel import each
 
 NO_FILTER = "A drive without soil: no on-line filter runs over it."
 NO_UPDATE = (
@@ -35,14 +40,18 @@ class Filtered:
 
 
 def filtered(
-    configuration: config.Configuration, recordings: Sequence[Recording], soil: bool
+    configuration: config.Configuration,
+    recordings: Sequence[Recording],
+    soil: bool,
+    jobs: int = 1,
 ) -> Filtered:
-    """By the given configuration; soil: whether the rig has any."""
+    """By the given configuration; soil: whether the rig has any; jobs: processes."""
     if not soil:
         return Filtered(note=NO_FILTER)
 
     try:
-        found = innovations(configuration.settings, recordings)
+        reads = [partial(_same, recording) for recording in recordings]
+        found = innovations(configuration.settings, reads, jobs)
     except (RecordingError, config.ConfigError) as error:
         return Filtered(note=_failed(error))
     return Filtered(found) if found else Filtered(note=NO_UPDATE)
@@ -52,13 +61,14 @@ def with_innovations(
     diagnosis: Diagnosis,
     configuration: config.Configuration,
     before: Filtered,
-    recordings: Iterable[Recording],
+    files: Sequence[Path],
+    jobs: int = 1,
 ) -> Diagnosis:
     """The result with the filter's normalised innovations by the given configuration, `before`, and
-    by the improved one.
+    by the improved one; jobs: processes.
 
-    recordings: asked for only where there is an improved one. Where there is none `innovation_note`
-    says why.
+    files: recordings, read only where there is an improved one. Where there is none
+    `innovation_note` says why.
     """
     if before.innovations is None:
         return _noted(diagnosis, before.note)
@@ -67,10 +77,15 @@ def with_innovations(
 
     try:
         improved = config.loads(applied(configuration, diagnosis), "improved configuration")
-        after = innovations(improved.settings, recordings)
+        reads = [partial(read_one, path) for path in files]
+        after = innovations(improved.settings, reads, jobs)
         return _noted(diagnosis, "", before.innovations, after)
     except (RecordingError, config.ConfigError) as error:
         return _noted(diagnosis, _failed(error))
+
+
+def _same(recording: Recording) -> Recording:
+    return recording
 
 
 def _failed(error: Exception) -> str:
@@ -89,18 +104,24 @@ def _noted(
     return replace(diagnosis, fit=fit)
 
 
-def innovations(settings: Settings, recordings: Iterable[Recording]) -> dict[str, float]:
+def innovations(
+    settings: Settings, reads: Sequence[Callable[[], Recording]], jobs: int = 1
+) -> dict[str, float]:
     """Root mean square of innovation over its stated standard deviation, per component; 1 where
-    they are true.
+    they are true. reads: give a recording each; jobs: processes.
 
     Of updates that were offered, whether accepted or not.
     """
-    squares: dict[str, list[float]] = {name: [] for name in COMPONENTS}
-    for recording in recordings:
-        table = batch.estimates(settings, recording)
-        for name in COMPONENTS:
-            variance, innovation = table[f"{name}_s"], table[f"{name}_innovation"]
-            offered = (variance > 0.0) & np.isfinite(innovation)
-            squares[name] += (innovation[offered] ** 2 / variance[offered]).tolist()
+    each_run = each(jobs, lambda read: _squares(settings, read()), reads)
+    joined = {name: np.concatenate([one[name] for one in each_run]) for name in COMPONENTS}
+    return {name: float(np.sqrt(np.mean(values))) for name, values in joined.items() if values.size}
 
-    return {name: float(np.sqrt(np.mean(values))) for name, values in squares.items() if values}
+
+def _squares(settings: Settings, recording: Recording) -> dict[str, Array]:
+    """Squared innovation over its variance at every update of one recording (n,), per component."""
+    table, squares = batch.estimates(settings, recording), {}
+    for name in COMPONENTS:
+        variance, innovation = table[f"{name}_s"], table[f"{name}_innovation"]
+        offered = (variance > 0.0) & np.isfinite(innovation)
+        squares[name] = innovation[offered] ** 2 / variance[offered]
+    return squares

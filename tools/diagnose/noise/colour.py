@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -168,24 +169,28 @@ def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Ar
         [[c.time for c in colours], [TUNING.noise.fast_time * step_of(gaps)] * len(colours)]
     )
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
-    white = 1.0 - share.sum(axis=0)
 
     kept = np.exp(-gaps[None, :, None] / times[:, None, :])
-    gain, scale = np.empty_like(kept), np.empty(kept.shape[1:])
-    ss, ff, sf = share[0], share[1], np.zeros(len(colours))
+    gain, variance = np.empty_like(kept), np.empty(kept.shape[1:])
+    decays: Any = kept.swapaxes(0, 1)
+    slow, fast, white = share[0], share[1], 1.0 - share.sum(axis=0)
+    if len(colours) == 1:  # floats take less time than arrays of one, with the same bits
+        decays = decays[..., 0].tolist()
+        slow, fast, white = (part.item() for part in (slow, fast, white))
+    ss, ff, sf = slow, fast, 0.0 * slow
 
-    for i in range(len(gaps)):
-        a, b = kept[0, i], kept[1, i]
+    for i, (a, b) in enumerate(decays):
         ss, ff, sf = (
-            a * a * ss + share[0] * (1 - a * a),
-            b * b * ff + share[1] * (1 - b * b),
+            a * a * ss + slow * (1 - a * a),
+            b * b * ff + fast * (1 - b * b),
             a * b * sf,
         )
         to_slow, to_fast = ss + sf, ff + sf
         total = to_slow + to_fast + white
-        gain[0, i], gain[1, i], scale[i] = to_slow / total, to_fast / total, np.sqrt(total)
-        ss, ff, sf = ss - to_slow * gain[0, i], ff - to_fast * gain[1, i], sf - to_slow * gain[1, i]
-    return kept[..., None], gain[..., None], np.maximum(scale, SLIGHT)
+        by_slow, by_fast = to_slow / total, to_fast / total
+        gain[0, i], gain[1, i], variance[i] = by_slow, by_fast, total
+        ss, ff, sf = ss - to_slow * by_slow, ff - to_fast * by_fast, sf - to_slow * by_fast
+    return kept[..., None], gain[..., None], np.maximum(np.sqrt(variance), SLIGHT)
 
 
 def step_of(gaps: Array) -> float:

@@ -4,7 +4,7 @@ itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,8 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
-from gritd.estimator.model.forward import simulate_arrays
+from gritd.estimator.model.balance import Balance, part_of
+from gritd.estimator.model.forward import Carried, carried, responded
 from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion, Sensed
 from gritd.estimator.terramechanics.soil import Array, Soil
@@ -32,44 +33,50 @@ class Campaign:
             slice(end - np.size(m.time), end) for m, end in zip(self._motions, ends, strict=True)
         ]
         self._joined = _joined(self._motions)
-        self._start: Array | None = None  # θ₁ of the last call: the next balance starts there
+        self._carried: dict[Hashable, Carried] = {}  # the last few
+        self._last: Balance | None = None  # the next balance starts there
 
     def readings(
         self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
     ) -> Array:
         """True readings (channels, N); weights (N,) and travel are factors on the motions'."""
         if all(_at_once(e) for e in effects):
-            return self._simulated(
-                soil, _scaled(self._joined, weights, travelled), effects, slice(None)
-            )
+            return self._read(self._solved(soil, weights, travelled, effects), effects)
 
-        runs = [
-            _scaled(m, weights[part], travelled)
-            for m, part in zip(self._motions, self.parts, strict=True)
-        ]
-        return np.hstack(
-            [
-                self._simulated(soil, run, effects, part)
-                for run, part in zip(runs, self.parts, strict=True)
-            ]
-        )
+        read = []
+        for motion, part in zip(self._motions, self.parts, strict=True):
+            scaled = _scaled(motion, weights[part], travelled)
+            near = None if self._last is None else part_of(self._last, part)
+            read.append(self._read(self._balanced(soil, scaled, effects, near), effects))
+        return np.hstack(read)
 
-    def _simulated(
-        self, soil: Soil, motion: Motion, effects: Sequence[Effect], part: slice
-    ) -> Array:
-        response = simulate_arrays(
-            self._settings.wheel,
-            soil,
-            motion,
-            effects,
-            torque_constant=self._settings.drive.torque_constant.value,
-            theta_1=None if self._start is None else self._start[part],
-            order=TUNING.rig.quadrature_order,
-        )
+    def _solved(
+        self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]
+    ) -> Carried:
+        """What the soil carries in all runs; solved anew only where something bears on it."""
+        bearing = tuple(effect for effect in effects if effect.bears_on_soil())
+        key = (soil, weights.tobytes(), travelled, bearing)
+        if key not in self._carried:
+            if len(self._carried) >= TUNING.rig.kept_balances:
+                self._carried.pop(next(iter(self._carried)))
+            motion = _scaled(self._joined, weights, travelled)
+            self._carried[key] = self._balanced(soil, motion, bearing, self._last)
 
-        if part == slice(None):
-            self._start = response.theta_1
-        return np.stack([sensed_as(response.sensed, c, self._settings) for c in self._channels])
+        found = self._carried[key] = self._carried.pop(key)  # the last to go
+        self._last = found.balance
+        return found
+
+    def _balanced(
+        self, soil: Soil, motion: Motion, effects: Sequence[Effect], near: Balance | None
+    ) -> Carried:
+        order = TUNING.rig.quadrature_order
+        return carried(self._settings.wheel, soil, motion, effects, near=near, order=order)
+
+    def _read(self, found: Carried, effects: Sequence[Effect]) -> Array:
+        """(channels, n)."""
+        constant = self._settings.drive.torque_constant.value
+        sensed = responded(found, effects, torque_constant=constant).sensed
+        return np.stack([sensed_as(sensed, c, self._settings) for c in self._channels])
 
 
 def sensed_as(sensed: Sensed, channel: str, settings: Settings) -> Array:

@@ -9,7 +9,7 @@ with too few of them is NaN.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,12 +56,7 @@ class Signals:
 
 def read_all(paths: Sequence[Path]) -> list[Recording]:
     """Raises CommandError, one line, for a file that cannot be read."""
-    return list(one_by_one(paths))
-
-
-def one_by_one(paths: Sequence[Path]) -> Iterator[Recording]:
-    """The same, each when it is asked for."""
-    return (_read(path) for path in paths)
+    return [read_one(path) for path in paths]
 
 
 def is_drive(recordings: Sequence[Recording]) -> bool:
@@ -118,7 +113,8 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
     return checksums
 
 
-def _read(path: Path) -> Recording:
+def read_one(path: Path) -> Recording:
+    """Raises CommandError, one line, for a file that cannot be read."""
     try:
         return read(path, tables=RAW)  # one pass over the file for all channels
     except Exception as error:

@@ -38,6 +38,7 @@ class Rig:
     quadrature_order: int = tuned(
         6, "nodes", "of a zone of the contact: leaves 4e-6 of the torque", "convergence of torque"
     )
+    kept_balances: int = tuned(8, "balances", "of all runs that are kept", "memory, run time")
 
     # --- candidates.py ---
     steady_range: float = tuned(0.2, "-", "relative range of a speed that does not change")

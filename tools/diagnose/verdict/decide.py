@@ -168,7 +168,9 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
 
 
 def power(search: Search, screen: Screen) -> float:
-    """Share of the listed effects that would be seen at their expected size."""
+    """Share of the listed effects that would be seen at their expected size; those that change
+    nothing measured would not.
+    """
     projection = search.base.fitted.projection()
     seen = []
     for name, likeliest in screen.best.items():
@@ -176,4 +178,4 @@ def power(search: Search, screen: Screen) -> float:
             a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
             seen.append(screen.surprise(name, float(gain)) > screen.threshold)
-    return float(np.mean(seen)) if seen else 0.0
+    return sum(seen) / max(len(search.problem.stack.rig.effects), 1)

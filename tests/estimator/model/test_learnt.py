@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from gritd.estimator.model.correction import Correction, weights_of
-from gritd.estimator.model.discrepancy import CARRYING, conditions_of
+from gritd.estimator.model.discrepancy import CARRYING, CONDITIONS, conditions_of
 from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.model.learnt import CHANNELS
-from gritd.estimator.stages.situation import situation_of
+from gritd.estimator.stages.situation import CREEP, situation_of
 from gritd.estimator.wheel.form import FormOnLine, Wheeling
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.testbed.plant import schedule
@@ -97,22 +97,70 @@ def test_far_outside_it_is_the_prior_exactly():
         assert abs(far.mean[-1, number]) < 1e-3 * channel.size * 1e5 / 60.0
 
 
-def test_on_line_it_is_the_same_window_by_window():
-    """Lags of slip and load included."""
-    situation = situation_of(MOTION, WHEEL)
-    whole = Correction(FORM).of(situation)
-    on_line, memory, found = FormOnLine(FORM, WHEEL.radius), (), []
-    for place in range(len(whole)):
+def _on_line(form, motion):
+    """δ under every window of a run, one after another."""
+    situation = situation_of(motion, WHEEL)
+    on_line, memory, found = FormOnLine(form, WHEEL.radius), (), []
+    for place in range(np.size(motion.time)):
         now = Wheeling(
             float(np.asarray(situation.slip)[place]),
-            float(np.asarray(MOTION.load)[place]),
-            float(WHEEL.radius * np.asarray(MOTION.wheel_speed)[place]),
-            float(np.asarray(MOTION.carriage_speed)[place]),
-            float(np.asarray(MOTION.wheel_angle)[place]),
+            float(np.broadcast_to(motion.load, np.shape(motion.time))[place]),
+            float(WHEEL.radius * np.asarray(motion.wheel_speed)[place]),
+            float(np.asarray(motion.carriage_speed)[place]),
+            float(np.asarray(motion.wheel_angle)[place]),
         )
-        found.append(on_line.at(now, memory).mean)
+        found.append(on_line.at(now, memory))
         memory = on_line.remember(now, memory)
+    return found
+
+
+def test_on_line_it_is_the_same_window_by_window():
+    """Lags of slip and load included."""
+    whole = Correction(FORM).of(situation_of(MOTION, WHEEL))
+    found = [here.mean for here in _on_line(FORM, MOTION)]
     np.testing.assert_allclose(found, whole, rtol=1e-9, atol=1e-12)
+
+
+def test_on_line_the_conditions_are_those_of_the_run():
+    """Every lag, that of the load and what is left of the start among them."""
+    situation = situation_of(MOTION, WHEEL)
+    rim = WHEEL.radius * np.asarray(MOTION.wheel_speed)
+    ways = np.tanh((rim + np.asarray(MOTION.carriage_speed)) / (2.0 * CREEP))
+    whole = conditions_of(
+        np.asarray(situation.slip),
+        np.asarray(MOTION.load),
+        np.abs(rim),
+        ways,
+        WHEEL.radius * np.asarray(MOTION.wheel_angle),
+        Correction(FORM).usual,
+    )
+    found = [here.conditions for here in _on_line(FORM, MOTION)]
+    np.testing.assert_allclose(found, whole, rtol=1e-9, atol=1e-12)
+
+
+def test_conditions_tell_the_slip_100_mm_ago_and_the_start():
+    """After a step of slip the longest lag has 1/e of it left 100 mm later, and the shortest none;
+    of a start 1/e is left after 50 mm. Both in units of their lengths, and neither turns with the
+    direction of travel.
+    """
+    step = 2e-4
+    travel = step * np.arange(2001)  # [m]
+    begins = 1000
+    slip = np.where(np.arange(2001) < begins, 0.1, 0.4)
+    held = np.full(2001, 60.0)
+    for way in (1.0, -1.0):
+        found = conditions_of(
+            slip, held, held, np.full(2001, way), way * travel, Correction(FORM).usual
+        )
+        by_name = dict(zip(CONDITIONS, found.T, strict=True))
+        later = begins + round(0.1 / step)
+        longest = by_name["longest_lag"] * 0.15
+        assert longest[begins - 1] == pytest.approx(0.0, abs=1e-12)
+        assert longest[later] == pytest.approx(-0.3 / np.e, rel=0.01)
+        assert by_name["short_lag"][later] == pytest.approx(0.0, abs=1e-9)
+        start = by_name["start"] * 0.5
+        assert start[0] == 1.0
+        assert start[round(0.05 / step)] == pytest.approx(1.0 / np.e, rel=1e-9)
 
 
 def test_a_pull_that_was_not_measured_has_no_discrepancy():

@@ -40,6 +40,7 @@ def plan(
     seed: int = 1,
     reverse: bool = False,
     stop: bool = False,
+    speeds: Sequence[float] = (0.015, 0.03, 0.022),
     pace: float = 1.0,
 ) -> Plan:
     """One run a load; three slips and speeds each, in another order each run."""
@@ -48,9 +49,9 @@ def plan(
         order = np.roll(SLIPS, number)
         each = seconds / len(order)
         rest = [Segment(2.0, load, 0.2, 0.0)] if standstill else []
-        speeds = pace * np.roll((0.015, 0.03, 0.022), number // 2)
+        paces = pace * np.roll(speeds, number // 2)
         driven = [
-            Segment(each, load, float(s), float(v)) for s, v in zip(order, speeds, strict=True)
+            Segment(each, load, float(s), float(v)) for s, v in zip(order, paces, strict=True)
         ]
         back = [Segment(each, load, 0.2, -0.02)] if reverse else []
         end = [Segment(1.5, load, 0.2, 0.0)] if stop else []

@@ -2,6 +2,8 @@
 
 A value's noise is white noise plus two Ornstein-Uhlenbeck processes: a fast one (what neighbouring
 slopes share) and a slow one of correlation time τ. Its size and colour are found in estimate.py.
+What is uncertain of a single value is white noise beside these. It hides the slow noise at that
+value and does not make it larger.
 """
 
 from __future__ import annotations
@@ -43,12 +45,27 @@ class Noise:
     uncertain: Array  # (N,) what adds to the noise of single values, same unit as the value
     # (N, m) what each run may do for itself, each column one standard deviation (replicates.py)
     of_runs: Array
+    rougher: Array | float = 1.0  # (N,) or for all, by what all parts of the noise are larger
 
     @cached_property
     def loose(self) -> Array:
         """(N,) by how much a value's noise exceeds its channel's."""
-        sigma = np.array([c.sigma for c in self.colours])[self.stack.channel]
-        return np.asarray(np.sqrt(1.0 + (self.uncertain / sigma) ** 2))
+        return np.asarray(np.hypot(self.times, self.uncertain / self._sigma))
+
+    @cached_property
+    def times(self) -> Array:
+        """(N,) by what all parts of a value's noise are larger than its channel's."""
+        return np.broadcast_to(np.asarray(self.rougher, float), self.uncertain.shape)
+
+    @cached_property
+    def beside(self) -> Array:
+        """(N,) variance of the white noise beside a value's own, whose variance is 1."""
+        return np.asarray((self.uncertain / (self._sigma * self.times)) ** 2)
+
+    @cached_property
+    def _sigma(self) -> Array:
+        """(N,) of each value's channel."""
+        return np.asarray(np.array([c.sigma for c in self.colours])[self.stack.channel])
 
     @cached_property
     def whitener(self) -> sparse.csr_matrix:
@@ -57,8 +74,8 @@ class Noise:
         for channel, number in self.stack.parts:
             colour = self.colours[self.stack.rig.channels.index(channel)]
             own = self.stack.of(channel) & (self.stack.run == number)
-            unit = unit_whitener(self.stack.gaps[own], colour)
-            unit.data /= (colour.sigma * self.loose[own])[unit.indices]
+            unit = unit_whitener(self.stack.gaps[own], colour, self.beside[own])
+            unit.data /= (colour.sigma * self.times[own])[unit.indices]
             blocks.append(unit)
         return sparse.block_diag(blocks, format="csr")
 
@@ -73,14 +90,14 @@ class Noise:
         return slice(first, int(self._last_touched[first:end].max()) + 1)
 
 
-def unit_whitener(gaps: Array, colour: Colour) -> sparse.csr_matrix:
+def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> sparse.csr_matrix:
     """(n, n): n values of unit variance to innovations, as `whiten_unit` makes them, without
-    weights that are negligible.
+    weights that are negligible. beside: (n,) variance of white noise beside it.
 
     Diagonal by diagonal: what every value weighs in the innovation so many values later. All are
     soon forgotten, so the matrix is a narrow band.
     """
-    kept, gain, scale = (np.squeeze(part, -1) for part in _recursion(gaps, [colour]))
+    kept, gain, scale = (np.squeeze(p, -1) for p in _recursion(gaps, [colour], beside))
     kept, gain = kept[..., 0], gain[..., 0]
     forgotten = TUNING.noise.forgotten * TUNING.noise.negligible * scale.min(initial=1.0)
 
@@ -107,26 +124,28 @@ def unit_whitener(gaps: Array, colour: Colour) -> sparse.csr_matrix:
     return sparse.csr_matrix((np.concatenate(values), entries), shape=(gaps.size, gaps.size))
 
 
-def whiten_unit(columns: Array, gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array]:
+def whiten_unit(
+    columns: Array, gaps: Array, colours: Sequence[Colour], beside: Array | None = None
+) -> tuple[Array, Array]:
     """Innovations (g, n, m) of columns (n, m) under noise of g colours and unit variance; log det
-    of each correlation.
+    of each covariance. beside: (n,) or (n, g) variance of white noise beside it.
 
     The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear
     in n.
     """
-    recursion = _recursion(gaps, colours)
+    recursion = _recursion(gaps, colours, beside)
     pieces = list(_innovations(columns, recursion, len(columns)))
     out = np.concatenate([np.empty((len(colours), 0, columns.shape[1])), *pieces], axis=1)
     return out, _log_det(recursion)
 
 
 def products_of_innovations(
-    columns: Array, gaps: Array, colours: Sequence[Colour]
+    columns: Array, gaps: Array, colours: Sequence[Colour], beside: Array | None = None
 ) -> tuple[Array, Array]:
     """Products (g, m, m) of the innovations of columns (n, m), which are never all in memory; log
-    det of each correlation.
+    det of each covariance. beside: (n,) or (n, g) as of `whiten_unit`.
     """
-    recursion, (_, width) = _recursion(gaps, colours), columns.shape
+    recursion, (_, width) = _recursion(gaps, colours, beside), columns.shape
     rows = max(TUNING.noise.whitened_at_once // max(len(colours) * width, 1), 1)
 
     gram = np.zeros((len(colours), width, width))
@@ -157,36 +176,45 @@ def _innovations(
 
 
 def _log_det(recursion: tuple[Array, Array, Array]) -> Array:
-    """Of the correlation of each colour (g,)."""
+    """Of the covariance of each colour (g,)."""
     return np.asarray(2.0 * np.log(recursion[2]).sum(axis=0))
 
 
-def _recursion(gaps: Array, colours: Sequence[Colour]) -> tuple[Array, Array, Array]:
+def innovation_variance(gaps: Array, colours: Sequence[Colour]) -> Array:
+    """Usual variance (g,) of an innovation of noise of each colour and unit variance."""
+    return np.asarray(np.median(_recursion(gaps, colours)[2] ** 2, axis=0))
+
+
+def _recursion(
+    gaps: Array, colours: Sequence[Colour], beside: Array | None = None
+) -> tuple[Array, Array, Array]:
     """Decay since the value before (2, n, g, 1), gains (2, n, g, 1), standard deviation of the
-    innovation (n, g).
+    innovation (n, g). beside: (n,) or (n, g) variance of white noise beside that of each colour.
     """
     times = np.array(
         [[c.time for c in colours], [TUNING.noise.fast_time * step_of(gaps)] * len(colours)]
     )
     share = np.array([[c.slow for c in colours], [c.fast for c in colours]])
+    own = np.zeros(len(gaps)) if beside is None else beside
 
     kept = np.exp(-gaps[None, :, None] / times[:, None, :])
     gain, variance = np.empty_like(kept), np.empty(kept.shape[1:])
     decays: Any = kept.swapaxes(0, 1)
-    slow, fast, white = share[0], share[1], 1.0 - share.sum(axis=0)
+    slow, fast = share[0], share[1]
+    white: Any = 1.0 - share.sum(axis=0) + (own if own.ndim > 1 else own[:, None])
     if len(colours) == 1:  # floats take less time than arrays of one, with the same bits
-        decays = decays[..., 0].tolist()
-        slow, fast, white = (part.item() for part in (slow, fast, white))
+        decays, white = decays[..., 0].tolist(), white[:, 0].tolist()
+        slow, fast = (part.item() for part in (slow, fast))
     ss, ff, sf = slow, fast, 0.0 * slow
 
-    for i, (a, b) in enumerate(decays):
+    for i, ((a, b), alone) in enumerate(zip(decays, white, strict=True)):
         ss, ff, sf = (
             a * a * ss + slow * (1 - a * a),
             b * b * ff + fast * (1 - b * b),
             a * b * sf,
         )
         to_slow, to_fast = ss + sf, ff + sf
-        total = to_slow + to_fast + white
+        total = to_slow + to_fast + alone
         by_slow, by_fast = to_slow / total, to_fast / total
         gain[0, i], gain[1, i], variance[i] = by_slow, by_fast, total
         ss, ff, sf = ss - to_slow * by_slow, ff - to_fast * by_fast, sf - to_slow * by_fast
@@ -221,7 +249,8 @@ def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
         own = stack.of(channel)
         for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
             out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
-    return np.asarray(out * noise.loose[:, None])
+    alone = noise.uncertain[:, None] * rng.standard_normal(out.shape)
+    return np.asarray(out * noise.times[:, None] + alone)
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:

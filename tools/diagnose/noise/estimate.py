@@ -150,9 +150,7 @@ def restless(noise: Noise, residual: Array) -> Noise:
         colour = noise.colours[stack.rig.channels.index(channel)]
         louder_by[index] = _restlessness(residual[index], stack.gaps[index], colour)
 
-    sigma = np.array([c.sigma for c in noise.colours])[stack.channel]
-    more = sigma * np.sqrt(louder_by**2 - 1.0)
-    return replace(noise, uncertain=np.hypot(noise.uncertain, more))
+    return replace(noise, rougher=louder_by)
 
 
 def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:

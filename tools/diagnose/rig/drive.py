@@ -111,6 +111,11 @@ class DriveRig:
         """Nothing (n,): both sides of the comparison go through one filter."""
         return [{"torque": np.zeros_like(run.time)} for run in self.runs]
 
+    @property
+    def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """Nothing, for the same reason."""
+        return ()
+
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:

@@ -204,6 +204,12 @@ class Rig(Protocol):
         the motion, in the channel's unit.
         """
 
+    @property
+    def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """Of each part that moves, per run, what every channel (n,) is predicted too low by if the
+        unrest of its speed is noise of the sensor, in the channel's unit.
+        """
+
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
@@ -274,6 +280,12 @@ class Stack:
     def motion_sigma(self) -> Array:
         """(N,) in the channels' units: see Rig.motion_sigma."""
         return self.joined(self.rig.motion_sigma)
+
+    @cached_property
+    def unrest(self) -> Array:
+        """Columns (N, k) in the channels' units: see Rig.unrest; those that act."""
+        columns = [self.joined(part) for part in self.rig.unrest]
+        return np.column_stack([np.zeros((self.size, 0)), *(c for c in columns if np.any(c))])
 
     @cached_property
     def gaps(self) -> Array:

@@ -32,6 +32,7 @@ from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.recorded import channels_of, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import states
+from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import weights_of
 from gritd.tools.diagnose.tuning import TUNING
@@ -264,18 +265,25 @@ class WheelRig:
         """By the encoders' counts (n,): slip is uncertain by what a carriage would make of it that
         is off by as much.
         """
-        place = next(
-            i for i, constant in enumerate(self.constants) if constant.name == "carriage_scale"
-        )
-        u = np.zeros(len(self.constants))
-        before = self.predict(u, ())
-        u[place] = 1.0
-
-        share = [doubt / self.constants[place].sigma for doubt in self._doubt]
         return [
-            {c: np.abs(after[c] - was[c]) * s for c in self.channels}
-            for was, after, s in zip(before, self.predict(u, ()), share, strict=True)
+            {channel: np.abs(change) * doubt for channel, change in by_speed.items()}
+            for by_speed, doubt in zip(self._by_carriage, self._doubt, strict=True)
         ]
+
+    @cached_property
+    def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """Of wheel and carriage: slip follows the ratio of their speeds."""
+        return unrest_in(self._motions, self._by_carriage)
+
+    @cached_property
+    def _by_carriage(self) -> list[dict[str, Array]]:
+        """Per run, change of every channel (n,) by ln of the carriage's speed."""
+        names = [constant.name for constant in self.constants]
+        moved = np.array([float(name == "carriage_scale") for name in names])
+        told = zip(self.predict(0.0 * moved, ()), self.predict(moved, ()), strict=True)
+
+        sigma = self.constants[names.index("carriage_scale")].sigma
+        return [{c: (two[c] - one[c]) / sigma for c in self.channels} for one, two in told]
 
     def blur(self, stack: Stack, predicted: Array) -> Array:
         """(N,) by slopes over three intervals, and by an axle that lags."""

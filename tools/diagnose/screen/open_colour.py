@@ -32,9 +32,14 @@ from scipy.special import logsumexp
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
-from gritd.tools.diagnose.noise.colour import Colour, products_of_innovations
+from gritd.tools.diagnose.noise.colour import (
+    Colour,
+    Noise,
+    innovation_variance,
+    products_of_innovations,
+)
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
-from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -86,7 +91,7 @@ class OpenNoise:
         self._colours = colours()
         self._prior = log_prior(self._colours, stack.gaps)
         self._squares = [
-            _squares(columns[own], stack.gaps_of(own), problem.noise.loose[own], self._colours)
+            _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
             for own in (stack.of(channel) for channel in stack.rig.channels)
             if own.any()
         ]
@@ -137,8 +142,20 @@ class OpenNoise:
         return SuitableColours(gram[near], rest, variance[near], squares.count)
 
 
-def _squares(columns: Array, gaps: Array, loose: Array, tried: Sequence[Colour]) -> Squares:
-    gram, log_det = products_of_innovations(columns / loose[:, None], gaps, tried)
+def _squares(
+    columns: Array, gaps: Array, noise: Noise, own: Bools, tried: Sequence[Colour]
+) -> Squares:
+    """Of one channel's columns (n, m), its values marked (N,).
+
+    What is uncertain of single values is known in the channel's unit. Of a colour the recordings
+    tell the size of its innovations: by these the colours are of equal size.
+    """
+    (number,) = np.unique(noise.stack.channel[own])
+    assumed = noise.colours[number]
+    innovations = innovation_variance(gaps, [assumed, *tried])
+    share = innovations[1:] / innovations[0]  # of the assumed variance, by that of each colour
+    beside = noise.beside[own][:, None] * share
+    gram, log_det = products_of_innovations(columns / noise.times[own, None], gaps, tried, beside)
     return Squares(gram, log_det, len(columns))
 
 

@@ -118,6 +118,10 @@ class Rig:
     rest_speed: float = tuned(0.01, "-", "of the usual rim speed: slower is the encoder's noise")
     lifted: float = tuned(0.2, "-", "of the least load: below it the wheel is lifted")
 
+    # --- unrest.py ---
+    unrest_values: int = tuned(61, "values", "whose median is the speed of a held condition")
+    unrest_most: float = tuned(7.5, "times", "the usual unrest: beyond, the motion changes")
+
     # --- weight_sets.py ---
     held_values: int = tuned(
         10, "values", "at exactly one load make a set of weights; in between they are changed"

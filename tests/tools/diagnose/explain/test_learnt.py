@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from gritd.config import packaged
+from gritd.estimator.config import configuration as config
+from gritd.estimator.model.learnt import CHANNELS
+from gritd.tools.diagnose.explain.apply import rewritten
 from gritd.tools.diagnose.explain.learnt import _parted
+from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
 
 
 def test_soil_at_its_bound_is_correlated_with_nothing() -> None:
@@ -13,3 +24,38 @@ def test_soil_at_its_bound_is_correlated_with_nothing() -> None:
     sigma, correlation = _parted(covariance)
     np.testing.assert_allclose(sigma, [2.0, 1.0, 1.0])
     np.testing.assert_allclose(correlation, [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.5, 0.0, 1.0]])
+
+
+def _bent(signals: Signals) -> Signals:
+    """The same run without motor and torque sensor; its pull bends with slip as no listed effect
+    has it.
+    """
+    rim = settings().wheel.radius * np.maximum(signals.wheel_speed, 1e-6)
+    slip = 1.0 - settings().pulley_radius * signals.carriage_rate / rim
+    kept = {n: v for n, v in signals.analogue.items() if n not in ("current", "axle_torque")}
+    bend = 1.0 + 0.15 * np.sin(2.0 * np.pi * np.clip(slip, 0.0, 1.0))
+    return replace(signals, analogue={**kept, "drawbar_pull": bend * kept["drawbar_pull"]})
+
+
+def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None:
+    """`--apply` writes δ of what was measured, and of torque none; the file loads; the same rig
+    diagnosed with it has nothing new.
+    """
+    first, later = ([_bent(s) for s in record(plan(seed=n, seconds=30.0), ())] for n in (3, 4))
+    found = diagnose(WheelRig(first, settings()), quick=True)
+    assert found.verdict != "consistent"
+    assert found.learnt is not None
+
+    stated = config.load(packaged())
+    applied = config.loads(rewritten(stated.text, stated, found), "applied", packaged().parent)
+    form = applied.settings.discrepancy
+    assert form is not None
+    by_name = dict(zip(CHANNELS, form.channels, strict=True))
+    assert by_name["torque"] is None
+    assert by_name["drawbar_pull"] is not None and by_name["drawbar_pull"].size > 0.0
+
+    rig = WheelRig(later, applied.settings)
+    assert rig.held is not None and "torque" not in rig.channels
+    assert diagnose(rig, quick=True).verdict == "consistent"
+    without = WheelRig(later, replace(applied.settings, discrepancy=None))
+    assert diagnose(without, quick=True).verdict != "consistent"

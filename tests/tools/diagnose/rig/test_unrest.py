@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
+from scipy.stats import norm
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.library import make
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.fit.base import BaseFit
+from gritd.tools.diagnose.fit.model import fit_model
+from gritd.tools.diagnose.fit.problem import Free, Maker, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.unrest import unrest_of
@@ -76,17 +81,51 @@ def test_a_fit_knows_the_noise_of_the_wheels_speed() -> None:
     assert wheel == pytest.approx(1.0, abs=0.3)
 
 
-def test_friction_that_falls_with_speed_has_no_more_evidence_than_friction_at_one_speed() -> None:
+def _evidence(base: BaseFit, effect: Maker, free: tuple[Free, ...]) -> float:
+    start = np.array([0.1, 0.0])[: len(free)]
+    none = tuple(0 for _ in base.forms)
+    model = fit_model(base.problem, base.forms, (effect,), free, (base.fitted.u, start), none)
+    assert model.fitted.converged
+    return model.evidence
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> BaseFit:
+    """The base fit of a rig whose drive loses 0.05 N·m, driven at one speed."""
+    rig = _noisy_rig([make("coulomb_friction", {"loss": 0.05})])
+    return fit_base(rig, np.random.default_rng(0))
+
+
+def test_friction_that_falls_with_speed_has_no_more_evidence_than_friction_at_one_speed(
+    rubbing: BaseFit,
+) -> None:
     """At one speed Stribeck's curve is Coulomb's constant. Only noise of the measured speed could
     tell them apart.
     """
-    base = fit_base(
-        _noisy_rig([make("coulomb_friction", {"loss": 0.05})]), np.random.default_rng(0)
+    effects = rubbing.problem.stack.rig.effects
+    coulomb, stribeck = (
+        _evidence(rubbing, effect, free_of((effect,)))
+        for effect in (effects["coulomb_friction"], effects["stribeck_friction"])
     )
-    problem, effects = base.problem, base.problem.stack.rig.effects
-    nats = {}
-    for name in ("coulomb_friction", "stribeck_friction"):
-        free = free_of((effects[name],))
-        start = np.array([0.1, 0.0])[: len(free)]
-        nats[name] = problem.descend((effects[name],), free, base.fitted.u, start).nats
-    assert nats["stribeck_friction"] > nats["coulomb_friction"] - 1.0
+    assert stribeck < coulomb + 1.0
+
+
+def test_evidence_along_a_ridge_is_that_of_a_sum_over_its_shape(rubbing: BaseFit) -> None:
+    """At one speed the strength of Stribeck's curve and the speed at which it falls are one: the
+    optimum is a curved ridge. Laplace's formula in both is held against a sum over the speed, each
+    fitted by itself.
+    """
+    effect = rubbing.problem.stack.rig.effects["stribeck_friction"]
+    strength, speed = free_of((effect,))
+    known = speed.parameter
+    step = 0.6
+    places = [x for x in np.arange(-1.2, 4.2, step) if speed.value(x) > known.low]
+
+    held = []
+    for x in places:
+        maker = partial(effect, **{known.name: speed.value(x)})
+        maker.name = effect.name  # type: ignore[attr-defined]
+        held.append(_evidence(rubbing, maker, (replace(strength, effect=maker),)))
+    prior = step * norm.pdf(places)
+    total = float(logsumexp(held, b=prior))
+    assert _evidence(rubbing, effect, (strength, speed)) == pytest.approx(total, abs=1.5)

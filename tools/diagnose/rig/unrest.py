@@ -45,13 +45,15 @@ def unrest_of(motion: Motion) -> tuple[Array, Array]:
 
 
 def _unrest(speed: Array, moving: Bools) -> Array:
-    """ln speed (n,) beside the median of its neighbours; 0 at rest, and where it is so much more
-    than usual that the motion itself changes.
+    """ln speed (n,) beside the median of its neighbours; 0 at rest, where it is so much more than
+    usual that the motion itself changes, and in a run whose speed is never held.
     """
     if moving.sum() < TUNING.rig.unrest_values:
         return np.zeros(speed.size)
     logarithm = np.log(np.where(moving, speed, 1.0))
     beside = logarithm - median_filter(logarithm, TUNING.rig.unrest_values, mode="nearest")
     usual = float(np.median(np.abs(beside[moving])))
+    if usual > TUNING.rig.unrest_largest:
+        return np.zeros(speed.size)
     counts = moving & (np.abs(beside) <= TUNING.rig.unrest_most * usual)
     return np.where(counts, beside, 0.0)

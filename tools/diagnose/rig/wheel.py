@@ -272,8 +272,8 @@ class WheelRig:
 
     @cached_property
     def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """Of wheel and carriage: slip follows the ratio of their speeds."""
-        return unrest_in(self._motions, self._by_carriage)
+        """Of wheel and carriage; nothing in tables, whose speeds are those of states."""
+        return () if self._tabled else unrest_in(self._motions, self._by_carriage)
 
     @cached_property
     def _by_carriage(self) -> list[dict[str, Array]]:

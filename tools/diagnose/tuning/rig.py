@@ -121,6 +121,7 @@ class Rig:
     # --- unrest.py ---
     unrest_values: int = tuned(61, "values", "whose median is the speed of a held condition")
     unrest_most: float = tuned(7.5, "times", "the usual unrest: beyond, the motion changes")
+    unrest_largest: float = tuned(0.03, "-", "usual unrest: more is no noise of a speed sensor")
 
     # --- weight_sets.py ---
     held_values: int = tuned(

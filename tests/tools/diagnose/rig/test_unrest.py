@@ -53,6 +53,12 @@ def test_unrest_is_what_a_held_speed_shows_beside_itself() -> None:
     np.testing.assert_allclose(carriage, 0.0, atol=1e-12)
 
 
+def test_a_speed_that_is_never_held_has_no_unrest() -> None:
+    swinging = 0.2 + 0.05 * np.sin(0.3 * np.arange(400))
+    wheel, _ = unrest_of(_moving(swinging, 0.02 + 0.0 * swinging))
+    assert not wheel.any()
+
+
 def test_a_short_run_has_no_unrest() -> None:
     wheel, carriage = unrest_of(_moving(np.full(30, 0.2), np.full(30, 0.02)))
     assert not wheel.any() and not carriage.any()

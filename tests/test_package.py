@@ -96,6 +96,7 @@ def test_the_wheel_holds_the_compiled_arithmetic_where_there_is_a_compiler(wheel
     assert {Path(name).name.partition(".")[0] for name in compiled} == {
         "algebra",
         "closed",
+        "innovations",
         "messages",
         "record",
         *of_x86,

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import solve_banded
 
+from gritd.estimator.compiled import whitening
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
@@ -158,21 +159,40 @@ def _innovations(
     columns: Array, recursion: tuple[Array, Array, Array], at_once: int
 ) -> Iterator[Array]:
     """Of so many rows after the other, (g, k, m)."""
-    kept, gain, scale = recursion
-    slow, fast = (np.zeros((scale.shape[1], columns.shape[1])) for _ in range(2))
+    columns, (length, colours) = np.ascontiguousarray(columns, dtype=float), recursion[2].shape
+    slow, fast = (np.zeros((colours, columns.shape[1])) for _ in range(2))
 
-    for first in range(0, len(columns), max(at_once, 1)):
-        rows = range(first, min(first + at_once, len(columns)))
-        out = np.empty((scale.shape[1], len(rows), columns.shape[1]))
-        for place, i in enumerate(rows):
-            slow *= kept[0, i]
-            fast *= kept[1, i]
-            innovation = columns[i] - slow - fast
-            out[:, place] = innovation
-            slow += gain[0, i] * innovation
-            fast += gain[1, i] * innovation
-        out /= scale[rows.start : rows.stop].T[:, :, None]
+    for first in range(0, length, max(at_once, 1)):
+        rows = range(first, min(first + at_once, length))
+        out = np.empty((colours, len(rows), columns.shape[1]))
+        if whitening.BUILT:
+            sizes = (length, colours, columns.shape[1], first, len(rows))
+            whitening.fill(columns, *recursion, slow, fast, out, *sizes)
+        else:
+            _follow(columns, recursion, slow, fast, out, rows)
         yield out
+
+
+def _follow(
+    columns: Array,
+    recursion: tuple[Array, Array, Array],
+    slow: Array,
+    fast: Array,
+    out: Array,
+    rows: range,
+) -> None:
+    """Fills `out` (g, k, m) with the innovations of some rows, from and to the states slow and fast
+    (g, m) of both processes: compiled/innovations.c with the same bits.
+    """
+    kept, gain, scale = recursion
+    for place, i in enumerate(rows):
+        slow *= kept[0, i]
+        fast *= kept[1, i]
+        innovation = columns[i] - slow - fast
+        out[:, place] = innovation
+        slow += gain[0, i] * innovation
+        fast += gain[1, i] * innovation
+    out /= scale[rows.start : rows.stop].T[:, :, None]
 
 
 def _log_det(recursion: tuple[Array, Array, Array]) -> Array:

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from gritd.estimator.compiled import whitening
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import plain
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum, strength_sizes
@@ -134,6 +135,24 @@ def test_products_of_innovations_are_the_same_however_many_are_in_memory() -> No
         gram, same = products_of_innovations(columns, GAPS, tried)
     np.testing.assert_allclose(gram, whitened.transpose(0, 2, 1) @ whitened, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(same, log_det)
+
+
+@pytest.mark.skipif(not whitening.BUILT, reason="gritd was installed without a compiler")
+def test_compiled_innovations_have_the_bits_of_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    columns = np.asfortranarray(np.random.default_rng(4).standard_normal((GAPS.size, 7)))
+    tried = [Colour(1.0, 2.0, 0.5, 0.3), Colour(1.0, 0.5, 0.0), Colour(1.0, 4.0, 0.95, 0.04)]
+    compiled, _ = whiten_unit(columns, GAPS, tried)
+    monkeypatch.setattr(whitening, "BUILT", False)
+    by_loop, _ = whiten_unit(columns, GAPS, tried)
+    np.testing.assert_array_equal(compiled, by_loop)
+
+
+@pytest.mark.skipif(not whitening.BUILT, reason="gritd was installed without a compiler")
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    some, state = np.zeros((4, 3)), np.zeros((2, 3))
+    kept, scale, out = np.zeros((2, 4, 2)), np.ones((4, 2)), np.zeros((2, 4, 3))
+    with pytest.raises(ValueError, match="do not fit"):
+        whitening.fill(some, kept, kept, scale, state, state.copy(), out, 4, 2, 3, 1, 4)
 
 
 def test_a_relaxing_process_remembers_as_a_filter_of_first_order_does() -> None:

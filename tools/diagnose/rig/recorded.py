@@ -33,6 +33,15 @@ def channels_of(
     return tuple(channels)
 
 
+def loss_measured(signals: Sequence[Signals], channels: Sequence[str]) -> bool:
+    """Whether the loss of the drive can be read off: the torque behind it is measured wherever the
+    motor's is. Else some motor torque would be compared with nothing.
+    """
+    driven = [s for s in signals if _varies(s.analogue.get("current"))]
+    both = all(_varies(s.analogue.get("axle_torque")) for s in driven)
+    return both and {"torque", "axle_torque"} <= set(channels)
+
+
 def _varies(values: Array | None) -> bool:
     return values is not None and bool(np.nanmax(values) > np.nanmin(values))
 

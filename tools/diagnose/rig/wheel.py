@@ -29,7 +29,7 @@ from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.held import HeldForm
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index, LawForm, Run, Stack
 from gritd.tools.diagnose.rig.proposals import driving, proposed
-from gritd.tools.diagnose.rig.recorded import channels_of, measured_of, motion_of
+from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.states import states
 from gritd.tools.diagnose.rig.unrest import unrest_in
@@ -92,7 +92,7 @@ class WheelRig:
             new: min(s.start for s, n in zip(signals, self.new, strict=True) if n == new)
             for new in set(self.new)
         }
-        self.loss_of_drive = read_off and {"torque", "axle_torque"} <= set(self.channels)
+        self.loss_of_drive = read_off and loss_measured(signals, self.channels)
         if self.loss_of_drive:
             self.caveats.append(LOSS_NOTE)
         self._tabled = tables(signals)

@@ -11,10 +11,12 @@ import pytest
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.fit.discrepancy import _columns
+from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import LOSS_NOTE, WheelRig
 from gritd.tools.proof.ours.cases import record
-from tests.tools.diagnose.campaigns import plan, settings
+from tests.tools.diagnose.campaigns import group, plan, settings
 
 LOSS = 0.8  # [N·m]
 
@@ -64,3 +66,23 @@ def test_without_axle_torque_the_motors_is_compared() -> None:
     rig = WheelRig(signals, settings())
     assert LOSS_NOTE not in rig.caveats
     assert not any(source.drive for source in rig.forms)
+
+
+def test_a_motor_without_axle_torque_beside_it_is_compared_with_the_model() -> None:
+    """Friction of later runs, whose torque behind the drive was not measured, is found."""
+    friction = (make("coulomb_friction", {"loss": LOSS}),)
+    first = record(plan(), ())
+    later = [_without_axle(s) for s in record(plan(seed=5), friction)]
+
+    rig = WheelRig([*first, *later], settings(), len(first), "same")
+    assert not rig.loss_of_drive
+    assert all(run.used["torque"].any() for run in rig.runs)
+
+    found = diagnose(rig, quick=True)
+    assert found.verdict == "explained"
+    assert "coulomb_friction" in group(found)
+
+
+def _without_axle(signals: Signals) -> Signals:
+    kept = {n: v for n, v in signals.analogue.items() if n != "axle_torque"}
+    return replace(signals, name=f"later-{signals.name}", analogue=kept)

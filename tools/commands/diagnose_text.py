@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from gritd.estimator.visible import visible
+from gritd.tools.cli.wording import number, shown, spelled
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
     Fit,
@@ -13,6 +14,10 @@ from gritd.tools.diagnose.explain.result import (
     NextExperiment,
     SoilFit,
 )
+from gritd.tools.report.words import quantity
+
+SHOWN = 4  # places and hypotheses
+NAMES = {"c": "c", "tan_phi": "tan φ"}
 
 
 def text(diagnosis: Diagnosis) -> str:
@@ -20,8 +25,8 @@ def text(diagnosis: Diagnosis) -> str:
     lines = [
         f"verdict: {diagnosis.verdict}",
         diagnosis.summary,
-        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:4]),
-        *map(_hypothesis, diagnosis.hypotheses[:4]),
+        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:SHOWN]),
+        *map(_hypothesis, diagnosis.hypotheses[:SHOWN]),
     ]
     if diagnosis.law is not None:
         lines.append(f"  law: {diagnosis.law.expression} (takes {diagnosis.law.share:.0%})")
@@ -37,37 +42,36 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _hypothesis(of: Hypothesis) -> str:
-    values = ", ".join(
-        f"{n} {q.value:.3g} ± {q.sigma:.2g} {q.unit}".rstrip() for n, q in of.parameters.items()
-    )
+    head = f"  {'*' if of.accepted else ' '} {of.effect} {of.probability:.2f}"
+    values = ", ".join(f"{name} {quantity(q)}" for name, q in of.parameters.items())
     alike = f"; like {', '.join(of.indistinguishable_from)}" if of.indistinguishable_from else ""
-    return f"  {'*' if of.accepted else ' '} {of.effect} {of.probability:.2f}: {values}{alike}"
+    return f"{head}{f': {values}' if values else ''}{alike}"
 
 
 def _soil(soil: SoilFit) -> Iterator[str]:
-    for name in ("c", "tan_phi"):
-        before, after = soil.before[name], soil.after[name]
-        yield (
-            f"  {name}: {before.value:.4g} ± {before.sigma:.2g} before, "
-            f"{after.value:.4g} ± {after.sigma:.2g} {after.unit} after"
-        )
+    for key, name in NAMES.items():
+        before, after = soil.before[key], soil.after[key]
+        yield f"  {name}: {quantity(before)} before, {quantity(after)} after"
     if strained := soil.strained():
         yield f"  {strained}"
 
 
 def _fit(fit: Fit) -> Iterator[str]:
-    for channel, unit in fit.unit.items():
+    for channel, inside in fit.unit.items():
+        unit, factor = shown(inside)
+        before, after = (number(of[channel] * factor) for of in (fit.before, fit.after))
+        noise = number(fit.noise_floor[channel] * factor, 2)
         yield (
-            f"  held-out {channel}: {fit.before[channel]:.3g} before, "
-            f"{fit.after[channel]:.3g} after, noise {fit.noise_floor[channel]:.2g} {unit}"
+            f"  error of {spelled(channel)} on runs held out: {before} before, {after} after,"
+            f" noise {noise} {unit}".rstrip()
         )
 
     if fit.innovation_before and fit.innovation_after:
         ratios = ", ".join(
-            f"{name} {ratio:.2g} before, {fit.innovation_after.get(name, ratio):.2g} after"
+            f"{spelled(name)} {ratio:.2g} before, {fit.innovation_after.get(name, ratio):.2g} after"
             for name, ratio in fit.innovation_before.items()
         )
-        yield f"  on-line filter, innovation over its sigma: {ratios}"
+        yield f"  innovation of the on-line filter over its σ: {ratios}"
     elif fit.innovation_note:
         yield f"  on-line filter: {fit.innovation_note}"
 

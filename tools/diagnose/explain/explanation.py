@@ -9,6 +9,7 @@ import numpy as np
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
+from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
@@ -27,7 +28,7 @@ from gritd.tools.diagnose.explain.result import (
 from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
 from gritd.tools.diagnose.explain.traces import scatters, traces
-from gritd.tools.diagnose.explain.wording import label
+from gritd.tools.diagnose.explain.wording import described, label
 from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
@@ -220,10 +221,10 @@ def _caveats(rig: Rig, redo: Mapping[str, Any]) -> list[str]:
 def _remaining(decision: Decision) -> str:
     if decision.beside is None:
         return "Nothing above the noise remains."
-    names = ", ".join(dict.fromkeys(label(f.shape.family) for f in decision.beside.functions))
+    kinds = ", ".join(dict.fromkeys(described(f.shape) for f in decision.beside.functions))
     return (
-        f"Something without a name remains: {names}. Functions for it gain"
-        f" {decision.beside.gain:.0f} nats."
+        f"Something without a name remains: {kinds}. It gains {decision.beside.gain:.0f} nats of"
+        " evidence."
     )
 
 
@@ -241,9 +242,9 @@ def _summary(decision: Decision, location: Sequence[Location], p: float, subject
     if decision.verdict == "unlisted":
         return f"{differ} in a way no listed effect explains.{where}"
 
-    names = " and ".join(decision.best.names)
+    names = listed(list(decision.best.names))
     verb = "explains" if len(decision.best.names) == 1 else "explain"
     alike = {r for n in decision.best.names for r in decision.groups.get(n, ())}
-    others = ", ".join(sorted(alike))
-    doubt = f" It cannot be told apart from {others} with these recordings." if alike else ""
+    rivals = ", ".join(sorted(alike))
+    doubt = f" It cannot be told apart from {rivals} with these recordings." if alike else ""
     return f"{differ}; {names} {verb} {decision.share:.0%} of it.{doubt}{where}"

@@ -39,6 +39,7 @@ AT = {  # a value of a covariate, in words
     "heat": "∫I² dt of {}",
     "acceleration": "{}",
 }
+PLACES = {"time": "over time", "position": "along the bed"}
 WINDOW = 2  # change points between which something is another
 TIMES = {1: "once", 2: "twice"}
 
@@ -51,6 +52,13 @@ def label(candidate: Candidate) -> str:
         return f"{candidate.channel} beyond what is known of it"
     along = f"{candidate.channel}~{'·'.join(candidate.along)}"
     return along if candidate.kind == "smooth" else f"{along} {candidate.kind}"
+
+
+def described(shape: Shape) -> str:
+    """A misfit without a name in words: `a step in drawbar pull along the bed`."""
+    where = " and ".join(PLACES.get(name, f"with {spelled(name)}") for name in shape.along)
+    kind = "smooth change" if shape.kind == "smooth" else shape.kind
+    return f"a {kind} in {spelled(shape.channel)} {where}"
 
 
 def sentence(

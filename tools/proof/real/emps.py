@@ -172,7 +172,9 @@ def _checks(diagnosis: DiagnosisRun, identified: Array, before: float, after: fl
         )
 
     checks.append(
-        Check("Does it say that something remains?", "yes", remains, "something remains" in remains)
+        Check(
+            "Does it say that something remains?", "yes", remains, remains.startswith("Something")
+        )
     )
 
     question = "Is the force of the unseen log predicted better?"

@@ -15,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
@@ -30,12 +31,11 @@ from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.apply import is_known, rewritten
 from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_innovations
-from gritd.tools.diagnose.explain.result import (
-    Diagnosis,
-)
+from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, read_all
+from gritd.tools.diagnose.search.parallel import meanwhile
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -289,20 +289,20 @@ def of_files(
         "versions": versions(),
     }
     damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
-    remarks = [
-        *provenance.remarks(recordings, settings),
-        *(f"Damaged: {line}" for line in damage),
-    ]
+    remarks = [*provenance.remarks(recordings, settings), *(f"Damaged: {d}" for d in damage)]
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         soil = any(constant.soil for constant in rig.constants)
-        before = Filtered() if quick else filtered(configuration, recordings, soil, jobs)
-        del recordings, known  # long ones are large; they are read again where they are needed
-        each = step if callable(step) else lambda _: None
-        diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
-        if not quick:
-            diagnosis = with_innovations(diagnosis, configuration, before, files, jobs)
+        # long recordings are large: they are let go, and read again where they are needed
+        work = Filtered if quick else partial(filtered, configuration, recordings, soil)
+        del recordings, known
+        with meanwhile(jobs, work) as before:
+            del work
+            each = step if callable(step) else lambda _: None
+            diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
+            if not quick:
+                diagnosis = with_innovations(diagnosis, configuration, before(), files, jobs)
 
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)

@@ -40,18 +40,15 @@ class Filtered:
 
 
 def filtered(
-    configuration: config.Configuration,
-    recordings: Sequence[Recording],
-    soil: bool,
-    jobs: int = 1,
+    configuration: config.Configuration, recordings: Sequence[Recording], soil: bool
 ) -> Filtered:
-    """By the given configuration; soil: whether the rig has any; jobs: processes."""
+    """By the given configuration; soil: whether the rig has any."""
     if not soil:
         return Filtered(note=NO_FILTER)
 
     try:
         reads = [partial(_same, recording) for recording in recordings]
-        found = innovations(configuration.settings, reads, jobs)
+        found = innovations(configuration.settings, reads)
     except (RecordingError, config.ConfigError) as error:
         return Filtered(note=_failed(error))
     return Filtered(found) if found else Filtered(note=NO_UPDATE)

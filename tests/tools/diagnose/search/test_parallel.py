@@ -1,0 +1,36 @@
+"""Work in children: the same results, and errors that reach whoever asks."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from gritd.tools.diagnose.search.parallel import each, meanwhile
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_results_come_in_order(jobs: int) -> None:
+    assert each(jobs, lambda x: x * x, [3, 1, 2]) == [9, 1, 4]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_is_done_meanwhile_is_there_when_asked_for(jobs: int) -> None:
+    with meanwhile(jobs, lambda: (os.getpid(), [1.5])) as result:
+        process, made = result()
+    assert made == [1.5] and (process == os.getpid()) == (jobs == 1)
+
+
+def test_an_error_of_a_child_is_raised_where_its_result_is_asked_for() -> None:
+    def fails() -> None:
+        raise ValueError("no such thing")
+
+    with meanwhile(2, fails) as result, pytest.raises(ValueError, match="no such thing"):
+        result()
+
+
+def test_a_child_that_is_killed_is_told_and_nobody_waits_for_it() -> None:
+    with meanwhile(2, lambda: os._exit(9)) as result, pytest.raises(ChildProcessError):
+        result()
+    with meanwhile(2, lambda: os.read(os.pipe()[0], 1)):
+        pass  # its result is not asked for

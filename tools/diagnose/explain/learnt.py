@@ -276,18 +276,25 @@ def _domain(stack: Stack, sources: list[FormSource]) -> Domain:
 
     forward, backward = bool(np.any(direction > 0.0)), bool(np.any(direction < 0.0))
     return Domain(
-        _ends(slip, TUNING.explain.learnt_end_places),
-        _ends(load, TUNING.explain.learnt_end_places),
-        _ends(speed, TUNING.explain.learnt_speed_places),
+        _ends(slip, TUNING.explain.learnt_end_places, -1.0, 1.0),  # farther no condition goes
+        _above_zero(load, TUNING.explain.learnt_end_places),
+        _above_zero(speed, TUNING.explain.learnt_speed_places),
         "both" if forward and backward else "forward" if forward else "backward",
     )
 
 
-def _ends(values: Array, places: int) -> tuple[float, float]:
-    """The range of values, a few hundredths wider, outwards to so many decimals."""
+def _above_zero(values: Array, places: int) -> tuple[float, float]:
+    """The range of positive values: no less than what so many decimals show."""
+    return _ends(values, places, 10.0**-places)
+
+
+def _ends(values: Array, places: int, least: float, most: float = np.inf) -> tuple[float, float]:
+    """The range of values, a few hundredths wider, outwards to so many decimals; from least to
+    most.
+    """
     beyond = TUNING.explain.learnt_beyond
     low, high = (float(np.quantile(values, q)) for q in (beyond, 1.0 - beyond))
     margin, unit = TUNING.explain.learnt_margin * max(abs(low), abs(high)), 10.0**-places
     low, high = low - margin, high + margin
-    ends = np.floor(low / unit) * unit, np.ceil(high / unit) * unit
+    ends = np.clip((np.floor(low / unit) * unit, np.ceil(high / unit) * unit), least, most)
     return round(float(ends[0]), places), round(float(ends[1]), places)

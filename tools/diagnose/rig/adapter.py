@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
@@ -60,14 +62,17 @@ def rig_of(
 
 def _check_drives(rig: WheelRig, new: bool, recordings: Sequence[Recording]) -> None:
     """Raises CommandError where the runs of a campaign are too short for a channel to tell
-    anything: values count from some time after the wheel has started.
+    anything: values count from some time after the wheel has started. What a campaign did not
+    measure at all is no channel of it.
     """
     runs = [run for run, acting in zip(rig.runs, rig.new, strict=True) if acting == new]
-    counts = {c: sum(int(run.used[c].sum()) for run in runs) for c in rig.channels}
-    channel, least = min(counts.items(), key=lambda item: item[1])
-
-    if runs and not least:
-        names = ", ".join(str(recording.path) for recording in recordings)
+    if not runs:
+        return
+    names = ", ".join(str(recording.path) for recording in recordings)
+    measured = [c for c in rig.channels if any(np.isfinite(r.measured[c]).any() for r in runs)]
+    counts = {c: sum(int(run.used[c].sum()) for run in runs) for c in measured}
+    channel, least = min(counts.items(), key=lambda item: item[1], default=("any channel", 0))
+    if not least:
         raise CommandError(
             f"{names}: found no value of {channel} while the wheel drives steadily;"
             " expected a run that goes on for longer after the wheel has started",

@@ -1,0 +1,49 @@
+"""Which campaigns can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from gritd.tools.cli.command import CommandError
+from gritd.tools.diagnose.rig.adapter import _check_drives
+from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+FILES = cast(Any, [SimpleNamespace(path=Path("one.mcap"))])
+
+
+def _without(signals: Signals, *names: str) -> Signals:
+    kept = {n: v for n, v in signals.analogue.items() if n not in names}
+    return replace(signals, analogue=kept)
+
+
+@pytest.mark.parametrize("missing", ["current", "drawbar_pull", "sinkage"])
+@pytest.mark.parametrize("new", [False, True])
+def test_a_channel_that_one_campaign_did_not_measure_is_no_obstacle(
+    missing: str, new: bool
+) -> None:
+    before, after = record(plan(), ()), record(plan(seed=5), ())
+    poorer = [_without(s, missing, "axle_torque") for s in (after if new else before)]
+    runs = [*before, *poorer] if new else [*poorer, *after]
+    rig = WheelRig(runs, settings(), len(before), "same")
+    for campaign in (False, True):
+        _check_drives(rig, campaign, FILES)
+
+
+def test_a_channel_that_was_measured_while_the_wheel_stood_is_one() -> None:
+    still = [
+        replace(s, wheel_speed=0.0 * s.wheel_speed, carriage_rate=0.0 * s.carriage_rate)
+        for s in record(plan(), ())
+    ]
+    rig = WheelRig(still, settings())
+    assert np.isfinite(rig.runs[0].measured["drawbar_pull"]).all()
+    with pytest.raises(CommandError, match=r"^one\.mcap: found no value of .* drives steadily"):
+        _check_drives(rig, True, FILES)

@@ -23,18 +23,21 @@ RIM_SPEED = 0.02  # [m/s]
 LOADS = (40.0, 70.0, 100.0)  # [N] of the runs in turn
 SLIPS = (0.1, 0.2, 0.3, 0.45, 0.6)
 SHORT = 60.0  # [s] of each run where there are several
-RUNS = (2, 4, 8)
+RUNS = (2, 4, 8, 24)
+ON_CORES = 6, 2  # runs that are diagnosed by so many processes on as many cores
 LENGTHS = (300.0, 600.0, 1200.0)  # [s] of one run
 
 # Memory is told by the process itself: by wait4 it would be that of whoever started it, where that
 # is the larger.
 _MEASURED = """
-import json, sys, time
+import json, os, sys, time
+began, cores = time.perf_counter(), int(sys.argv[1])
+os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
 from gritd.tools.main import main
-code = main(sys.argv[1:])
+code = main([*sys.argv[2:], "--jobs", sys.argv[1]])
 lines = open("/proc/self/status", encoding="ascii").read().splitlines()
 memory = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
-print(json.dumps([time.process_time(), 1024 * memory]))
+print(json.dumps([time.process_time(), 1024 * memory, time.perf_counter() - began]))
 sys.exit(code)
 """
 
@@ -45,11 +48,13 @@ def diagnosis(
     folder: Path, runs: Sequence[int] = RUNS, lengths: Sequence[float] = LENGTHS
 ) -> Figures:
     """Processor time [s] and largest memory [bytes] on one core, of simulated runs with nothing
-    left out.
+    left out; and by the wall clock on several.
     """
     written = [_written(folder, number, SHORT) for number in range(max(runs))]
-    by_runs = [_diagnosed(written[:count]) for count in runs]
-    by_length = [_diagnosed([_written(folder, 100 + n, s)]) for n, s in enumerate(lengths)]
+    by_runs = [_diagnosed(written[:count])[:2] for count in runs]
+    by_length = [_diagnosed([_written(folder, 100 + n, s)])[:2] for n, s in enumerate(lengths)]
+    count, cores = min(ON_CORES[0], len(written)), ON_CORES[1]
+    elapsed = _diagnosed(written[:count], cores)[2]
 
     figures: Figures = {}
     for count, (seconds, memory) in zip(runs, by_runs, strict=True):
@@ -57,6 +62,7 @@ def diagnosis(
     for length, (seconds, memory) in zip(lengths, by_length, strict=True):
         figures |= {f"{length:g}_s_seconds": seconds, f"{length:g}_s_memory": memory}
     return figures | {
+        f"{count}_runs_on_{cores}_cores_elapsed": elapsed,
         "exponent_of_runs": exponent(runs, [seconds for seconds, _ in by_runs]),
         "exponent_of_length": exponent(lengths, [seconds for seconds, _ in by_length]),
     }
@@ -88,14 +94,16 @@ def _written(folder: Path, number: int, seconds: float) -> Path:
     return path
 
 
-def _diagnosed(paths: Sequence[Path]) -> tuple[float, float]:
-    """Processor time [s] and largest memory [bytes] of a process. Raises CalledProcessError."""
+def _diagnosed(paths: Sequence[Path], cores: int = 1) -> tuple[float, float, float]:
+    """Processor time [s] and largest memory [bytes] of the process alone, and the time that went by
+    [s]. Raises CalledProcessError.
+    """
     command = ["diagnose", *map(str, paths), "--config", str(packaged()), "--seed", "0"]
     done = subprocess.run(
-        [sys.executable, "-c", _MEASURED, *command, "--jobs", "1"],
+        [sys.executable, "-c", _MEASURED, str(cores), *command],
         capture_output=True,
         text=True,
         check=True,
     )
-    seconds, memory = json.loads(done.stdout.splitlines()[-1])
-    return float(seconds), float(memory)
+    seconds, memory, elapsed = json.loads(done.stdout.splitlines()[-1])
+    return float(seconds), float(memory), float(elapsed)

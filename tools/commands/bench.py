@@ -183,6 +183,12 @@ def _diagnosis(figures: Figures) -> list[str]:
             f"{figures[f'{size}_memory'] / 1e6:.0f} MB"
             for size in sizes
         ),
+        *(
+            f"diagnosis  {name.removesuffix('_elapsed').replace('_', ' ')}: {seconds:.1f} s by the "
+            "wall clock"
+            for name, seconds in figures.items()
+            if name.endswith("_elapsed")
+        ),
         f"           time goes with runs^{figures['exponent_of_runs']:.2f}, "
         f"length^{figures['exponent_of_length']:.2f}",
     ]

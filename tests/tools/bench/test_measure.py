@@ -125,3 +125,4 @@ def test_a_diagnosis_is_measured_against_runs_and_length(tmp_path):
     found = diagnosis.diagnosis(tmp_path, (1, 2), (40.0, 80.0))
     assert found["1_runs_seconds"] > 0.0 and found["80_s_memory"] > 50e6
     assert {"exponent_of_runs", "exponent_of_length"} <= found.keys()
+    assert found["2_runs_on_2_cores_elapsed"] > 0.0

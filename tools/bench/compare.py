@@ -14,7 +14,7 @@ WORSE = 0.8  # of what a ratio was; less is worse than the noise of a run explai
 
 def is_ratio(name: str) -> bool:
     """Whether a figure is a ratio of which larger is better."""
-    return name.startswith("over_") or "ratio" in name
+    return name.startswith("over_") or "ratio" in name.split("_")
 
 
 def ratios(figures: Mapping[str, Any]) -> dict[str, float]:

@@ -98,3 +98,16 @@ def test_what_is_no_earlier_run_is_one_line(text, tmp_path):
         bench.main(["--compare", str(old)])
     with pytest.raises(CommandError, match="No such file"):
         bench.main(["--compare", str(tmp_path / "none.json")])
+
+
+@pytest.mark.parametrize(
+    ("name", "ratio"),
+    [
+        ("over_rosbags", True),
+        ("balance_ratio_to_8_nodes", True),
+        ("duration_median", False),  # a shorter duration is no loss
+        ("lateness_worst", False),
+    ],
+)
+def test_what_is_a_ratio(name, ratio):
+    assert is_ratio(name) == ratio

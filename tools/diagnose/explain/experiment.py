@@ -245,7 +245,7 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
 def _slopes(search: Search, key: str, here: Foreseen, u: Array, effects: Sequence[Effect]) -> Array:
     """Change of what is foreseen (values, q) for one σ of each soil constant as fitted so far."""
     rig = search.problem.stack.rig
-    sigma = np.sqrt(np.diag(search.base.fitted.covariance()))
+    sigma = search.base.fitted.sigma
     slopes = []
 
     for i, constant in enumerate(rig.constants):

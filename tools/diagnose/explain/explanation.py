@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.wording import listed
@@ -163,7 +161,7 @@ def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]])
 
 def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
     """Fitted values of an effect, in what its units mean for the rig."""
-    sigma = np.sqrt(np.diag(fitted.covariance()))[len(fitted.u) :]
+    sigma = fitted.sigma[len(fitted.u) :]
 
     return {
         p.name: Quantity(

@@ -216,7 +216,7 @@ def _law(
 
 def _quantities(fitted: Fitted, before: int, free: tuple[Free, ...]) -> dict[str, Quantity]:
     first = len(fitted.u) + before
-    sigma = np.sqrt(np.diag(fitted.covariance()))[first : first + len(free)]
+    sigma = fitted.sigma[first : first + len(free)]
     return {
         f.parameter.name: Quantity(
             f.value(float(x)), float(s) * f.parameter.sigma, f.parameter.unit

@@ -165,14 +165,20 @@ class Marginal:
         gram = products[np.ix_(index, index)] + np.diag(prior)
         pull = products[index, -1] - prior * self._centre[index]
 
-        covariance = np.linalg.inv(gram)
-        every, shared = self._centre.copy(), np.zeros((len(self._centre), len(wanted)))
-        every[index] += covariance @ pull
+        root = cholesky(gram, lower=True, overwrite_a=True, check_finite=False)
         own = np.isin(wanted, index)
-        places = np.searchsorted(index, wanted[own])
-        shared[np.ix_(index, np.flatnonzero(own))] = covariance[:, places]
+        units = np.zeros((len(index), int(own.sum())))
+        units[np.searchsorted(index, wanted[own]), np.arange(units.shape[1])] = 1.0
+        solved = solve_triangular(
+            root, np.column_stack((units, pull)), lower=True, check_finite=False
+        )
+        inside, last = solved[:, :-1], solved[:, -1]
+
+        mean, shared = self._centre[wanted], np.zeros((len(wanted), len(wanted)))
+        mean[own] += inside.T @ last
+        shared[np.ix_(own, own)] = inside.T @ inside
         sized = scale[wanted]
-        return every[wanted] * sized, shared[wanted] * np.outer(sized, sized)
+        return mean * sized, shared * np.outer(sized, sized)
 
     def _along(self, chosen: Chosen, number: int) -> list[Chosen]:
         """The same sizes but for one freedom, which has each of its own; with their evidence."""

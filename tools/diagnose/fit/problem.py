@@ -127,6 +127,11 @@ class Fitted:
         jacobian = self.jacobian
         return np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(self.penalty**2)))
 
+    @cached_property
+    def sigma(self) -> Array:
+        """Standard deviations of the same (n,)."""
+        return np.sqrt(np.diag(self.covariance()))
+
     def allowed(self, allowance: Allowance) -> Fitted:
         """The same point and slopes with another allowance, not fitted to it: for a projection."""
         slack = np.zeros(sum(columns.shape[1] for columns, _, _ in allowance.parts))

@@ -71,7 +71,7 @@ class Explain:
     shown_lines: int = tuned(4, "places", "of ripples and of vibrations that a note tells")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
     slight_explanation: float = tuned(
-        1e-3, "probability", "below which an explanation does not count for the soil"
+        1e-2, "probability", "below which an explanation does not count for the soil"
     )
     contradicts: float = tuned(
         2.0, "σ", "of what was known: soil further away contradicts it, and its σ reaches back"

@@ -269,6 +269,11 @@ def restricted(gram: Array, log_det: Array, count: int) -> tuple[Array, Array]:
 
 
 def _least(stack: Stack, channel: str) -> float:
-    """A noise no channel is below. Noise-free simulations still need a scale."""
+    """A noise no channel is below. Noise-free simulations still need a scale: the channel's size,
+    or that of what it is the difference of.
+    """
     values = stack.measured[stack.of(channel)]
-    return TUNING.noise.floor * float(np.sqrt(np.mean(values**2))) + SIZE if values.size else 1.0
+    if not values.size:
+        return 1.0
+    of = [s.size for s in stack.rig.forms if s.size is not None and channel in s.channels]
+    return TUNING.noise.floor * max([float(np.sqrt(np.mean(values**2))), *of]) + SIZE

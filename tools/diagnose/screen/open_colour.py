@@ -41,6 +41,7 @@ from gritd.tools.diagnose.noise.colour import (
 from gritd.tools.diagnose.noise.estimate import colours, log_prior, restricted
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SLIGHT
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,11 @@ def _log_evidence(gram: Array, prior: Array) -> Array:
     """From products (…, p + 1, p + 1) of columns and y, and the prior precision (p,) of the
     columns.
     """
-    root = np.linalg.cholesky(gram[..., :-1, :-1] + np.diag(prior))
+    inner = gram[..., :-1, :-1]
+    squares = np.diagonal(inner, axis1=-2, axis2=-1)
+    # a column is known to a millionth: of very quiet recordings the prior is less than rounding
+    own = prior + SLIGHT**2 * squares
+    root = np.linalg.cholesky(inner + own[..., None] * np.eye(prior.size))
     taken = np.linalg.solve(root, gram[..., :-1, -1:])[..., 0]
     spread = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) - 0.5 * np.log(prior).sum()
     return np.asarray(-0.5 * (gram[..., -1, -1] - np.sum(taken**2, axis=-1)) - spread)

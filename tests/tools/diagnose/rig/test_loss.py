@@ -68,6 +68,16 @@ def test_without_axle_torque_the_motors_is_compared() -> None:
     assert not any(source.drive for source in rig.forms)
 
 
+@pytest.mark.parametrize("noise", [1e-9, 1e-3])
+def test_sensors_that_hardly_hiss_show_nothing_where_nothing_is_amiss(noise: float) -> None:
+    """A drive that loses nothing is read off as nought: its noise has the scale of the torques, and
+    not that of their difference.
+    """
+    rig = WheelRig(record(plan(noise=noise), ()), settings())
+    assert rig.loss_of_drive
+    assert diagnose(rig, quick=True).verdict == "consistent"
+
+
 def test_a_motor_without_axle_torque_beside_it_is_compared_with_the_model() -> None:
     """Friction of later runs, whose torque behind the drive was not measured, is found."""
     friction = (make("coulomb_friction", {"loss": LOSS}),)

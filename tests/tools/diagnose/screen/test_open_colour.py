@@ -90,3 +90,20 @@ def test_a_loss_of_the_drive_that_is_read_off_stands_out_too() -> None:
     friction = search.first.best["coulomb_friction"]
     gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
     assert gain > 20.0 * TUNING.screen.sure
+
+
+def test_products_of_very_quiet_recordings_keep_their_root() -> None:
+    """Two columns that are one but for rounding, 10¹⁰ noises large: the evidence is a number, and
+    that of columns of usual size is what it was.
+    """
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((50, 4))
+    columns[:, 1] = columns[:, 0] * (1.0 + 1e-17)
+    for size in (1e10, 1e7, 10.0):
+        scaled = size * columns
+        scaled[:, -1] = columns[:, -1]
+        assert np.isfinite(_log_evidence((scaled.T @ scaled)[None], np.ones(3))).all()
+
+    inner, usual = np.eye(50) + scaled[:, :-1] @ scaled[:, :-1].T, scaled[:, -1]
+    exact = -0.5 * (usual @ np.linalg.solve(inner, usual) + np.linalg.slogdet(inner)[1])
+    assert _log_evidence((scaled.T @ scaled)[None], np.ones(3))[0] == pytest.approx(exact, abs=1e-6)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.tools.diagnose.explain.covered import covered
 from gritd.tools.diagnose.explain.wording import value_of
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.tuning import TUNING
 
 NAMED = ("slip", "load", "speed", "position")
@@ -24,9 +24,7 @@ class Coverage:
 
 def coverage(stack: Stack) -> Coverage:
     """Of a rig with a reference campaign."""
-    asked = stack.new & (stack.covariate("speed") > 0.0)
-    share = float(np.mean(covered(stack)[asked])) if asked.any() else 0.0
-    return Coverage(share, _outside(stack))
+    return Coverage(covered_share(stack), _outside(stack))
 
 
 def _outside(stack: Stack) -> str:

@@ -20,6 +20,7 @@ from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
+from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.screen.habit import habits
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
 from gritd.tools.diagnose.screen.open_form import gain_with_form_open
@@ -196,11 +197,20 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
 
 
 def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
-    """The evidence of what is new with the sizes of what the rig does anyway open [nats]."""
+    """The evidence of what is new with the sizes of what the rig does anyway open [nats]; the less
+    of it counts the less of the new campaign lies where the reference was driven.
+    """
     if not screen.stands_out:
         return np.inf
     every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
-    return gain_with_form_open(screening.problem, model, every)
+    gain = gain_with_form_open(screening.problem, model, every)
+    return gain * max(_covered(screening), TUNING.screen.least_covered)
+
+
+def _covered(screening: Screening) -> float:
+    """Share of the new campaign that the reference covers; all where no form varies."""
+    stack = screening.problem.stack
+    return covered_share(stack) if stack.rig.forms else 1.0
 
 
 def _standing_out(screening: Screening, model: Model, screen: Screen) -> list[Signature]:

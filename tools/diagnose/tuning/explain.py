@@ -60,13 +60,6 @@ class Explain:
     gain_worth: float = tuned(1.0, "nats", "from which on two are said to be told apart")
     foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
 
-    # --- covered.py ---
-    coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
-    coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
-    reference_open: float = tuned(
-        0.3, "share", "of the discrepancy's variance that the reference may leave open"
-    )
-
     # --- explanation.py ---
     shown_lines: int = tuned(4, "places", "of ripples and of vibrations that a note tells")
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")

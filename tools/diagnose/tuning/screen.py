@@ -55,6 +55,20 @@ class Screen:
     )
     colour_sweeps: int = tuned(2, "sweeps", "over the channels")
 
+    # --- covered.py ---
+    coverage_points: int = tuned(120, "points", "inducing points at most", "run time")
+    coverage_left: float = tuned(0.02, "-", "variance at which there are points enough")
+    reference_open: float = tuned(
+        0.3, "share", "of the discrepancy's variance that the reference may leave open"
+    )
+    least_covered: float = tuned(
+        0.2,
+        "share",
+        "of the new campaign that counts as covered at least: an alarm outside needs five times "
+        "the evidence",
+        "judgement",
+    )
+
     # --- habit.py ---
     habit: float = tuned(2.0, "-", "times the surprise that the reference shows of the same kind")
 

@@ -17,15 +17,21 @@ def covered(stack: Stack) -> Bools:
     source = stack.rig.forms[0]
     pairs = list(zip(source.conditions, source.weight, stack.rig.new, strict=True))
     known = np.vstack([c[w != 0.0] for c, w, new in pairs if not new])
-    features = features_of(known, TUNING.explain.coverage_points, TUNING.explain.coverage_left)
+    features = features_of(known, TUNING.screen.coverage_points, TUNING.screen.coverage_left)
 
     inside = []
     for conditions, weight, _ in pairs:
         left = 1.0 - np.sum(features.at(conditions) ** 2, axis=1)
-        inside.append(_held(left < TUNING.explain.reference_open, weight != 0.0))
+        inside.append(_held(left < TUNING.screen.reference_open, weight != 0.0))
     joined = stack.joined([dict.fromkeys(stack.rig.channels, i.astype(float)) for i in inside])
     marks: Bools = joined > 0.5
     return marks
+
+
+def covered_share(stack: Stack) -> float:
+    """Share of what the new campaign drives that the reference covers."""
+    asked = stack.new & (stack.covariate("speed") > 0.0)
+    return float(np.mean(covered(stack)[asked])) if asked.any() else 0.0
 
 
 def _held(inside: Bools, driving: Bools) -> Bools:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gritd.tools.diagnose.explain.covered import _held
+from gritd.tools.diagnose.screen.covered import _held
 
 
 def test_a_standing_wheel_is_covered_as_where_it_drove_last() -> None:

@@ -269,8 +269,12 @@ def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
         own = stack.of(channel)
         for part, colour in zip(np.array_split(np.arange(count), len(draws)), draws, strict=True):
             out[np.ix_(own, part)] = coloured(stack.gaps[own], len(part), colour, rng)
-    alone = noise.uncertain[:, None] * rng.standard_normal(out.shape)
-    return np.asarray(out * noise.times[:, None] + alone)
+
+    alone = rng.standard_normal(out.shape)
+    alone *= noise.uncertain[:, None]  # in their place: they are large
+    out *= noise.times[:, None]
+    out += alone
+    return out
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:

@@ -197,15 +197,14 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
 
 
 def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
-    """What counts of the evidence of what is new with the sizes of what the rig does anyway open
-    [nats]: the less the less of the new campaign lies where the reference was driven.
+    """The evidence of what is new with the sizes of what the rig does anyway open [nats]; the less
+    of it counts the less of the new campaign lies where the reference was driven.
     """
     if not screen.stands_out:
         return np.inf
     every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
     gain = gain_with_form_open(screening.problem, model, every)
-    worth = TUNING.screen.form_worth * max(_covered(screening), TUNING.screen.least_covered)
-    return float(worth * gain)
+    return gain * max(_covered(screening), TUNING.screen.least_covered)
 
 
 def _covered(screening: Screening) -> float:

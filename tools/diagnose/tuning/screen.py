@@ -69,14 +69,6 @@ class Screen:
         "judgement",
     )
 
-    # --- screening.py: with a reference, the sizes of the discrepancy open ---
-    form_worth: float = tuned(
-        0.5,
-        "-",
-        "of evidence beside a discrepancy of form, whose own form nobody knows: 36 opened pairs of "
-        "campaigns with nothing new reached 10.5 nats",
-    )
-
     # --- habit.py ---
     habit: float = tuned(2.0, "-", "times the surprise that the reference shows of the same kind")
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -15,12 +17,15 @@ from gritd.tools.cli.offspring import ends_with_us
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
+ENDED = "a child process ended before its work was done"
+
 _work: Callable[[Any], Any] | None = None  # what the children find when they are forked
 
 
 def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
     """`work` of every item, in order. The result must be picklable, `work` and the items need not
-    be.
+    be. Raises what `work` raised, and ChildProcessError where a child ended otherwise: a Pool would
+    begin another child in its place for ever.
     """
     if jobs < 2 or len(items) < 2:
         return [work(item) for item in items]
@@ -30,8 +35,11 @@ def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list
     _work = lambda place: work(items[place])  # noqa: E731
     try:
         fork = multiprocessing.get_context("fork")
-        with fork.Pool(min(jobs, len(items)), initializer=ends_with_us()) as pool:
-            return pool.map(_forked, range(len(items)), chunksize=1)
+        count = min(jobs, len(items))
+        with ProcessPoolExecutor(count, fork, initializer=ends_with_us()) as pool:
+            return list(pool.map(_forked, range(len(items))))
+    except BrokenProcessPool:
+        raise ChildProcessError(ENDED) from None
     finally:
         _work = None
 
@@ -78,7 +86,7 @@ def _received(ours: Connection) -> Any:
     try:
         made, error = ours.recv()
     except EOFError:
-        raise ChildProcessError("a child process ended before its work was done") from None
+        raise ChildProcessError(ENDED) from None
     if error is not None:
         raise error
     return made

@@ -34,3 +34,8 @@ def test_a_child_that_is_killed_is_told_and_nobody_waits_for_it() -> None:
         result()
     with meanwhile(2, lambda: os.read(os.pipe()[0], 1)):
         pass  # its result is not asked for
+
+
+def test_a_child_that_ends_is_said_and_not_replaced_for_ever() -> None:
+    with pytest.raises(ChildProcessError, match="before its work was done"):
+        each(2, lambda item: os._exit(item), [1, 2, 3])

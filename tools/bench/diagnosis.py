@@ -53,8 +53,8 @@ def diagnosis(
     written = [_written(folder, number, SHORT) for number in range(max(runs))]
     by_runs = [_diagnosed(written[:count])[:2] for count in runs]
     by_length = [_diagnosed([_written(folder, 100 + n, s)])[:2] for n, s in enumerate(lengths)]
-    count, cores = min(ON_CORES[0], len(written)), ON_CORES[1]
-    elapsed = _diagnosed(written[:count], cores)[2]
+    several, cores = min(ON_CORES[0], len(written)), ON_CORES[1]
+    elapsed = _diagnosed(written[:several], cores)[2]
 
     figures: Figures = {}
     for count, (seconds, memory) in zip(runs, by_runs, strict=True):
@@ -62,7 +62,7 @@ def diagnosis(
     for length, (seconds, memory) in zip(lengths, by_length, strict=True):
         figures |= {f"{length:g}_s_seconds": seconds, f"{length:g}_s_memory": memory}
     return figures | {
-        f"{count}_runs_on_{cores}_cores_elapsed": elapsed,
+        f"{several}_runs_on_{cores}_cores_elapsed": elapsed,
         "exponent_of_runs": exponent(runs, [seconds for seconds, _ in by_runs]),
         "exponent_of_length": exponent(lengths, [seconds for seconds, _ in by_length]),
     }

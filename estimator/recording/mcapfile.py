@@ -97,7 +97,6 @@ def opened(path: Path, buffering: int = 1 << 18) -> BinaryIO:
 
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         return file
-
     file.close()
     raise OSError(errno.EINVAL, "it is no regular file")
 
@@ -121,7 +120,6 @@ def gather(
     """
     if starts.size == 0:
         return np.empty(0, dtype)
-
     room = len(content) - dtype.itemsize + 1
     windows = np.ndarray((room,), np.dtype((np.void, dtype.itemsize)), content, strides=(1,))
     return np.asarray(windows[starts]).view(dtype)
@@ -355,7 +353,6 @@ class McapFile:
 
     def _statistics(self, schemas: int) -> Statistics:
         first, last = self._span or (0, 0)
-
         return Statistics(
             attachment_count=0,
             channel_count=len(self._counts),
@@ -400,5 +397,4 @@ def _message_index(
     head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
         "<HI", channel, len(entries)
     )
-
     return channel, head + entries

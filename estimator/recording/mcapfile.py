@@ -15,15 +15,13 @@ import stat
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
-import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
-import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -42,6 +40,7 @@ from mcap.records import (
 from numpy.typing import NDArray
 
 from gritd.estimator.recording.chunk_index import ChunkIndexes
+from gritd.estimator.recording.packing import compressor
 
 MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
@@ -155,7 +154,7 @@ class McapFile:
 
         self.path = path
         self._compression = "" if compression == "none" else compression
-        self._compress = _compressor(compression)
+        self._compress = compressor(compression)
         self._definitions: dict[int, Definition] = {}
         self._preambles: dict[int, bytes] = {}
         self._metadata_index: list[MetadataIndex] = []
@@ -375,15 +374,6 @@ def _created(draft: Path) -> FileIO:
             raise OSError(errno.EEXIST, f"{draft.name} is there and is no regular file")
         draft.unlink()
     return open(draft, "xb", buffering=0)
-
-
-def _compressor(kind: str) -> Callable[[bytes], bytes]:
-    """One for the whole file: a context for every chunk is half a megabyte, allocated and freed
-    five times a second.
-    """
-    if kind == "zstd":
-        return zstandard.ZstdCompressor(write_content_size=True).compress
-    return lz4.frame.compress if kind == "lz4" else bytes
 
 
 def _message_index(

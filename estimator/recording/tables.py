@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from gritd.estimator.compiled import records
-from gritd.estimator.recording.cdr import BILLION, TIME, Rows, Topic
+from gritd.estimator.recording.cdr import BILLION, TIME, Codec, Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source
 from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, Starts, gather
 
@@ -133,54 +134,9 @@ class Table:
 
     def _copy(self, channel: int, source: Source) -> _Copy | _CompiledCopy:
         if channel not in self._copies:
-            self._copies[channel] = self._copy_of(source)
+            assert source.codec is not None
+            self._copies[channel] = _copy_of(source.codec, self._names, self.dtype, records.BUILT)
         return self._copies[channel]
-
-    def _copy_of(self, source: Source) -> _Copy | _CompiledCopy:
-        """By the places of the fields in the messages of a source, neighbours joined."""
-        assert source.codec is not None
-        record, pieces = source.codec.record_dtype(MESSAGE_HEAD.size), list[_Piece]()
-        split = []
-        for name in self._names:
-            if source.codec.kinds[source.codec.names.index(name)] == TIME:
-                split.append(name)
-            else:
-                _join(pieces, _piece(name, record, self.dtype))
-
-        kinds = [piece.kind for piece in pieces]
-        offsets = [piece.offset for piece in pieces]
-        times = [(name, f"{name}.sec", f"{name}.nanosec") for name in split]
-        for part in (part for _, *both in times for part in both):
-            kinds.append(_kind(record, part))
-            offsets.append(_offset(record, part))
-
-        if records.BUILT and all(piece.kind == piece.row_kind for piece in pieces):
-            return self._compiled(record, pieces, times)
-
-        names = [str(number) for number in range(len(pieces))]
-        low = min(offsets)
-        parts = [part for _, *both in times for part in both]
-        return _Copy(
-            low,
-            _dtype([*names, *parts], kinds, [o - low for o in offsets], None),
-            _dtype(names, [p.row_kind for p in pieces], [p.row_offset for p in pieces], self.dtype),
-            tuple(names),
-            tuple(times),
-        )
-
-    def _compiled(
-        self, record: np.dtype[np.void], pieces: list[_Piece], times: list[tuple[str, str, str]]
-    ) -> _CompiledCopy:
-        lengths = [np.dtype(piece.kind).itemsize for piece in pieces]
-
-        return _CompiledCopy(
-            record.itemsize,
-            tuple((p.offset, p.row_offset, n) for p, n in zip(pieces, lengths, strict=True)),
-            tuple(
-                (_offset(record, seconds), _offset(self.dtype, name), _offset(record, rest))
-                for name, seconds, rest in times
-            ),
-        )
 
 
 class Tables:
@@ -223,6 +179,67 @@ class Tables:
     def done(self) -> dict[tuple[str, Fields], Rows]:
         """The rows by topic and fields."""
         return {(name, self.wanted[name]): table.done() for name, table in self._tables.items()}
+
+
+@lru_cache(maxsize=64)  # the recordings of a campaign hold the same messages
+def _copy_of(
+    codec: Codec, names: tuple[str, ...], row: np.dtype[np.void], compiled: bool
+) -> _Copy | _CompiledCopy:
+    """By the places of some fields in the messages and in the rows, neighbours joined."""
+    record, pieces = codec.record_dtype(MESSAGE_HEAD.size), list[_Piece]()
+    split = []
+    for name in names:
+        if codec.kinds[codec.names.index(name)] == TIME:
+            split.append(name)
+        else:
+            _join(pieces, _piece(name, record, row))
+    times = [(name, f"{name}.sec", f"{name}.nanosec") for name in split]
+
+    if compiled and all(piece.kind == piece.row_kind for piece in pieces):
+        return _compiled(record, row, pieces, times)
+    return _in_numpy(record, row, pieces, times)
+
+
+def _in_numpy(
+    record: np.dtype[np.void],
+    row: np.dtype[np.void],
+    pieces: list[_Piece],
+    times: list[tuple[str, str, str]],
+) -> _Copy:
+    kinds = [piece.kind for piece in pieces]
+    offsets = [piece.offset for piece in pieces]
+    parts = [part for _, *both in times for part in both]
+    for part in parts:
+        kinds.append(_kind(record, part))
+        offsets.append(_offset(record, part))
+
+    names = [str(number) for number in range(len(pieces))]
+    low = min(offsets)
+    return _Copy(
+        low,
+        _dtype([*names, *parts], kinds, [o - low for o in offsets], None),
+        _dtype(names, [p.row_kind for p in pieces], [p.row_offset for p in pieces], row),
+        tuple(names),
+        tuple(times),
+    )
+
+
+def _compiled(
+    record: np.dtype[np.void],
+    row: np.dtype[np.void],
+    pieces: list[_Piece],
+    times: list[tuple[str, str, str]],
+) -> _CompiledCopy:
+    lengths = [np.dtype(piece.kind).itemsize for piece in pieces]
+
+    return _CompiledCopy(
+        record.itemsize,
+        tuple((p.offset, p.row_offset, n) for p, n in zip(pieces, lengths, strict=True)),
+        tuple(
+            (_offset(record, seconds), _offset(row, name), _offset(record, rest))
+            for name, seconds, rest in times
+        ),
+    )
 
 
 def _piece(name: str, record: np.dtype[np.void], row: np.dtype[np.void]) -> _Piece:

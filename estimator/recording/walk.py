@@ -62,7 +62,7 @@ class Walk:
         self._limit = size  # where the data section ends
         self._metadata_room = MAX_METADATA
         self._idle = 0  # records without messages
-        self._chunks = 0
+        self._chunks, self._most = 0, limits().chunks
         # the last one, whose message index may follow, and the one before
         self._blocks: list[Block] = []
         self._window, self._window_start = b"", 0  # the part of the file that was read last
@@ -89,9 +89,8 @@ class Walk:
 
     def _too_many(self) -> str:
         """What there is more of than a recording has; '' as a rule."""
-        most = limits().chunks
-        if self._chunks > most:
-            return f"{most:.0f} chunks"
+        if self._chunks > self._most:
+            return f"{self._most:.0f} chunks"
         idle = self._idle > MAX_IDLE + INDEXES * self._chunks
         return f"{MAX_IDLE} records without messages" if idle else ""
 

@@ -1,0 +1,185 @@
+"""Every channel of a wheel in soil as the forward model predicts it, for constants and effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.forward import simulate_arrays
+from gritd.estimator.stages.situation import Motion
+from gritd.estimator.terramechanics.soil import Array, Soil
+from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
+from gritd.tools.diagnose.rig.interface import Constant, Foreseen, Index
+from gritd.tools.diagnose.rig.proposals import driving, proposed
+from gritd.tools.diagnose.rig.weight_sets import WeightSets
+from gritd.tools.diagnose.tuning import TUNING
+
+SOIL = ("c", "tan_phi", "k", "n", "K")
+PHYSICS = (*SOIL, "weights", "carriage_scale")  # constants that need the forward model
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What was driven, run by run.
+
+    motions: on the analysis grid.
+    steps:   grid intervals [s].
+    new:     whether candidates act; not in the runs of a reference campaign.
+    sets:    the set of weights that each value has.
+    """
+
+    motions: Sequence[Motion]
+    steps: Sequence[float]
+    new: Sequence[bool]
+    sets: WeightSets
+
+    @property
+    def parts(self) -> list[slice]:
+        """Where each run lies in the vector (N,) of all."""
+        ends = np.cumsum([np.size(m.time) for m in self.motions])
+        return [
+            slice(end - np.size(m.time), end) for m, end in zip(self.motions, ends, strict=True)
+        ]
+
+    def set_of(self, new: bool) -> Index:
+        """The set of weights of each value (n,) of the new campaign, or of the reference."""
+        labels = [label for label, n in zip(self.sets.label, self.new, strict=True) if n == new]
+        return np.concatenate(labels)
+
+
+class Prediction:
+    """Channels of all runs, for the constants of a wheel.
+
+    prepared: soil constants that a bed prepared anew has for itself; there is a constant `new_NAME`
+    of each. loss_of_drive: whether channel torque is compared as motor torque less axle torque.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        channels: Sequence[str],
+        constants: Sequence[Constant],
+        driven: Driven,
+        prepared: Sequence[str],
+        loss_of_drive: bool,
+    ) -> None:
+        self._settings, self._channels, self._constants = settings, channels, constants
+        self._driven, self._prepared, self._loss_of_drive = driven, prepared, loss_of_drive
+        self._campaigns = _campaigns(driven, settings, channels)
+        self._true_readings: dict[tuple[object, ...], Array] = {}  # the last few
+
+        self._parts = driven.parts
+        sizes = [part.stop - part.start for part in self._parts]
+        self._step: Array = np.repeat(driven.steps, sizes)
+        self._inner = np.ones(sum(sizes), bool)  # with a neighbour of the same run on either side
+        for part in self._parts:
+            self._inner[[part.start, part.stop - 1]] = False
+
+    def channels(
+        self, u: Array, effects: Sequence[Effect], everywhere: bool
+    ) -> list[dict[str, Array]]:
+        """See interface.Rig.predict."""
+        value = self._values(u)
+        baseline = self._baseline(value)
+
+        true = []
+        for new, campaign in self._campaigns:
+            acting = (*baseline, *effects) if new or everywhere else baseline
+            true.append(self._true(value, acting, new, campaign))
+
+        read = self._read(np.hstack(true), value)
+        return [dict(zip(self._channels, read[:, part], strict=True)) for part in self._parts]
+
+    def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
+        """Channels under a proposed experiment (see proposals.py), for constants u (q,) and
+        effects as fitted.
+        """
+        value = self._values(u)
+        sensed = simulate_arrays(
+            self._settings.wheel,
+            self._soil(value, True),
+            proposed(experiment, self._driven.motions, self._settings.wheel.radius),
+            (*self._baseline(value), *effects),
+            torque_constant=self._settings.drive.torque_constant.value,
+            order=TUNING.rig.quadrature_order,
+        ).sensed
+
+        read = [sensed_as(sensed, c, self._settings) + value[f"{c}_offset"] for c in self._channels]
+        compared = dict(zip(self._channels, self._compared(np.array(read)), strict=True))
+        return Foreseen(
+            compared, {c: driving(experiment) | (c == "torque") for c in self._channels}
+        )
+
+    def _values(self, u: Array) -> dict[str, float]:
+        return {c.name: c.of(float(x)) for c, x in zip(self._constants, u, strict=True)}
+
+    def _baseline(self, value: Mapping[str, float]) -> tuple[Effect, ...]:
+        return tuple(
+            make(e.name, {p: value.get(f"{e.name}.{p}", q.value) for p, q in e.parameters.items()})
+            for e in self._settings.effects
+        )
+
+    def _true(
+        self,
+        value: Mapping[str, float],
+        effects: tuple[Effect, ...],
+        new: bool,
+        campaign: Campaign,
+    ) -> Array:
+        """True readings (channels, n) of one campaign before scale, offset and delay."""
+        # the last for values without a set of weights of their own
+        own = (*(value[name] for name in self._driven.sets.names), 0.0)
+        shifts = tuple(value[f"new_{name}"] if new else 0.0 for name in self._prepared)
+        physics = (*(value[name] for name in PHYSICS), *shifts, *own, *effects, new)
+
+        if physics not in self._true_readings:
+            if len(self._true_readings) >= TUNING.rig.kept_simulations:
+                self._true_readings.pop(next(iter(self._true_readings)))
+            weights = 1.0 + value["weights"] + np.array(own)[self._driven.set_of(new)]
+            self._true_readings[physics] = campaign.readings(
+                self._soil(value, new), weights, 1.0 + value["carriage_scale"], effects
+            )
+        return self._true_readings[physics]
+
+    def _soil(self, value: Mapping[str, float], new: bool) -> Soil:
+        """The soil of one campaign: a bed that was prepared anew has its own."""
+        shift = {name: np.exp(value[f"new_{name}"]) if new else 1.0 for name in self._prepared}
+        return Soil(*(value[name] * float(shift.get(name, 1.0)) for name in SOIL))
+
+    def _read(self, true: Array, value: Mapping[str, float]) -> Array:
+        """What the sensors make of true readings (channels, N)."""
+        scale, offset, delay, blur = (
+            np.array([value[f"{c}_{what}"] for c in self._channels])[:, None]
+            for what in ("scale", "offset", "delay", "blur")
+        )
+        read = true * (1.0 + scale) + offset
+
+        before, after = np.roll(read, 1, axis=1), np.roll(read, -1, axis=1)
+        rate, bend = (after - before) / (2.0 * self._step), after + before - 2.0 * read
+        return self._compared(np.where(self._inner, read - delay * rate + blur * bend, read))
+
+    def _compared(self, read: Array) -> Array:
+        """Of what the channels read (channels, N): the loss of the drive where both its sides are
+        measured.
+        """
+        out = np.array(read)
+        if self._loss_of_drive:
+            motor, axle = (self._channels.index(name) for name in ("torque", "axle_torque"))
+            out[motor] -= read[axle]
+        return out
+
+
+def _campaigns(
+    driven: Driven, settings: Settings, channels: Sequence[str]
+) -> list[tuple[bool, Campaign]]:
+    """The reference first, where there is one; whether each is the new one."""
+    campaigns = []
+    for new in sorted(set(driven.new)):
+        motions = [m for m, n in zip(driven.motions, driven.new, strict=True) if n == new]
+        campaigns.append((new, Campaign(motions, settings, channels)))
+    return campaigns

@@ -106,6 +106,18 @@ def test_rooms_of_the_diagnosis_import_earlier_ones() -> None:
     assert wrong == []
 
 
+def test_rooms_of_the_diagnosis_know_a_rig_by_its_interface() -> None:
+    rooms = DIAGNOSIS[DIAGNOSIS.index("rig") + 1 :]
+    wrong = [
+        f"{path} imports {module}"
+        for path in FILES
+        if path.parts[:2] == ("tools", "diagnose") and path.with_suffix("").parts[2] in rooms
+        for module in imported(path)
+        if module.startswith("tools.diagnose.rig.") and ".rig.interface." not in module
+    ]
+    assert wrong == []
+
+
 def test_drivers_know_messages_configuration_and_threads_of_the_estimator() -> None:
     allowed = {
         "estimator.config",

@@ -34,7 +34,7 @@ from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_in
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, read_all
+from gritd.tools.diagnose.rig.signals import distinct, read_all, read_one
 from gritd.tools.diagnose.search.parallel import meanwhile
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
@@ -302,7 +302,8 @@ def of_files(
             each = step if callable(step) else lambda _: None
             diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
             if not quick:
-                diagnosis = with_innovations(diagnosis, configuration, before(), files, jobs)
+                again = [partial(read_one, path) for path in files]
+                diagnosis = with_innovations(diagnosis, configuration, before(), again, jobs)
 
     if reference.files:
         diagnosis = references.with_reference(diagnosis, rig, reference)

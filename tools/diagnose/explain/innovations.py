@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.rig.signals import read_one
 from gritd.tools.diagnose.search.parallel import each
 
 NO_FILTER = "A drive without soil: no on-line filter runs over it."
@@ -48,23 +46,23 @@ def filtered(
 
     try:
         reads = [partial(_same, recording) for recording in recordings]
-        found = innovations(configuration.settings, reads)
+        ratios = innovations(configuration.settings, reads)
     except (RecordingError, config.ConfigError) as error:
         return Filtered(note=_failed(error))
-    return Filtered(found) if found else Filtered(note=NO_UPDATE)
+    return Filtered(ratios) if ratios else Filtered(note=NO_UPDATE)
 
 
 def with_innovations(
     diagnosis: Diagnosis,
     configuration: config.Configuration,
     before: Filtered,
-    files: Sequence[Path],
+    reads: Sequence[Callable[[], Recording]],
     jobs: int = 1,
 ) -> Diagnosis:
     """The result with the filter's normalised innovations by the given configuration, `before`, and
     by the improved one; jobs: processes.
 
-    files: recordings, read only where there is an improved one. Where there is none
+    reads: give a recording each, called only where there is an improved one. Where there is none
     `innovation_note` says why.
     """
     if before.innovations is None:
@@ -74,7 +72,6 @@ def with_innovations(
 
     try:
         improved = config.loads(applied(configuration, diagnosis), "improved configuration")
-        reads = [partial(read_one, path) for path in files]
         after = innovations(improved.settings, reads, jobs)
         return _noted(diagnosis, "", before.innovations, after)
     except (RecordingError, config.ConfigError) as error:

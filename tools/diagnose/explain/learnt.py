@@ -29,7 +29,6 @@ from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.rig.form import usual_of
 from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -54,8 +53,8 @@ def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) ->
     """δ of a model, for a soil that is written beside it; None for a rig or model without one."""
     stack, marginal = problem.stack, model.marginal
     sources = [s for s in stack.rig.forms if not s.drive]
-    usual = usual_of(stack.rig.runs)
-    if marginal is None or usual is None or not sources:
+    usual = sources[0].usual if sources else None
+    if marginal is None or usual is None:
         return None
 
     unknowns = _Unknowns(problem, model, sources, soil)

@@ -12,11 +12,8 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 def restored(rig: Rig, channel: str) -> list[Line]:
-    """Lines of a channel that stand on the grid as they are at its times; with the loss of a drive
-    those of both torques.
-    """
-    names = {channel} | ({"axle_torque"} if channel == "torque" else set())
-    lines = [line for name in names & {*rig.channels} for line in rig.lines.of(name)]
+    """Lines of a channel that stand on the grid as they are at its times."""
+    lines = [line for name in rig.recorded(channel) for line in rig.lines.of(name)]
     return [line for line in lines if line.axis == "angle" and not line.harmonic]
 
 

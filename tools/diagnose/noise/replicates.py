@@ -49,15 +49,15 @@ def _labels(stack: Stack, coarser: float) -> Index:
 
 
 def _conditions(stack: Stack) -> Array:
-    """Slip, speed and load of each value, in widths of a cell (N, m)."""
+    """What was held at each value, in widths of a cell (N, m)."""
     columns = [np.where(stack.new, 1.0, 0.0)]
     for name, width in TUNING.noise.cell_widths.items():
         if name in stack.rig.runs[0].covariates:
             values = stack.covariate(name)
-            columns.append(
-                values
-                / (width * (1.0 if name == "slip" else max(float(np.abs(values).max()), SPAN)))
-            )
+            # a ratio has no scale of its own
+            ratio = stack.rig.units[name] == "-"
+            largest = 1.0 if ratio else max(float(np.abs(values).max()), SPAN)
+            columns.append(values / (width * largest))
     return np.column_stack(columns)
 
 

@@ -159,6 +159,10 @@ class DriveRig:
             sensed = effect.sensors(sensed, situation)
         return np.asarray(sensed.current) * self.unit
 
+    def recorded(self, channel: str) -> tuple[str, ...]:
+        """See interface.Rig."""
+        return (channel,)
+
     def unit_factor(self, unit: str) -> float:
         """Factor from a parameter of the library to what it means for this drive."""
         if unit == "rad/s":

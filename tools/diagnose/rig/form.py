@@ -40,7 +40,7 @@ def wheel_forms(
         measured = tuple(c for c in both if c in channels and c not in lost)
         if measured:
             weight = tuple(_weight(run, usual, signed) for run in runs)
-            forms.append(FormSource(name, measured, conditions, weight))
+            forms.append(FormSource(name, measured, conditions, weight, usual=usual))
 
     if driven is not None:
         weight = tuple(_weight(run, usual, True) for run in runs)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.effects.base import Effect
+from gritd.estimator.model.discrepancy import Usual
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines
 from gritd.tools.diagnose.orders.latency import Latency
@@ -112,6 +113,7 @@ class FormSource:
     weight:     per run (n,), how large the function is there, in `size`.
     size:       in the unit of its channels; None: the root mean square of its last channel.
     drive:      whether it is the drive's and not the soil's.
+    usual:      load and speed that the conditions are counted from, where there is soil.
     """
 
     name: str
@@ -120,6 +122,7 @@ class FormSource:
     weight: tuple[Array, ...]
     size: float | None = None
     drive: bool = False
+    usual: Usual | None = None
 
     @property
     def count(self) -> int:
@@ -185,6 +188,11 @@ class Rig(Protocol):
     @property
     def lines(self) -> Lines:
         """Ripples that the recordings show at their own rate."""
+
+    def recorded(self, channel: str) -> tuple[str, ...]:
+        """The channels as recorded that this one is compared as: itself, or both sides of a
+        difference.
+        """
 
     @property
     def latencies(self) -> Sequence[Latency]:

@@ -145,6 +145,11 @@ class WheelRig:
     def unit_factor(self, unit: str) -> float:
         return 1.0
 
+    def recorded(self, channel: str) -> tuple[str, ...]:
+        """Of the drive's loss, the torques on both its sides."""
+        lost = self.loss_of_drive and channel == "torque"
+        return ("torque", "axle_torque") if lost else (channel,)
+
     @property
     def partial(self) -> Mapping[str, tuple[str, Sequence[Bools]]]:
         """What one set of weights is off by for itself does to its own values, marked (n,), what

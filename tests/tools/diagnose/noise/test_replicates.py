@@ -18,6 +18,7 @@ from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.noise import replicates
 from gritd.tools.diagnose.noise.colour import Colour
+from gritd.tools.diagnose.rig.constants import UNITS
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import RATE, Plan, record
@@ -48,7 +49,7 @@ def stack_of(slip: float = 0.2) -> Any:
         SimpleNamespace(covariates={**held, "position": np.zeros(1), "pass": np.ones(1)})
         for _ in range(RUNS)
     ]
-    rig = SimpleNamespace(channels=("sinkage",), runs=runs, new=[True] * RUNS)
+    rig = SimpleNamespace(channels=("sinkage",), runs=runs, new=[True] * RUNS, units=UNITS)
     return SimpleNamespace(
         rig=rig,
         size=time.size,

@@ -35,6 +35,15 @@ def test_torque_is_what_is_lost() -> None:
     assert float(np.median(run.measured["torque"][driving])) == pytest.approx(LOSS, rel=0.3)
 
 
+def test_a_ripple_of_either_torque_is_one_of_what_is_lost() -> None:
+    """Where the loss is not read off, a ripple of the axle's sensor is none of the motor's."""
+    rig, apart = _rig(), WheelRig(record(plan(), ()), settings(), read_off=False)
+    assert rig.recorded("torque") == ("torque", "axle_torque")
+    assert {channel: apart.recorded(channel) for channel in apart.channels} == {
+        channel: (channel,) for channel in apart.channels
+    }
+
+
 def test_soil_does_not_change_the_loss() -> None:
     rig = _rig()
     u = np.zeros(len(rig.constants))

@@ -1,6 +1,6 @@
 """The daemon at work: `gritd run` as a process of its own against the simulated testbed on
 pseudo-terminals. When the first estimate comes, how late its ticks are, what it takes of a core and
-of memory.
+of memory; and how late a loop is that only sleeps (control.py).
 """
 
 from __future__ import annotations
@@ -11,8 +11,10 @@ import time
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.config import packaged
+from gritd.estimator.config.configuration import load
 from gritd.estimator.messages.readings import NS
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import read
@@ -37,13 +39,17 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
     stop = StopRequest()
     told = ["--seconds", str(BEFORE + seconds + SPARE), "--folder", str(folder), "--wait"]
     told += ["--can", "slcan", "--config", str(configuration or packaged())]
+    rate, noted = load(configuration or packaged()).settings.rates.tick, folder / "control.npy"
 
     with Child(stop, "testbed", "gritd.tools.testbed.testbed", *told) as testbed:
         config = testbed.wait_for("configuration ", READY).split(" ", 1)[1]
         testbed.tell("play")
         time.sleep(BEFORE)
         began, clock = time.time(), time.monotonic()
-        with Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "live") as daemon:
+        with (
+            Child(stop, "control", "gritd.tools.bench.control", str(rate), str(noted)) as control,
+            Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "live") as daemon,
+        ):
             settled, started = 0.0, 0.0
             while (elapsed := time.monotonic() - clock) < seconds:
                 daemon.line(0.2)
@@ -51,14 +57,17 @@ def live(seconds: float, folder: Path, configuration: Path | None = None) -> Fig
                     settled, started = elapsed, _used(daemon.pid)[0]
             used, memory = _used(daemon.pid)
             daemon.stop()
+            control.stop()
 
     recording = read(next(folder.glob("*.mcap")))
+    loop = recording.arrays("/loop")
     return {
         **_started(recording.arrays("/tick"), began),
         "memory": memory,
         "share_of_a_core": used / elapsed,
         "share_at_work": (used - started) / (elapsed - settled),
-        **_punctual(recording.arrays("/loop")),
+        **_punctual(loop),
+        **beside(loop, np.load(noted), rate),
     }
 
 
@@ -97,6 +106,29 @@ def _punctual(loop: Rows) -> Figures:
         "missed": float(loop["missed"][-1]),
         "missed_at_work": float(at_work["missed"][-1] - at_work["missed"][0]),
     }
+
+
+def beside(loop: Rows, control: NDArray[np.int64], rate: float) -> Figures:
+    """How late the control was, rows (deadline, lateness) [ns], while the loop ran; and how many of
+    the missed ticks the computer took from both: the control, too, was late by a period, which
+    leaves no time for a tick.
+    """
+    period = round(NS / rate)
+    stamps = loop["stamp"].astype(np.int64)
+    control = control[(control[:, 0] >= stamps[0]) & (control[:, 0] <= stamps[-1])]
+    figures = {
+        f"control_{label}": float(np.quantile(control[:, 1], share)) / NS
+        for label, share in QUANTILES
+    }
+
+    held = control[control[:, 1] >= period]
+    missed = np.diff(loop["missed"].astype(np.int64))
+    both = 0
+    for after in (np.flatnonzero(missed) + 1).tolist():
+        begin, end = stamps[after - 1] - period, stamps[after]
+        if np.any((held[:, 0] < end) & (held[:, 0] + held[:, 1] > begin)):
+            both += int(missed[after - 1])
+    return figures | {"missed_by_both": float(both)}
 
 
 def _used(pid: int) -> tuple[float, float]:

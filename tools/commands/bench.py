@@ -168,6 +168,10 @@ def _live(title: str, figures: Figures) -> list[str]:
         f"           {figures['missed']:.0f} missed of "
         f"{figures['ticks'] + figures['missed']:.0f}, "
         f"{figures['missed_at_work']:.0f} of them once started",
+        f"           a loop that only sleeps beside it: late {_µs(figures['control_median'])} at "
+        f"50 %, {_µs(figures['control_at_99_percent'])} at 99 %, worst "
+        f"{_µs(figures['control_worst'])}; of the missed {figures['missed_by_both']:.0f} when it, "
+        "too, was late by a period",
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from gritd.config import packaged
@@ -27,7 +28,8 @@ def figures(tmp_path_factory):
 def test_every_figure_is_a_positive_number(figures):
     assert tuple(figures) == SECTIONS
     missed = figures["live"].pop("missed")
-    assert missed >= figures["live"].pop("missed_at_work") >= 0.0
+    for part in ("missed_at_work", "missed_by_both"):
+        assert missed >= figures["live"].pop(part) >= 0.0
     assert all(value > 0.0 for section in figures.values() for value in section.values())
 
 
@@ -97,8 +99,25 @@ def test_the_daemon_at_work_is_measured_from_the_command_on(figures):
     assert found["first_tick"] < found["first_estimate"] < 6.0
     assert found["ticks"] > 500 and 20e6 < found["memory"] < 200e6
     assert found["share_at_work"] < 1.0
-    for name in ("lateness", "duration"):
+    for name in ("lateness", "duration", "control"):
         assert found[f"{name}_median"] <= found[f"{name}_at_99_percent"] <= found[f"{name}_worst"]
+
+
+def test_missed_ticks_are_the_computers_where_the_control_was_held_too():
+    """Two ticks are missed at 10 ms and three at 40 ms; the control is 2.5 ms late at 9 ms, and
+    half a period at 40 ms.
+    """
+    stamps = np.array([9, 10, 13, 14, 40, 44], np.int64) * 1_000_000
+    loop = np.zeros(stamps.size, [("stamp", "i8"), ("missed", "u8")])
+    loop["stamp"], loop["missed"] = stamps, (0, 0, 2, 2, 2, 5)
+    deadlines = np.arange(9, 45, dtype=np.int64) * 1_000_000
+    late = np.full(deadlines.size, 50_000, np.int64)
+    late[0], late[31] = 2_500_000, 500_000
+
+    found = live.beside(loop, np.column_stack((deadlines, late)), 1000.0)
+    assert found["missed_by_both"] == 2.0
+    assert found["control_worst"] == pytest.approx(2.5e-3)
+    assert found["control_median"] == pytest.approx(5e-5)
 
 
 def test_another_rate_is_that_of_the_loop_and_of_every_sensor(tmp_path):

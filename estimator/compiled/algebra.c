@@ -1,7 +1,9 @@
-/* The filter's algebra: the variance of a predicted quantity, and the update with one or two components.
+/* The filter's algebra: the variance of a predicted quantity, and the update with one or two
+   components.
 
-   This is `variance` of filter/estimate.py and filter/plain_engine.py, operation for operation: the same bits. No sum
-   is reordered and no product fused with a sum (-ffp-contract=off). A test compares the two on drawn values. */
+   This is `variance` of filter/estimate.py and filter/plain_engine.py, operation for operation: the
+   same bits. No sum is reordered and no product fused with a sum (-ffp-contract=off). A test
+   compares the two on drawn values. */
 
 #include "tuples.h"
 
@@ -14,7 +16,8 @@ typedef struct {
     Py_ssize_t nuisances;
 } estimate;
 
-static PyObject *made_matrix(const double *values, Py_ssize_t rows, Py_ssize_t size, Py_ssize_t stride) {
+static PyObject *made_matrix(const double *values, Py_ssize_t rows, Py_ssize_t size,
+                             Py_ssize_t stride) {
     PyObject *made = PyTuple_New(rows);
     for (Py_ssize_t n = 0; made != NULL && n < rows; n++) {
         PyObject *row = made_vector(values + n * stride, size);
@@ -38,7 +41,9 @@ static int enough(Py_ssize_t given, Py_ssize_t wanted, PyObject *variances) {
 
 /* --- the algebra --- */
 
-PyDoc_STRVAR(dot_doc, "dot(a, b)\n--\n\nSum of products over the shorter of two tuples. See filter/estimate.py.");
+PyDoc_STRVAR(
+    dot_doc,
+    "dot(a, b)\n--\n\nSum of products over the shorter of two tuples. See filter/estimate.py.");
 
 static PyObject *dot_of(PyObject *module, PyObject *const *given, Py_ssize_t count) {
     (void)module;
@@ -66,31 +71,38 @@ static PyObject *variance(PyObject *module, PyObject *const *given, Py_ssize_t c
     const Py_ssize_t size = PyTuple_GET_SIZE(given[2]);
     const Py_ssize_t felt = PyTuple_Check(given[4]) && PyTuple_GET_SIZE(given[4]) == 0 ? 0 : size;
     if (!read_matrix(given[0], STATES, STATES, STATES, &P[0][0]) ||
-        !read_matrix(given[1], STATES, size, MOST, &cross[0][0]) || !read_vector(given[2], size, variances) ||
-        !read_vector(given[3], STATES, h) || !read_vector(given[4], felt, g))
+        !read_matrix(given[1], STATES, size, MOST, &cross[0][0]) ||
+        !read_vector(given[2], size, variances) || !read_vector(given[3], STATES, h) ||
+        !read_vector(given[4], felt, g))
         return NULL;
 
-    const double own = P[0][0] * h[0] * h[0] + P[1][1] * h[1] * h[1] + P[2][2] * h[2] * h[2] +
-                       2.0 * (P[0][1] * h[0] * h[1] + P[0][2] * h[0] * h[2] + P[1][2] * h[1] * h[2]);
-    const double shared = h[0] * dot(cross[0], g, felt) + h[1] * dot(cross[1], g, felt) + h[2] * dot(cross[2], g, felt);
+    const double own =
+        P[0][0] * h[0] * h[0] + P[1][1] * h[1] * h[1] + P[2][2] * h[2] * h[2] +
+        2.0 * (P[0][1] * h[0] * h[1] + P[0][2] * h[0] * h[2] + P[1][2] * h[1] * h[2]);
+    const double shared = h[0] * dot(cross[0], g, felt) + h[1] * dot(cross[1], g, felt) +
+                          h[2] * dot(cross[2], g, felt);
     double squares = 0.0;
     for (Py_ssize_t n = 0; n < felt; n++) squares += variances[n] * (g[n] * g[n]);
     const double all = own + 2.0 * shared + squares;
     return PyFloat_FromDouble(0.0 > all ? 0.0 : all);
 }
 
-/* Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and g (q,). */
-static void covariances(const estimate *e, const double *variances, const double *h, const double *g, double *state,
-                        double *nuisance) {
+/* Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and g
+   (q,). */
+static void covariances(const estimate *e, const double *variances, const double *h,
+                        const double *g, double *state, double *nuisance) {
     const double (*P)[STATES] = e->P;
     state[0] = P[0][0] * h[0] + P[0][1] * h[1] + P[0][2] * h[2] + dot(e->cross[0], g, e->nuisances);
     state[1] = P[0][1] * h[0] + P[1][1] * h[1] + P[1][2] * h[2] + dot(e->cross[1], g, e->nuisances);
     state[2] = P[0][2] * h[0] + P[1][2] * h[1] + P[2][2] * h[2] + dot(e->cross[2], g, e->nuisances);
     for (Py_ssize_t n = 0; n < e->nuisances; n++)
-        nuisance[n] = e->cross[0][n] * h[0] + e->cross[1][n] * h[1] + e->cross[2][n] * h[2] + variances[n] * g[n];
+        nuisance[n] = e->cross[0][n] * h[0] + e->cross[1][n] * h[1] + e->cross[2][n] * h[2] +
+                      variances[n] * g[n];
 }
 
-typedef struct { double y[COMPONENTS], H[COMPONENTS][STATES], G[COMPONENTS][MOST], R[COMPONENTS][COMPONENTS]; } measured;
+typedef struct {
+    double y[COMPONENTS], H[COMPONENTS][STATES], G[COMPONENTS][MOST], R[COMPONENTS][COMPONENTS];
+} measured;
 
 static int with_one(estimate *e, const double *variances, const measured *z, int states) {
     double m[STATES], n[MOST], gain[STATES] = {0.0}, P[STATES][STATES];
@@ -102,7 +114,8 @@ static int with_one(estimate *e, const double *variances, const measured *z, int
     for (int i = 0; i < STATES; i++) {
         const double rest = gain[i] * s - m[i];
         e->x[i] = e->x[i] + gain[i] * z->y[0];
-        for (Py_ssize_t j = 0; j < e->nuisances; j++) e->cross[i][j] = e->cross[i][j] - gain[i] * n[j];
+        for (Py_ssize_t j = 0; j < e->nuisances; j++)
+            e->cross[i][j] = e->cross[i][j] - gain[i] * n[j];
         for (int j = 0; j < STATES; j++) P[i][j] = e->P[i][j] + rest * gain[j] - gain[i] * m[j];
     }
     memcpy(e->P, P, sizeof P);
@@ -135,7 +148,8 @@ static int with_two(estimate *e, const double *variances, const measured *z, int
     }
     for (int i = 0; i < STATES; i++)
         for (int j = 0; j < STATES; j++)
-            P[i][j] = e->P[i][j] - k_y[i] * m_y[j] - k_z[i] * m_z[j] + e_y[i] * k_y[j] + e_z[i] * k_z[j];
+            P[i][j] =
+                e->P[i][j] - k_y[i] * m_y[j] - k_z[i] * m_z[j] + e_y[i] * k_y[j] + e_z[i] * k_z[j];
     memcpy(e->P, P, sizeof P);
     return 1;
 }
@@ -154,12 +168,15 @@ static PyObject *update(PyObject *module, PyObject *const *given, Py_ssize_t cou
     const long states = PyLong_AsLong(given[8]);
     if (states == -1 && PyErr_Occurred()) return NULL;
     if (components < 1 || components > COMPONENTS || states < 0 || states > STATES) {
-        PyErr_SetString(PyExc_ValueError, "expected one or two components and at most three states");
+        PyErr_SetString(PyExc_ValueError,
+                        "expected one or two components and at most three states");
         return NULL;
     }
-    if (!read_vector(given[0], STATES, e.x) || !read_matrix(given[1], STATES, STATES, STATES, &e.P[0][0]) ||
-        !read_matrix(given[2], STATES, size, MOST, &e.cross[0][0]) || !read_vector(given[3], size, variances) ||
-        !read_vector(given[4], components, z.y) || !read_matrix(given[5], components, STATES, STATES, &z.H[0][0]) ||
+    if (!read_vector(given[0], STATES, e.x) ||
+        !read_matrix(given[1], STATES, STATES, STATES, &e.P[0][0]) ||
+        !read_matrix(given[2], STATES, size, MOST, &e.cross[0][0]) ||
+        !read_vector(given[3], size, variances) || !read_vector(given[4], components, z.y) ||
+        !read_matrix(given[5], components, STATES, STATES, &z.H[0][0]) ||
         !read_matrix(given[6], components, size, MOST, &z.G[0][0]) ||
         !read_matrix(given[7], components, components, COMPONENTS, &z.R[0][0]))
         return NULL;
@@ -188,7 +205,8 @@ static PyMethodDef methods[] = {
     {"update", (PyCFunction)(void (*)(void))update, METH_FASTCALL, update_doc},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "algebra", "The filter's algebra, compiled.", -1, methods,
-                                    NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "algebra", "The filter's algebra, compiled.", -1, methods, NULL,
+    NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit_algebra(void) { return PyModule_Create(&module); }

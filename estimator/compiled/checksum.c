@@ -1,7 +1,9 @@
-/* CRC-32 of zlib, the checksum of MCAP's chunks, four times faster where the processor multiplies without carries.
+/* CRC-32 of zlib, the checksum of MCAP's chunks, four times faster where the processor multiplies
+   without carries.
 
-   V. Gopal et al., Fast CRC computation for generic polynomials using the PCLMULQDQ instruction, Intel 2009: 64 bytes
-   at a time are folded into the next 64; the bit-reflected constants are those of its last page. */
+   V. Gopal et al., Fast CRC computation for generic polynomials using the PCLMULQDQ instruction,
+   Intel 2009: 64 bytes at a time are folded into the next 64; the bit-reflected constants are those
+   of its last page. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -35,10 +37,13 @@ static inline __m128i folded(__m128i x, __m128i k, __m128i next) {
 /* The same of 64 bytes or more, in steps of 16. */
 __attribute__((target("pclmul,sse4.1")))
 static uint32_t by_folding(const unsigned char *data, Py_ssize_t size, uint32_t crc) {
-    const __m128i k64 = _mm_set_epi64x(0x01c6e41596, 0x0154442bd4), k16 = _mm_set_epi64x(0x00ccaa009e, 0x01751997d0);
-    const __m128i k8 = _mm_set_epi64x(0, 0x0163cd6124), barrett = _mm_set_epi64x(0x01f7011641, 0x01db710641);
+    const __m128i k64 = _mm_set_epi64x(0x01c6e41596, 0x0154442bd4);
+    const __m128i k16 = _mm_set_epi64x(0x00ccaa009e, 0x01751997d0);
+    const __m128i k8 = _mm_set_epi64x(0, 0x0163cd6124);
+    const __m128i barrett = _mm_set_epi64x(0x01f7011641, 0x01db710641);
     const __m128i words = _mm_setr_epi32(~0, 0, ~0, 0);
-    __m128i a = _mm_xor_si128(AT(0), _mm_cvtsi32_si128((int)crc)), b = AT(16), c = AT(32), d = AT(48);
+    __m128i a = _mm_xor_si128(AT(0), _mm_cvtsi32_si128((int)crc)), b = AT(16);
+    __m128i c = AT(32), d = AT(48);
     for (data += 64, size -= 64; size >= 64; data += 64, size -= 64) {
         a = folded(a, k64, AT(0));
         b = folded(b, k64, AT(16));
@@ -50,7 +55,8 @@ static uint32_t by_folding(const unsigned char *data, Py_ssize_t size, uint32_t 
 
     /* 128 bits to 64, to 32 */
     a = _mm_xor_si128(_mm_srli_si128(a, 8), _mm_clmulepi64_si128(a, k16, 0x10));
-    a = _mm_xor_si128(_mm_srli_si128(a, 4), _mm_clmulepi64_si128(_mm_and_si128(a, words), k8, 0x00));
+    a = _mm_xor_si128(_mm_srli_si128(a, 4),
+                      _mm_clmulepi64_si128(_mm_and_si128(a, words), k8, 0x00));
     b = _mm_and_si128(_mm_clmulepi64_si128(_mm_and_si128(a, words), barrett, 0x10), words);
     return (uint32_t)_mm_extract_epi32(_mm_xor_si128(a, _mm_clmulepi64_si128(b, barrett, 0x00)), 1);
 }
@@ -72,8 +78,8 @@ static PyMethodDef methods[] = {
     {"crc32", crc32, METH_O, "crc32(data): as zlib.crc32."},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "checksum", "CRC-32, folded.", -1,
-                                    methods, NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "checksum", "CRC-32, folded.", -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit_checksum(void) {
     if (!__builtin_cpu_supports("pclmul") || !__builtin_cpu_supports("sse4.1")) {

@@ -1,12 +1,16 @@
-/* The closed forms (20)-(22) of one sample under a load, with gradients, and the shift of their integrals.
+/* The closed forms (20)-(22) of one sample under a load, with gradients, and the shift of their
+   integrals.
 
-   This is terramechanics/scalar.py and the evaluation in filter/shift.py, operation for operation: the same bits, a
-   tenth of the time. Complex numbers are multiplied, divided and raised as CPython does. No sum is reordered and no
-   product fused with a sum (-ffp-contract=off). A test compares the two on drawn values. */
+   This is terramechanics/scalar.py and the evaluation in filter/shift.py, operation for operation:
+   the same bits, a tenth of the time. Complex numbers are multiplied, divided and raised as CPython
+   does. No sum is reordered and no product fused with a sum (-ffp-contract=off). A test compares
+   the two on drawn values. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 #include <math.h>
+
+#include "complex_numbers.h"
 
 #define INTEGRALS 8               /* A1, A2, B1, B2, B3, C1, C2, C3 */
 #define PARTS 3                   /* the shift, its derivative by ln k, by n */
@@ -14,8 +18,6 @@
 #define POWERS 14                 /* of the polynomials in theta_1 and in slip */
 #define SMALLEST 0.1              /* as in scalar.py */
 #define NEAREST 0.02
-
-typedef struct { double re, im; } number;
 
 /* A1, A2, B1 + iC3, C1 + iB2, C2 + iB3 */
 typedef struct { double a1, a2; number bare, one, hat; } integrals;
@@ -29,30 +31,6 @@ typedef struct {
     double table[POWERS][POWERS][COLUMNS];
     PyObject *quantity;           /* the named tuple of a result */
 } Closed;
-
-/* --- complex numbers as CPython calculates them --- */
-
-static number plus(number a, number b) { return (number){a.re + b.re, a.im + b.im}; }
-static number minus(number a, number b) { return (number){a.re - b.re, a.im - b.im}; }
-static number real(double a) { return (number){a, 0.0}; }
-
-static number times(number a, number b) {
-    return (number){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
-}
-
-static number over(number a, number b) {
-    if (fabs(b.re) >= fabs(b.im)) {
-        const double ratio = b.im / b.re, whole = b.re + b.im * ratio;
-        return (number){(a.re + a.im * ratio) / whole, (a.im - a.re * ratio) / whole};
-    }
-    const double ratio = b.re / b.im, whole = b.re * ratio + b.im;
-    return (number){(a.re * ratio + a.im) / whole, (a.im * ratio - a.re) / whole};
-}
-
-static number turn(number a) {
-    const double size = exp(a.re);
-    return (number){size * cos(a.im), size * sin(a.im)};
-}
 
 /* --- the integrals and their derivatives by ln theta_1 and by ln f --- */
 
@@ -79,15 +57,16 @@ static void transforms_real(double s, double end, double peak, double lam, doubl
 
 static number opposite(number a) { return (number){-a.re, -a.im}; }
 
-static void all_integrals(double theta_1, double eta, double lam, integrals *x, integrals *by_theta_1,
-                          integrals *by_f) {
+static void all_integrals(double theta_1, double eta, double lam, integrals *x,
+                          integrals *by_theta_1, integrals *by_f) {
     const number turning = {0.0, theta_1}, both = {eta, theta_1};
     const double alpha = 1.0 - lam;
     const number ahead = turn(turning);
     double e0[4];
     number e1[4], e2[4];
     transforms_real(eta, exp(-eta), exp(-eta * alpha), lam, e0);
-    transforms(turning, turn(opposite(turning)), turn(times(opposite(turning), real(alpha))), lam, e1);
+    transforms(turning, turn(opposite(turning)), turn(times(opposite(turning), real(alpha))), lam,
+               e1);
     transforms(both, turn(opposite(both)), turn(times(opposite(both), real(alpha))), lam, e2);
 
     const number bare = times(ahead, e1[1]);
@@ -134,7 +113,8 @@ static integrals added(integrals x, const double *change, double factor) {
 /* --- the shift (filter/shift.py) --- */
 
 /* T_0 .. at the place of x in its range, and their derivatives by x. */
-static void polynomials(double x, double low, double high, double first[POWERS], double slopes[POWERS]) {
+static void polynomials(double x, double low, double high, double first[POWERS],
+                        double slopes[POWERS]) {
     double slope = 2.0 / (high - low), u = (x - low) * slope - 1.0;
     if (!(low <= x && x <= high)) {
         u = x < low ? -1.0 : 1.0;
@@ -151,7 +131,8 @@ static void polynomials(double x, double low, double high, double first[POWERS],
 }
 
 /* out: the first `columns` of the table at a point: values, derivatives by theta_1 and by slip. */
-static void tabulated(const Closed *self, double theta_1, double slip, int columns, double out[3][COLUMNS]) {
+static void tabulated(const Closed *self, double theta_1, double slip, int columns,
+                      double out[3][COLUMNS]) {
     double rows[POWERS], by_rows[POWERS], across[POWERS], by_across[POWERS];
     polynomials(theta_1, self->low[0], self->high[0], rows, by_rows);
     polynomials(slip, self->low[1], self->high[1], across, by_across);
@@ -168,22 +149,25 @@ static void tabulated(const Closed *self, double theta_1, double slip, int colum
                 by_theta_1[q] += by_rows[a] * self->table[a][b][q];
             }
         for (int q = 0; q < columns; q++) {
-            const double parts[3] = {across[b] * value[q], across[b] * by_theta_1[q], by_across[b] * value[q]};
+            const double parts[3] = {across[b] * value[q], across[b] * by_theta_1[q],
+                                     by_across[b] * value[q]};
             for (int p = 0; p < 3; p++) out[p][q] = b ? out[p][q] + parts[p] : parts[p];
         }
     }
 }
 
-/* value, by theta_1, by slip of the shift at k, and its derivative by ln k: each of eight integrals. */
-static void shift_at(const Closed *self, double k, double theta_1, double slip, double exponent_error,
-                     double out[4][INTEGRALS]) {
+/* value, by theta_1, by slip of the shift at k, and its derivative by ln k: each of eight
+   integrals. */
+static void shift_at(const Closed *self, double k, double theta_1, double slip,
+                     double exponent_error, double out[4][INTEGRALS]) {
     double point[3][COLUMNS];
     const double ln_k = log(k) - self->ln_k;
     tabulated(self, theta_1, slip, exponent_error != 0.0 ? COLUMNS : 2 * INTEGRALS, point);
     for (int q = 0; q < INTEGRALS; q++) {
         for (int p = 0; p < 3; p++) {
             out[p][q] = point[p][q] + ln_k * point[p][INTEGRALS + q];
-            if (exponent_error != 0.0) out[p][q] = out[p][q] + exponent_error * point[p][2 * INTEGRALS + q];
+            if (exponent_error != 0.0)
+                out[p][q] = out[p][q] + exponent_error * point[p][2 * INTEGRALS + q];
         }
         out[3][q] = point[0][INTEGRALS + q];
     }
@@ -193,7 +177,8 @@ static void shift_at(const Closed *self, double k, double theta_1, double slip, 
 
 typedef struct { double area, arm, cohesion, s, friction; } under;
 
-/* Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same formulas. */
+/* Eqs. (20)-(22) at this s: linear in the integrals, so that changes of both follow the same
+   formulas. */
 static change forces(const under *u, integrals x) {
     const double drag = u->area * u->s * x.bare.im;
     return (change){
@@ -205,7 +190,8 @@ static change forces(const under *u, integrals x) {
 
 /* Whether the transforms lose digits here, or a number is none: then the general form answers. */
 static int delicate(double theta_1, double f, double slip, double lam) {
-    return !(slip >= 0.0 && theta_1 >= SMALLEST && f * theta_1 >= SMALLEST && NEAREST < lam && lam < 1.0 - NEAREST);
+    return !(slip >= 0.0 && theta_1 >= SMALLEST && f * theta_1 >= SMALLEST && NEAREST < lam &&
+             lam < 1.0 - NEAREST);
 }
 
 static PyObject *quantity(const Closed *self, double value, const double gradient[6]) {
@@ -270,7 +256,8 @@ static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_
         {arm * theta_1 * x.a1, area * theta_1 * x.one.re, 0.0, area * theta_1 * x.one.im},
         {arm * s * x.a2, area * s * x.hat.re, 0.0, area * s * x.hat.im},
         forces(&at, by_f),
-        forces(&at, (integrals){x.a1 + by_theta.a1, by_theta.a2, by_theta.bare, plus(x.one, by_theta.one), by_theta.hat}),
+        forces(&at, (integrals){x.a1 + by_theta.a1, by_theta.a2, by_theta.bare,
+                                plus(x.one, by_theta.one), by_theta.hat}),
         self->c2 != 0.0 ? forces(&at, by_ratio(theta_1, f * theta_1, lam)) : none,
         self->shifted ? forces(&at, added(nothing, shift[3], 1.0)) : none,
         self->shifted ? forces(&at, added(nothing, shift[2], 1.0)) : none};
@@ -285,7 +272,8 @@ static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_
         columns[n].drag = columns[n].drag + drag_s * columns[n].load;
     }
     /* of ln f by theta_1 and by slip */
-    const double f_theta_1 = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f, f_slip = scale * (1.0 - rise) / f;
+    const double f_theta_1 = 0.5 * scale * (1.0 - slip) * sin(theta_1) / f;
+    const double f_slip = scale * (1.0 - rise) / f;
     const double by_w[3] = {torque_s, pull_s, drag_s};
     for (int q = 0; q < 3; q++) {
         double by[7];
@@ -317,7 +305,8 @@ static PyObject *load_of(PyObject *object, PyObject *const *arguments, Py_ssize_
     const Closed *self = (Closed *)object;
     double in[7], shift[4][INTEGRALS];
     if (!numbers(arguments, given, 7, in)) return NULL;
-    const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3], slip = in[4], sigma_m = in[5];
+    const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3];
+    const double slip = in[4], sigma_m = in[5];
 
     const double lam = self->c1 + self->c2 * slip, half = sin(0.5 * theta_1);
     const double f = self->radius / k * (slip + (1.0 - slip) * (half * half)); /* Eq. (19) */
@@ -343,8 +332,9 @@ static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
         PyErr_SetString(PyExc_TypeError, "Closed takes no names");
         return -1;
     }
-    if (!PyArg_ParseTuple(arguments, "O!(dddd)d(dd)(dd)O", &PyType_Type, &type, &self->radius, &self->width, &self->c1,
-                          &self->c2, &self->ln_k, &self->low[0], &self->high[0], &self->low[1], &self->high[1], &table))
+    if (!PyArg_ParseTuple(arguments, "O!(dddd)d(dd)(dd)O", &PyType_Type, &type, &self->radius,
+                          &self->width, &self->c1, &self->c2, &self->ln_k, &self->low[0],
+                          &self->high[0], &self->low[1], &self->high[1], &table))
         return -1;
     if (!PyType_IsSubtype((PyTypeObject *)type, &PyTuple_Type)) {
         PyErr_SetString(PyExc_TypeError, "expected a named tuple for results");
@@ -357,7 +347,8 @@ static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
         if (fits) memcpy(self->table, given.buf, sizeof self->table);
         PyBuffer_Release(&given);
         if (!fits) {
-            PyErr_Format(PyExc_ValueError, "expected a table of %d x %d x %d doubles", POWERS, POWERS, COLUMNS);
+            PyErr_Format(PyExc_ValueError, "expected a table of %d x %d x %d doubles", POWERS,
+                         POWERS, COLUMNS);
             return -1;
         }
     }

@@ -1,6 +1,6 @@
-/* Innovations of many columns under noise of several colours, as the loop in tools/diagnose/noise/colour.py finds them,
-   operation for operation: the same bits (-ffp-contract=off). One colour at a time, so that its state stays in the
-   nearest cache. */
+/* Innovations of many columns under noise of several colours, as the loop in
+   tools/diagnose/noise/colour.py finds them, operation for operation: the same bits
+   (-ffp-contract=off). One colour at a time, so that its state stays in the nearest cache. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -8,8 +8,9 @@
 enum { COLUMNS, KEPT, GAIN, SCALE, SLOW, FAST, OUT, ARRAYS };
 
 /* One value of all columns: the innovation over its deviation, and the state after it. */
-static void value(const double *restrict column, Py_ssize_t width, double kept_slow, double kept_fast, double gain_slow,
-                  double gain_fast, double scale, double *restrict slow, double *restrict fast, double *restrict out) {
+static void value(const double *restrict column, Py_ssize_t width, double kept_slow,
+                  double kept_fast, double gain_slow, double gain_fast, double scale,
+                  double *restrict slow, double *restrict fast, double *restrict out) {
     for (Py_ssize_t j = 0; j < width; j++) {
         const double before_slow = slow[j] * kept_slow, before_fast = fast[j] * kept_fast;
         const double innovation = column[j] - before_slow - before_fast;
@@ -19,28 +20,31 @@ static void value(const double *restrict column, Py_ssize_t width, double kept_s
     }
 }
 
-static void follow(double *const at[ARRAYS], Py_ssize_t length, Py_ssize_t colours, Py_ssize_t width, Py_ssize_t first,
-                   Py_ssize_t rows) {
+static void follow(double *const at[ARRAYS], Py_ssize_t length, Py_ssize_t colours,
+                   Py_ssize_t width, Py_ssize_t first, Py_ssize_t rows) {
     const Py_ssize_t second = length * colours; /* the fast part stands behind the slow one */
     for (Py_ssize_t c = 0; c < colours; c++)
         for (Py_ssize_t row = 0; row < rows; row++) {
             const Py_ssize_t i = (first + row) * colours + c;
-            value(at[COLUMNS] + (first + row) * width, width, at[KEPT][i], at[KEPT][second + i], at[GAIN][i],
-                  at[GAIN][second + i], at[SCALE][i], at[SLOW] + c * width, at[FAST] + c * width,
-                  at[OUT] + (c * rows + row) * width);
+            value(at[COLUMNS] + (first + row) * width, width, at[KEPT][i], at[KEPT][second + i],
+                  at[GAIN][i], at[GAIN][second + i], at[SCALE][i], at[SLOW] + c * width,
+                  at[FAST] + c * width, at[OUT] + (c * rows + row) * width);
         }
 }
 
 static PyObject *fill(PyObject *self, PyObject *arguments) {
     Py_buffer held[ARRAYS];
     Py_ssize_t length, colours, width, first, rows;
-    if (!PyArg_ParseTuple(arguments, "y*y*y*y*w*w*w*nnnnn", &held[COLUMNS], &held[KEPT], &held[GAIN], &held[SCALE],
-                          &held[SLOW], &held[FAST], &held[OUT], &length, &colours, &width, &first, &rows))
+    if (!PyArg_ParseTuple(arguments, "y*y*y*y*w*w*w*nnnnn", &held[COLUMNS], &held[KEPT],
+                          &held[GAIN], &held[SCALE], &held[SLOW], &held[FAST], &held[OUT], &length,
+                          &colours, &width, &first, &rows))
         return NULL;
 
-    const Py_ssize_t sizes[ARRAYS] = {length * width,  2 * length * colours, 2 * length * colours, length * colours,
-                                      colours * width, colours * width,      colours * rows * width};
-    int fits = length >= 0 && colours >= 0 && width >= 0 && first >= 0 && rows >= 0 && first + rows <= length;
+    const Py_ssize_t sizes[ARRAYS] = {
+        length * width,  2 * length * colours, 2 * length * colours,  length * colours,
+        colours * width, colours * width,      colours * rows * width};
+    int fits = length >= 0 && colours >= 0 && width >= 0 && first >= 0 && rows >= 0 &&
+               first + rows <= length;
     double *at[ARRAYS];
     for (int k = 0; k < ARRAYS; k++) {
         fits = fits && held[k].len == sizes[k] * (Py_ssize_t)sizeof(double);
@@ -61,10 +65,12 @@ static PyObject *fill(PyObject *self, PyObject *arguments) {
 }
 
 static PyMethodDef methods[] = {
-    {"fill", fill, METH_VARARGS, "fill(columns, kept, gain, scale, slow, fast, out, length, colours, width, first, rows)"},
+    {"fill", fill, METH_VARARGS,
+     "fill(columns, kept, gain, scale, slow, fast, out, length, colours, width, first, rows)"},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "innovations", "Innovations under coloured noise.", -1,
-                                    methods, NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "innovations", "Innovations under coloured noise.", -1, methods, NULL,
+    NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit_innovations(void) { return PyModule_Create(&module); }

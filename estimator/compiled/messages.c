@@ -1,5 +1,6 @@
-/* Messages of unpacked blocks: found and held against the sizes of their channels, as recording/piles.py does by the
-   message index, and copied into rows, as recording/tables.py does. */
+/* Messages of unpacked blocks: found and held against the sizes of their channels, as
+   recording/piles.py does by the message index, and copied into rows, as recording/tables.py
+   does. */
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
@@ -11,7 +12,8 @@
 #endif
 
 enum { SCHEMA = 3, CHANNEL = 4, MESSAGE = 5 };         /* opcodes */
-enum { RECORD = 9, HEAD = 31, LOOK = 33, LOG_TIME = 15 }; /* [bytes] heads; with two bytes of CDR; a place in it */
+/* [bytes] heads; with two bytes of CDR; a place in it */
+enum { RECORD = 9, HEAD = 31, LOOK = 33, LOG_TIME = 15 };
 enum { PADDING = 7, CDR_LE = 0x0100 };                 /* as in decoding.py */
 enum { NOT_FIXED = -1, UNKNOWN = -2 };                 /* in the place of a size */
 #define BILLION 1000000000LL                           /* [ns/s] */
@@ -40,9 +42,10 @@ static int64_t after(const pile *p, int64_t at, int64_t end) {
     return length > (uint64_t)(end - at - RECORD) ? -1 : at + RECORD + (int64_t)length;
 }
 
-/* Where the messages of a block begin, behind their definitions; -1 where that is not to be found. */
+/* Where the messages of a block begin, behind their definitions; -1 where that is unknown. */
 static int64_t behind_definitions(const pile *p, int64_t at, int64_t end) {
-    while (at >= 0 && at < end && (p->data[at] == SCHEMA || p->data[at] == CHANNEL)) at = after(p, at, end);
+    while (at >= 0 && at < end && (p->data[at] == SCHEMA || p->data[at] == CHANNEL))
+        at = after(p, at, end);
     return at;
 }
 
@@ -57,8 +60,8 @@ static int is_sound(const pile *p, int64_t at, int64_t next) {
     return excess >= 0 && excess <= PADDING && u16(head + HEAD) == CDR_LE;
 }
 
-/* How many messages there are, and of each channel; -1 where messages, and nothing else, do not lie end to end behind
-   the definitions of each block. */
+/* How many messages there are, and of each channel; -1 where messages, and nothing else, do not lie
+   end to end behind the definitions of each block. */
 static int64_t counted(const pile *p) {
     int64_t total = 0, at = 0;
     for (Py_ssize_t block = 0; block < p->blocks; block++) {
@@ -100,7 +103,8 @@ static PyObject *by_channel(const pile *p) {
     PyObject *made = PyDict_New();
     for (Py_ssize_t channel = 0; made != NULL && channel < p->channels; channel++) {
         if (p->counts[channel] == 0) continue;
-        PyObject *key = PyLong_FromSsize_t(channel), *value = PyLong_FromLongLong(p->counts[channel]);
+        PyObject *key = PyLong_FromSsize_t(channel);
+        PyObject *value = PyLong_FromLongLong(p->counts[channel]);
         if (key == NULL || value == NULL || PyDict_SetItem(made, key, value) < 0) Py_CLEAR(made);
         Py_XDECREF(key);
         Py_XDECREF(value);
@@ -116,7 +120,8 @@ static PyObject *noted(pile *p) {
     if (total < 0) { PyMem_Free(p->counts); Py_RETURN_NONE; }
 
     PyObject *made = NULL, *counts = by_channel(p);
-    PyObject *starts = PyBytes_FromStringAndSize(NULL, total * 8), *order = PyBytes_FromStringAndSize(NULL, total * 8);
+    PyObject *starts = PyBytes_FromStringAndSize(NULL, total * 8);
+    PyObject *order = PyBytes_FromStringAndSize(NULL, total * 8);
     PyObject *heads = PyBytes_FromStringAndSize(NULL, total * LOOK);
     PyObject *cuts = PyBytes_FromStringAndSize(NULL, (p->blocks + 1) * 8);
     if (counts && starts && order && heads && cuts) {
@@ -144,36 +149,48 @@ static PyObject *walk(PyObject *self, PyObject *args) {
 
 /* --- fill --- */
 
-/* n triples of places: bytes of a record that become bytes of a row, or seconds and nanoseconds that become a time */
+/* n triples of places: bytes of a record that become bytes of a row, or seconds and nanoseconds
+   that become a time */
 typedef struct { Py_ssize_t from, to, other; } step;
 
 static step *read_steps(PyObject *given, Py_ssize_t *n) {
-    if (!PyTuple_Check(given)) { PyErr_SetString(PyExc_TypeError, "expected a tuple of triples"); return NULL; }
+    if (!PyTuple_Check(given)) {
+        PyErr_SetString(PyExc_TypeError, "expected a tuple of triples");
+        return NULL;
+    }
     *n = PyTuple_GET_SIZE(given);
     step *steps = PyMem_Calloc((size_t)*n + 1, sizeof(step));
     if (steps == NULL) { PyErr_NoMemory(); return NULL; }
     for (Py_ssize_t i = 0; i < *n; i++)
-        if (!PyArg_ParseTuple(PyTuple_GET_ITEM(given, i), "nnn", &steps[i].from, &steps[i].to, &steps[i].other)) {
+        if (!PyArg_ParseTuple(PyTuple_GET_ITEM(given, i), "nnn", &steps[i].from, &steps[i].to,
+                              &steps[i].other)) {
             PyMem_Free(steps);
             return NULL;
         }
     return steps;
 }
 
-/* Whether all that is read of a record lies within `reach` of its start, and all that is written within a row. */
-static int fits(const step *pieces, Py_ssize_t n, const step *times, Py_ssize_t m, Py_ssize_t reach, Py_ssize_t row) {
+/* Whether all that is read of a record lies within `reach` of its start, and all that is written
+   within a row. */
+static int fits(const step *pieces, Py_ssize_t n, const step *times, Py_ssize_t m, Py_ssize_t reach,
+                Py_ssize_t row) {
     for (Py_ssize_t i = 0; i < n; i++) {
         const step s = pieces[i];
-        if (s.from < 0 || s.to < 0 || s.other < 0 || s.other > reach - s.from || s.other > row - s.to) return 0;
+        if (s.from < 0 || s.to < 0 || s.other < 0 || s.other > reach - s.from ||
+            s.other > row - s.to)
+            return 0;
     }
     for (Py_ssize_t i = 0; i < m; i++) {
         const step s = times[i];
-        if (s.from < 0 || s.to < 0 || s.other < 0 || s.from > reach - 4 || s.other > reach - 4 || s.to > row - 8) return 0;
+        if (s.from < 0 || s.to < 0 || s.other < 0 || s.from > reach - 4 || s.other > reach - 4 ||
+            s.to > row - 8)
+            return 0;
     }
     return row >= 16 && reach >= HEAD;
 }
 
-static void copy(const char *record, char *row, const step *pieces, Py_ssize_t n, const step *times, Py_ssize_t m) {
+static void copy(const char *record, char *row, const step *pieces, Py_ssize_t n, const step *times,
+                 Py_ssize_t m) {
     for (Py_ssize_t i = 0; i < n; i++) {
         if (pieces[i].other == 8) memcpy(row + pieces[i].to, record + pieces[i].from, 8);
         else memcpy(row + pieces[i].to, record + pieces[i].from, (size_t)pieces[i].other);
@@ -189,12 +206,14 @@ static PyObject *fill(PyObject *self, PyObject *args) {
     Py_ssize_t reach, n = 0, m = 0;
     long long before;
     PyObject *given_pieces, *given_times, *made = NULL;
-    if (!PyArg_ParseTuple(args, "y*y*y*w*nLOO", &content, &starts, &own, &rows, &reach, &before, &given_pieces,
-                          &given_times))
+    if (!PyArg_ParseTuple(args, "y*y*y*w*nLOO", &content, &starts, &own, &rows, &reach, &before,
+                          &given_pieces, &given_times))
         return NULL;
     const int64_t *start = starts.buf, *number = own.buf;
-    const Py_ssize_t count = own.len / 8, messages = starts.len / 8, row = count ? rows.len / count : 16;
-    step *pieces = read_steps(given_pieces, &n), *times = pieces ? read_steps(given_times, &m) : NULL;
+    const Py_ssize_t count = own.len / 8, messages = starts.len / 8;
+    const Py_ssize_t row = count ? rows.len / count : 16;
+    step *pieces = read_steps(given_pieces, &n);
+    step *times = pieces ? read_steps(given_times, &m) : NULL;
     if (times == NULL) goto done;
     if (!fits(pieces, n, times, m, reach, row)) {
         PyErr_SetString(PyExc_ValueError, "a piece lies outside its record or its row");
@@ -217,23 +236,29 @@ static PyObject *fill(PyObject *self, PyObject *args) {
 done:
     PyMem_Free(pieces);
     PyMem_Free(times);
-    PyBuffer_Release(&content); PyBuffer_Release(&starts); PyBuffer_Release(&own); PyBuffer_Release(&rows);
+    PyBuffer_Release(&content);
+    PyBuffer_Release(&starts);
+    PyBuffer_Release(&own);
+    PyBuffer_Release(&rows);
     return made;
 }
 
 static PyMethodDef methods[] = {
     {"walk", walk, METH_VARARGS,
-     "walk(content, ends, sizes): the messages of joined blocks that end at `ends` (n,) int64, each behind its\n"
-     "definitions. sizes: int64 by channel, of a message without MCAP's head; -1 not fixed, -2 unknown. As bytes:\n"
-     "starts (m,) int64, heads (m, 33), cuts (n + 1,) int64, numbers by channel (m,) int64; and {channel: messages}.\n"
-     "None where anything is not as it should be."},
+     "walk(content, ends, sizes): the messages of joined blocks that end at `ends` (n,) int64,\n"
+     "each behind its definitions. sizes: int64 by channel, of a message without MCAP's head; -1\n"
+     "not fixed, -2 unknown. As bytes: starts (m,) int64, heads (m, 33), cuts (n + 1,) int64,\n"
+     "numbers by channel (m,) int64; and {channel: messages}. None where anything is not as it\n"
+     "should be."},
     {"fill", fill, METH_VARARGS,
-     "fill(content, starts, own, rows, reach, before, pieces, times): the messages numbered `own` (m,) int64 as rows\n"
-     "that begin with log_time and order. pieces: (place in the record, in the row, bytes); times: (place of the\n"
-     "seconds, in the row, of the nanoseconds). reach: bytes of a record that are looked at."},
+     "fill(content, starts, own, rows, reach, before, pieces, times): the messages numbered `own`\n"
+     "(m,) int64 as rows that begin with log_time and order. pieces: (place in the record, in the\n"
+     "row, bytes); times: (place of the seconds, in the row, of the nanoseconds). reach: bytes of\n"
+     "a record that are looked at."},
     {NULL, NULL, 0, NULL},
 };
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "messages", NULL, -1, methods, NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "messages", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit_messages(void) { return PyModule_Create(&module); }

@@ -1,4 +1,5 @@
-/* Whether the soil changed: the Bayes factors of filter/evidence.py, operation for operation, to the same bits. */
+/* Whether the soil changed: the Bayes factors of filter/evidence.py, operation for operation, to
+   the same bits. */
 
 #include "tuples.h"
 #include <math.h>
@@ -46,7 +47,8 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     const Py_ssize_t d = r->d;
     double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
     double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS];
-    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 || !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
+    if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 ||
+        !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
         PyErr_SetString(PyExc_ValueError, "expected a line of y, H, G, R and D");
         return 0;
     }
@@ -55,7 +57,8 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
         PyErr_SetString(PyExc_ValueError, "expected one or two components");
         return 0;
     }
-    if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) || !read_matrix(PyTuple_GET_ITEM(line, 1), m, STATES, d, A) ||
+    if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 1), m, STATES, d, A) ||
         !read_matrix(PyTuple_GET_ITEM(line, 2), m, r->q, d, A + STATES) ||
         !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &R[0][0]) ||
         !read_matrix(PyTuple_GET_ITEM(line, 4), m, m, COMPONENTS, &D[0][0]))
@@ -101,11 +104,14 @@ static int cholesky(const double *A, double *L, Py_ssize_t d) {
 static int root_of(record *r, PyObject *P, PyObject *cross, PyObject *variances) {
     const Py_ssize_t d = r->d, q = r->q;
     double *joint = r->gram;
-    if (!read_matrix(P, STATES, STATES, d, joint) || !read_matrix(cross, STATES, q, d, joint + STATES)) return 0;
+    if (!read_matrix(P, STATES, STATES, d, joint) ||
+        !read_matrix(cross, STATES, q, d, joint + STATES))
+        return 0;
     if (!read_vector(variances, q, r->best)) return 0;
     for (Py_ssize_t i = STATES; i < d; i++) {
         for (Py_ssize_t j = 0; j < STATES; j++) joint[i * d + j] = joint[j * d + i];
-        for (Py_ssize_t j = STATES; j < d; j++) joint[i * d + j] = i == j ? r->best[i - STATES] : 0.0;
+        for (Py_ssize_t j = STATES; j < d; j++)
+            joint[i * d + j] = i == j ? r->best[i - STATES] : 0.0;
     }
     for (Py_ssize_t i = 0; i < d; i++) {
         r->sigma[i] = sqrt(joint[i * d + i]);
@@ -113,7 +119,8 @@ static int root_of(record *r, PyObject *P, PyObject *cross, PyObject *variances)
     }
     for (Py_ssize_t i = 0; i < d; i++)
         for (Py_ssize_t j = 0; j < d; j++)
-            joint[i * d + j] = joint[i * d + j] / (r->scale[i] * r->scale[j]) + (i == j ? TINY : 0.0);
+            joint[i * d + j] =
+                joint[i * d + j] / (r->scale[i] * r->scale[j]) + (i == j ? TINY : 0.0);
     if (!cholesky(joint, r->root, d)) return 0;
     for (Py_ssize_t i = 0; i < d; i++)
         for (Py_ssize_t j = 0; j < d; j++) r->root[i * d + j] = r->sigma[i] * r->root[i * d + j];
@@ -175,7 +182,8 @@ static void since(record *r, double *evidence) {
     const Py_ssize_t d = r->d;
     double information[STATES][STATES] = {{0.0}}, score[STATES] = {0.0}, left[STATES][STATES];
     for (Py_ssize_t at = r->s - 1; at >= 0; at--) {
-        const double *A = r->A + COMPONENTS * at * d, *B = A + d, *F = r->F + COMPONENTS * at * d, *E = F + d;
+        const double *A = r->A + COMPONENTS * at * d, *B = A + d;
+        const double *F = r->F + COMPONENTS * at * d, *E = F + d;
         const double *y = r->y + COMPONENTS * at;
         const double y_a = y[0] - dot(F, r->best, d), y_b = y[1] - dot(E, r->best, d);
         for (int i = 0; i < STATES; i++) {
@@ -210,8 +218,8 @@ static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t c
     (void)module;
     record r = {0};
     PyObject *factors = NULL, *x = NULL, *all = NULL;
-    if (count != 7 || !PyTuple_Check(given[3]) || !PyList_Check(given[5]) || !PyList_Check(given[6]) ||
-        PyList_GET_SIZE(given[5]) != PyList_GET_SIZE(given[6])) {
+    if (count != 7 || !PyTuple_Check(given[3]) || !PyList_Check(given[5]) ||
+        !PyList_Check(given[6]) || PyList_GET_SIZE(given[5]) != PyList_GET_SIZE(given[6])) {
         PyErr_SetString(PyExc_TypeError, "expected five tuples and two lists of one length");
         return NULL;
     }
@@ -220,8 +228,9 @@ static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t c
     r.d = STATES + r.q;
     if (!room(&r)) return NULL;
     double *factor = PyMem_Calloc((size_t)r.s + 1, sizeof(double));
-    if (factor != NULL && read_vector(given[0], STATES, r.x) && read_vector(given[4], STATES, r.spread) &&
-        read_lines(&r, given[5], given[6]) && root_of(&r, given[1], given[2], given[3]) && fitted(&r)) {
+    if (factor != NULL && read_vector(given[0], STATES, r.x) &&
+        read_vector(given[4], STATES, r.spread) && read_lines(&r, given[5], given[6]) &&
+        root_of(&r, given[1], given[2], given[3]) && fitted(&r)) {
         double known[STATES];
         since(&r, factor);
         for (int n = 0; n < STATES; n++) known[n] = r.x[n] + dot(r.root + n * r.d, r.best, r.d);
@@ -242,7 +251,8 @@ static PyMethodDef methods[] = {
     {"evidence", (PyCFunction)(void (*)(void))evidence, METH_FASTCALL, evidence_doc},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "record", "Whether the soil changed, compiled.", -1,
-                                    methods, NULL, NULL, NULL, NULL};
+static struct PyModuleDef module = {
+    PyModuleDef_HEAD_INIT, "record", "Whether the soil changed, compiled.", -1, methods, NULL,
+    NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit_record(void) { return PyModule_Create(&module); }

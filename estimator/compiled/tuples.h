@@ -1,4 +1,5 @@
-/* Tuples of floats, in and out. A reader sets an exception and returns 0 where it finds something else. */
+/* Tuples of floats, in and out. A reader sets an exception and returns 0 where it finds something
+   else. */
 
 #ifndef GRITD_TUPLES_H
 #define GRITD_TUPLES_H
@@ -19,7 +20,8 @@ static int read_vector(PyObject *given, Py_ssize_t size, double *out) {
 }
 
 /* rows of `size` numbers, `stride` apart in out */
-static int read_matrix(PyObject *given, Py_ssize_t rows, Py_ssize_t size, Py_ssize_t stride, double *out) {
+static int read_matrix(PyObject *given, Py_ssize_t rows, Py_ssize_t size, Py_ssize_t stride,
+                       double *out) {
     if (!PyTuple_Check(given) || PyTuple_GET_SIZE(given) != rows) {
         PyErr_Format(PyExc_ValueError, "expected a tuple of %zd rows", rows);
         return 0;

@@ -25,10 +25,12 @@ def undisturbed() -> Iterator[None]:
     came since.
     """
     interval, (first, second, third) = sys.getswitchinterval(), gc.get_threshold()
+
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(first, second, YOUNGER)
     gc.collect()
     gc.freeze()
+
     try:
         yield
     finally:

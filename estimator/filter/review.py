@@ -65,6 +65,7 @@ class Reviewer:
     def step(self, state: TrackState) -> TrackState:
         """A tick's share of a review that is under way."""
         task = state.task
+
         if isinstance(task, Ended):
             return self._completed(state, task)
         if isinstance(task, Judging):

@@ -106,8 +106,10 @@ def _solve_chunk(wheel: Wheel, contact: Contact, near: Balance | None, order: in
     touching = np.flatnonzero(load > 0.0)
     if touching.size:
         guess, steep = (np.broadcast_to(a, load.shape)[touching] for a in (theta_1, slope))
-        found = _iterate(wheel, _take(contact, touching), guess, steep, order, near is not None)
-        out[:, touching] = np.vstack((found.theta_1, *found.forces, found.overloaded, found.slope))
+        solved = _iterate(wheel, _take(contact, touching), guess, steep, order, near is not None)
+        out[:, touching] = np.vstack(
+            (solved.theta_1, *solved.forces, solved.overloaded, solved.slope)
+        )
     return Balance(out[0], Forces(*out[1:-2]), out[-2] > 0.0, out[-1])
 
 

@@ -102,6 +102,7 @@ def carried(
         situation, cohesion=soil.cohesion, tan_phi=soil.tan_phi, shear_modulus=soil.shear_modulus
     )
     law = reduce(lambda law, e: e.contact(law, situation), effects, paper_contact(wheel, situation))
+
     solved = _balance(wheel, soil, law, motion, situation, effects, near, order)
     return Carried(wheel, situation, solved)
 
@@ -117,14 +118,14 @@ def responded(
     `simulate_arrays`.
     """
     effects = in_order(effects)
-    found = solved.balance
-    situation = loaded(solved.situation, solved.wheel, found.theta_1, found.forces)
+    balanced = solved.balance
+    situation = loaded(solved.situation, solved.wheel, balanced.theta_1, balanced.forces)
     reaction = corrected_form(react(situation, effects), situation, correction)
     situation, motor_torque = drive(
         replace(situation, torque=reaction.torque), effects, torque_constant
     )
 
-    return _response(situation, found, reaction, motor_torque, effects)
+    return _response(situation, balanced, reaction, motor_torque, effects)
 
 
 def _response(

@@ -119,6 +119,7 @@ def gather(
     """
     if starts.size == 0:
         return np.empty(0, dtype)
+
     room = len(content) - dtype.itemsize + 1
     windows = np.ndarray((room,), np.dtype((np.void, dtype.itemsize)), content, strides=(1,))
     return np.asarray(windows[starts]).view(dtype)

@@ -184,6 +184,7 @@ def classify(
         return Status.STALE if started else Status.STARTING
     if snapshot.stuck:
         return Status.STUCK
+
     return _contact(settings, now) or _travel(settings, now) or _steadiness(now, before)
 
 

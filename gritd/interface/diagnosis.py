@@ -96,10 +96,10 @@ def diagnose(
 
     given = references.given([_file(each) for each in reference], bed)
     files, configuration = [_file(run) for run in runs], configured(config)
-    found, damage = of_files(
+    diagnosis, damage = of_files(
         files, configuration, seed, step, jobs, "", given, quick, own_rig=not other_rig
     )
-    return Result(lab.with_runs(found, files, configuration), tuple(damage))
+    return Result(lab.with_runs(diagnosis, files, configuration), tuple(damage))
 
 
 def _file(run: Run | Place) -> Path:

@@ -39,9 +39,9 @@ def test_the_soil_changes(cases, figure):
 def test_the_soil_stays_the_same(runs, figure):
     settings = changes.packaged_rig()
     seeds = range(100_000, 100_000 + runs)
-    courses = [course for _, course in changes.unchanged(settings, seeds, "original", 250.0)]
+    tracks = [track for _, track in changes.unchanged(settings, seeds, "original", 250.0)]
     hours = runs * changes.UNCHANGED / 3600.0
-    flags = sum(changes.begun(course) for course in courses) / hours
+    flags = sum(changes.begun(track) for track in tracks) / hours
     level = f"{CASES}, {hours:g} h"
     figure(CHANGES, level, "false flags an hour in an unchanged soil", flags, "", 1)
 

@@ -105,5 +105,6 @@ def _diagnosed(paths: Sequence[Path], cores: int = 1) -> tuple[float, float, flo
         text=True,
         check=True,
     )
+
     seconds, memory, elapsed = json.loads(done.stdout.splitlines()[-1])
     return float(seconds), float(memory), float(elapsed)

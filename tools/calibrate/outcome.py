@@ -14,7 +14,7 @@ BAR = 41  # characters of the picture of a residual
 
 
 @dataclass(frozen=True)
-class Found:
+class Calibrated:
     """One key: its path in the configuration, value ± σ in SI, the SI unit, and the unit that is
     shown.
     """
@@ -33,7 +33,7 @@ class Outcome:
     lines:  what is told of the data, before the values.
     """
 
-    found: tuple[Found, ...]
+    values: tuple[Calibrated, ...]
     sensor: tuple[str, ...] = ()
     lines: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -44,7 +44,7 @@ class Outcome:
         rows = [
             f"{'.'.join(each.path)}: {_shown(each, before)}"
             + (f" (was {was})" if (was := _was(before, each.path)) else "")
-            for each in self.found
+            for each in self.values
         ]
         return "\n".join([*self.lines, *rows, *(f"warning: {each}" for each in self.warnings)])
 
@@ -57,7 +57,7 @@ class Outcome:
 
 def written(outcome: Outcome, document: EditedYaml, date: str, serial: str) -> str:
     """The text of the configuration with what was found."""
-    for each in outcome.found:
+    for each in outcome.values:
         like = document.written(*each.path) or f"1 {each.shown}"
         document.set(each.path, quantity(each.value.value, each.value.sigma, each.unit, like))
     if outcome.sensor:
@@ -67,7 +67,7 @@ def written(outcome: Outcome, document: EditedYaml, date: str, serial: str) -> s
     return document.text()
 
 
-def _shown(each: Found, before: EditedYaml) -> str:
+def _shown(each: Calibrated, before: EditedYaml) -> str:
     like = before.written(*each.path) or f"1 {each.shown}"
     text = quantity(each.value.value, each.value.sigma, each.unit, like)
     return text.removeprefix("{value: ").replace(", sigma: ", " ± ").removesuffix("}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from gritd.estimator.config.settings import Uncertain
 from gritd.tools.calibrate.line import Line, fitted
-from gritd.tools.calibrate.outcome import Found, Outcome, residual_table
+from gritd.tools.calibrate.outcome import Calibrated, Outcome, residual_table
 from gritd.tools.calibrate.sources import Signal, Source
 
 
@@ -38,9 +38,9 @@ class Straight:
         scale = Uncertain(line.scale.value * factor, line.scale.sigma * abs(factor))
         shown = f"{self.shown}/{self.signal.unit}" if self.scale else ""
 
-        values = [Found((*self.path, "scale"), scale, self.scale, shown)]
+        values = [Calibrated((*self.path, "scale"), scale, self.scale, shown)]
         if self.offset:
-            values.append(Found((*self.path, "offset"), line.offset, self.unit, self.shown))
+            values.append(Calibrated((*self.path, "offset"), line.offset, self.unit, self.shown))
 
         return Outcome(
             tuple(values),

@@ -87,7 +87,7 @@ def _capture(arguments: argparse.Namespace, configuration: Configuration) -> Non
 
 def _text(outcome: Outcome, document: EditedYaml, arguments: argparse.Namespace) -> str:
     """The configuration with what was found. Bekker's moduli take the place of Reece's."""
-    if any(value.path == ("soil", "k_c") for value in outcome.found):
+    if any(value.path == ("soil", "k_c") for value in outcome.values):
         for key in ("k1", "k2"):
             document.remove("soil", key)
     return written(outcome, document, arguments.date, arguments.serial)

@@ -60,6 +60,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             print(told.line(), flush=True)
             total[told.kind] += 1
             alarms[told.kind] += told.screen.alarmed
+
     for kind, count in sorted(total.items()):
         print(f"{kind}: {alarms[kind]} of {count} alarm")
 

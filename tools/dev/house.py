@@ -34,7 +34,7 @@ def counted(tree: Path, folder: str) -> dict[str, str]:
 
     functions = [f for p in parsed.values() for f in ast.walk(p) if isinstance(f, Function)]
     lengths = sorted((f.end_lineno or f.lineno) - f.lineno + 1 for f in functions)
-    arrays = [f for f in functions if _on_arrays(f)]
+    arrays = [f for p in parsed.values() for f in _outermost(p) if _on_arrays(f)]
     stated = sum(bool(SHAPE.search(ast.get_docstring(f) or "")) for f in arrays)
 
     home = tree / folder
@@ -104,6 +104,13 @@ def _imported(module: ast.Module) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _outermost(module: ast.Module) -> Iterator[Function]:
+    """Functions and methods, but none inside a function: nobody else can call those."""
+    for node in module.body:
+        inside = node.body if isinstance(node, ast.ClassDef) else [node]
+        yield from (each for each in inside if isinstance(each, Function))
 
 
 def _on_arrays(function: Function) -> bool:

@@ -65,6 +65,7 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
     RigFileError.
     """
     text = Template(packaged(template).read_text(encoding="utf-8")).substitute(values)
+
     path = output / name
     try:
         output.mkdir(parents=True, exist_ok=True)
@@ -74,6 +75,7 @@ def configuration(template: str, output: Path, name: str, **values: str) -> conf
         raise RigFileError(
             f"{path}: cannot be written: {reason}; expected a folder for the output", USAGE
         ) from None
+
     return config.load(path)
 
 

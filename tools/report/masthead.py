@@ -31,19 +31,19 @@ def _entries(rig: str, records: Sequence[Record]) -> Iterator[tuple[str, str]]:
         yield "rig", rig
     if days := _days(records):
         yield "date", days
-    yield "operator", listed(_said(records, OPERATOR)) or UNSTATED
-    if notes := _said(records, NOTES):
+    yield "operator", listed(_distinct(records, OPERATOR)) or UNSTATED
+    if notes := _distinct(records, NOTES):
         yield "notes", notes[0] if _same(records, NOTES) else "see the runs"
 
 
 def _days(records: Sequence[Record]) -> str:
     """The first and the last day."""
-    days = sorted({day[:DAY] for day in _said(records, DATE) if day != NOTHING})
+    days = sorted({day[:DAY] for day in _distinct(records, DATE) if day != NOTHING})
     return " … ".join(dict.fromkeys((days[0], days[-1]))) + " (UTC)" if days else ""
 
 
-def _said(records: Sequence[Record], key: str) -> list[str]:
-    """What is said, each once, in the order of the runs."""
+def _distinct(records: Sequence[Record], key: str) -> list[str]:
+    """Values of a key, each once, in the order of the runs."""
     return [words for words in dict.fromkeys(r.get(key, "") for r in records) if words]
 
 

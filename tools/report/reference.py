@@ -91,6 +91,7 @@ def _earlier(path: Path) -> Mapping[str, Any]:
             f"{path}: found no diagnosis; expected recordings or the JSON of `gritd diagnose`",
             DAMAGED,
         ) from None
+
     return diagnosis  # type: ignore[no-any-return]
 
 

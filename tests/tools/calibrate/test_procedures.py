@@ -50,7 +50,7 @@ def straight_pulls(tmp_path: Path, seed: int, which: str) -> list[float]:
 
     path = record(tmp_path / "r.mcap", {procedure.signal.channel: (time, raw)})
     known = [Uncertain(v, sigma) for v in values]
-    found = procedure.outcome(Recorded(path), known).found
+    found = procedure.outcome(Recorded(path), known).values
     # the offset's σ is that of what is read at physical zero
     at_zero = Uncertain(
         found[0].value.value * -offset / scale + found[1].value.value, found[1].value.sigma
@@ -71,7 +71,7 @@ def test_turns_and_rail_give_the_angle_of_a_count(tmp_path: Path) -> None:
         time, angle = staircase([2 * np.pi * n + hand * rng.standard_normal() for n in range(4)])
         path = record(tmp_path / "w.mcap", {"wheel_encoder": (time, angle / 9.6e-5)})
         known = [Uncertain(2 * np.pi * n, hand) for n in range(4)]
-        found = encoders.outcome(encoders.WHEEL, Recorded(path), known).found
+        found = encoders.outcome(encoders.WHEEL, Recorded(path), known).values
         assert [each.path[-1] for each in found] == ["scale"]
         return [of(found[0].value, 9.6e-5)]
 
@@ -80,7 +80,7 @@ def test_turns_and_rail_give_the_angle_of_a_count(tmp_path: Path) -> None:
         time, way = staircase([x + 2e-4 * rng.standard_normal() for x in (0.0, 0.5, 1.0)])
         path = record(tmp_path / "c.mcap", {"carriage_encoder": (time, way / 0.02 / 7.7e-4)})
         known = [Uncertain(x, 2e-4) for x in (0.0, 0.5, 1.0)]
-        found = encoders.outcome(encoders.CARRIAGE, Recorded(path), known, 0.02).found
+        found = encoders.outcome(encoders.CARRIAGE, Recorded(path), known, 0.02).values
         return [of(found[0].value, 7.7e-4)]
 
     assert pulls(wheel) >= 0.9 and pulls(carriage) >= 0.9
@@ -106,7 +106,7 @@ def test_touches_give_the_zero(tmp_path: Path) -> None:
         path = touch_run(tmp_path / "t.mcap", seed, surface=0.6e-3, scatter=1e-4)
         volts = datum.touches(recording(path), SETTINGS, contact=2.0)
         assert len(volts) == 5
-        found = datum.outcome(volts, SETTINGS).found[0].value
+        found = datum.outcome(volts, SETTINGS).values[0].value
         return [of(found, -12.5e-3 - 0.6e-3)]
 
     assert pulls(one) >= 0.9
@@ -130,7 +130,7 @@ def spin_run(path: Path, seed: int) -> Path:
 def test_a_wheel_in_the_air_tells_friction_and_offset(tmp_path: Path) -> None:
     def one(seed: int) -> list[float]:
         path = spin_run(tmp_path / "s.mcap", seed)
-        loss, damping, offset = torque.by_spinning(recording(path), SETTINGS).found
+        loss, damping, offset = torque.by_spinning(recording(path), SETTINGS).values
         return [of(loss.value, 0.3), of(damping.value, 0.5), of(offset.value, -5.010)]
 
     assert pulls(one) >= 0.9
@@ -145,7 +145,7 @@ def test_a_lever_and_a_sensor_give_the_torque_constant(tmp_path: Path) -> None:
         volts = noisy((held / true + 5.0) / 2.0, 4e-3, seed)
         path = record(tmp_path / "l.mcap", {"motor_shunt": (time, volts)})
         known = [Uncertain(v, 2e-3) for v in levels]
-        return [of(torque.by_lever(Recorded(path), known, SETTINGS).found[0].value, true)]
+        return [of(torque.by_lever(Recorded(path), known, SETTINGS).values[0].value, true)]
 
     def sensor(seed: int) -> list[float]:
         time, axle = staircase((0.5, 1.5, 2.5, 1.0), seconds=6.0)
@@ -158,7 +158,7 @@ def test_a_lever_and_a_sensor_give_the_torque_constant(tmp_path: Path) -> None:
             "wrench": (time, six),
         }
         path = record(tmp_path / "t.mcap", channels)
-        return [of(torque.by_sensor(recording(path), SETTINGS).found[0].value, true)]
+        return [of(torque.by_sensor(recording(path), SETTINGS).values[0].value, true)]
 
     assert pulls(lever) >= 0.9 and pulls(sensor) >= 0.9
 
@@ -179,7 +179,7 @@ def test_plates_give_the_soil_and_its_scatter_is_that_of_the_next_bed() -> None:
     def one(seed: int) -> list[float]:
         rng = np.random.default_rng(seed)
         tests = [press(rng, r, 1.1, 9e3, 1.5e6) for r in (0.025, 0.05) for _ in range(6)]
-        n, k_c, k_phi, relative = soil.outcome(tests, SETTINGS).found
+        n, k_c, k_phi, relative = soil.outcome(tests, SETTINGS).values
         next_bed = (9e3 / width + 1.5e6) * np.exp(0.08 * rng.standard_normal())
         found = k_c.value.value / width + k_phi.value.value
         next_n = 1.1 + 0.03 * rng.standard_normal()

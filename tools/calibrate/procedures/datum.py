@@ -10,7 +10,7 @@ from scipy.stats import norm, t
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.calibrate.outcome import Found, Outcome
+from gritd.tools.calibrate.outcome import Calibrated, Outcome
 from gritd.tools.calibrate.sources import Signal, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
@@ -86,7 +86,7 @@ def outcome(volts: Sequence[float], settings: Settings) -> Outcome:
         f"touch {number}: {v:.5g} V, {1e3 * (h - offset.value):+.3f} mm from the mean"
         for number, (v, h) in enumerate(zip(volts, heights, strict=True), start=1)
     ]
-    datum = Found(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
+    datum = Calibrated(("channels", "sinkage_pot", "offset"), offset, "m", "mm")
     return Outcome((datum,), ("channels", "sinkage_pot"), tuple(rows), tuple(warnings))
 
 

@@ -39,8 +39,8 @@ def outcome(
     """
     points = [_rounded(point) for point in source.points(procedure.signal, known)]
     fit = procedure.of_line(fitted(points), 1.0 / pulley_radius)
-    scale = replace(fit.found[0], shown="mrad/count")
-    return replace(fit, found=(scale, *fit.found[1:]))
+    scale = replace(fit.values[0], shown="mrad/count")
+    return replace(fit, values=(scale, *fit.values[1:]))
 
 
 def _rounded(point: Point) -> Point:

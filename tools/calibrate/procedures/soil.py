@@ -16,7 +16,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.calibrate.outcome import Found, Outcome
+from gritd.tools.calibrate.outcome import Calibrated, Outcome
 from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
 
 SUMMARY = "plate tests: sinkage exponent and moduli with their scatter, into the soil's prior"
@@ -111,10 +111,10 @@ def outcome(tests: Sequence[Press], settings: Settings) -> Outcome:
 
     at_width = k_c / width + k_phi
     values = (
-        Found(("soil", "exponent"), n, ""),
-        Found(("soil", "k_c"), _rounded(k_c, 4), "Pa/m^(n-1)", "kN/m^(n+1)"),
-        Found(("soil", "k_phi"), _rounded(k_phi, 4), "Pa/m^n", "kN/m^(n+2)"),
-        Found(("soil", "modulus_sigma"), _rounded(min(sigma / at_width, 1.0), 2), "", "%"),
+        Calibrated(("soil", "exponent"), n, ""),
+        Calibrated(("soil", "k_c"), _rounded(k_c, 4), "Pa/m^(n-1)", "kN/m^(n+1)"),
+        Calibrated(("soil", "k_phi"), _rounded(k_phi, 4), "Pa/m^n", "kN/m^(n+2)"),
+        Calibrated(("soil", "modulus_sigma"), _rounded(min(sigma / at_width, 1.0), 2), "", "%"),
     )
     return Outcome(values, lines=tuple(_rows(good, moduli, each)), warnings=tuple(warnings))
 

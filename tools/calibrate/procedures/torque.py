@@ -13,7 +13,7 @@ from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.calibrate.line import Point, fitted
-from gritd.tools.calibrate.outcome import Found, Outcome, residual_table
+from gritd.tools.calibrate.outcome import Calibrated, Outcome, residual_table
 from gritd.tools.calibrate.plateaus import mean_of, plateaus
 from gritd.tools.calibrate.sources import Signal, Source, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
@@ -39,7 +39,7 @@ def by_lever(source: Source, known: Sequence[Uncertain], settings: Settings) -> 
     spread = float(np.hypot(line.scale.sigma, line.scale.value * relative))
 
     return Outcome(
-        (Found(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
+        (Calibrated(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
         lines=tuple(residual_table(line, "A", "N*m")),
         warnings=line.warnings,
         fits=(("drive.torque_constant", line),),
@@ -86,11 +86,11 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
     before = settings.channels["motor_shunt"].calibration.offset.value
     offset = Uncertain(before - values[2] / constant, spread[2] / constant)
     constants = (
-        Found(("effects", "coulomb_friction", "loss"), _positive(values, spread, 0), "N·m"),
-        Found(
+        Calibrated(("effects", "coulomb_friction", "loss"), _positive(values, spread, 0), "N·m"),
+        Calibrated(
             ("effects", "viscous_friction", "damping"), _positive(values, spread, 1), "N·m·s/rad"
         ),
-        Found(("channels", "motor_shunt", "offset"), offset, "A", "A"),
+        Calibrated(("channels", "motor_shunt", "offset"), offset, "A", "A"),
     )
     warnings = []
     if excess > 3.0:
@@ -198,7 +198,7 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
         f"the motor's torque is {-line.offset.value:.3g} N*m more than the sensor's at no torque",
     )
     return Outcome(
-        (Found(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
+        (Calibrated(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
         lines=rows,
         warnings=line.warnings,
         fits=(("drive.torque_constant", line),),

@@ -56,12 +56,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     runs = round(arguments.hours * 3600.0 / UNCHANGED)
     with Progress("runs without a change", runs) as progress:
-        courses = []
-        for _, course in unchanged(settings, range(first, first + runs), *drives):
-            courses.append(course)
+        tracks = []
+        for _, track in unchanged(settings, range(first, first + runs), *drives):
+            tracks.append(track)
             progress.advance()
-    if courses:
-        print(quiet(courses))
+    if tracks:
+        print(quiet(tracks))
     return DONE
 
 

@@ -18,7 +18,7 @@ TOLD = Flag.MISMATCH | Flag.RESET | Flag.CHANGED | Flag.PRIOR
 BACK, STAYS = 15.0, 5.0  # [s] in which σ is to hold again, and for how long at least
 
 
-class Course(NamedTuple):
+class Track(NamedTuple):
     """What the filter made of a case, one row a window that was used, each (n,)."""
 
     time: Array  # [s]
@@ -34,7 +34,7 @@ class Course(NamedTuple):
         return worst
 
 
-def followed(case: Case) -> Course:
+def followed(case: Case) -> Track:
     """The filter over a case."""
     tracker = Tracker(case.settings)
     state, rows = tracker.start(), []
@@ -61,7 +61,7 @@ def followed(case: Case) -> Course:
             )
         )
 
-    return Course(*(np.array(column) for column in zip(*rows, strict=True)))
+    return Track(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 class Verdict(NamedTuple):
@@ -75,25 +75,25 @@ class Verdict(NamedTuple):
     nees: float  # at the end
 
 
-def judged(case: Case, course: Course) -> Verdict:
+def judged(case: Case, track: Track) -> Verdict:
     """How honest σ was from the change on."""
     step = 1.0 / case.settings.rates.update
-    after = course.time >= case.begins
-    silent = after & ~course.told
+    after = track.time >= case.begins
+    silent = after & ~track.told
 
     return Verdict(
         driven=step * float(np.sum(after)),
-        beyond=step * float(np.sum(silent & (course.away > 3.0))),
-        far=step * float(np.sum(silent & (course.away > 5.0))),
-        told=step * float(np.sum(after & course.told)),
-        back=_back(course, case.settled, step),
-        nees=float(course.nees[-1]),
+        beyond=step * float(np.sum(silent & (track.away > 3.0))),
+        far=step * float(np.sum(silent & (track.away > 5.0))),
+        told=step * float(np.sum(after & track.told)),
+        back=_back(track, case.settled, step),
+        nees=float(track.nees[-1]),
     )
 
 
-def _back(course: Course, settled: float, step: float) -> float:
+def _back(track: Track, settled: float, step: float) -> float:
     """Driving time from `settled` until error ≤ 2σ has begun to hold for some seconds."""
-    inside = course.away[course.time >= settled] <= 2.0
+    inside = track.away[track.time >= settled] <= 2.0
     stays = round(STAYS / step)
     if inside.size < stays:
         return float("inf")
@@ -101,6 +101,6 @@ def _back(course: Course, settled: float, step: float) -> float:
     return step * float(np.argmax(held)) if held.any() else float("inf")
 
 
-def begun(course: Course) -> int:
+def begun(track: Track) -> int:
     """How often a flag went up."""
-    return int(np.sum(np.diff(course.told.astype(int), prepend=0) > 0))
+    return int(np.sum(np.diff(track.told.astype(int), prepend=0) > 0))

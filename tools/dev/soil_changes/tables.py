@@ -9,7 +9,7 @@ import numpy as np
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.estimate import KPA
 from gritd.tools.dev.soil_changes.cases import KINDS, UNCHANGED, Case, case
-from gritd.tools.dev.soil_changes.followed import BACK, Course, Verdict, begun, followed, judged
+from gritd.tools.dev.soil_changes.followed import BACK, Track, Verdict, begun, followed, judged
 from gritd.tools.testbed import plant
 
 
@@ -53,24 +53,24 @@ def _line(name: str, group: Sequence[Verdict]) -> str:
 
 def unchanged(
     settings: Settings, seeds: Sequence[int], of: plant.PlantKind, rate: float
-) -> Iterator[tuple[Case, Course]]:
+) -> Iterator[tuple[Case, Track]]:
     for seed in seeds:
         each = case(settings, "none", seed, of, rate)
         yield each, followed(each)
 
 
-def quiet(courses: Sequence[Course]) -> str:
+def quiet(tracks: Sequence[Track]) -> str:
     """False flags and honesty of runs without a change."""
-    hours = len(courses) * UNCHANGED / 3600.0
-    flags = [begun(course) for course in courses]
-    beyond = np.concatenate([(course.away > 3.0) & ~course.told for course in courses])
-    within = np.concatenate([course.away <= 2.0 for course in courses])
-    nees = [course.nees[-1] for course in courses]
-    sigma_c, sigma_t = np.median([course.sigma[-1] for course in courses], axis=0)
+    hours = len(tracks) * UNCHANGED / 3600.0
+    flags = [begun(track) for track in tracks]
+    beyond = np.concatenate([(track.away > 3.0) & ~track.told for track in tracks])
+    within = np.concatenate([track.away <= 2.0 for track in tracks])
+    nees = [track.nees[-1] for track in tracks]
+    sigma_c, sigma_t = np.median([track.sigma[-1] for track in tracks], axis=0)
 
     return (
         f"unchanged, {hours:.1f} h: {sum(flags)} flags in {sum(f > 0 for f in flags)} of"
-        f" {len(courses)} runs, {sum(flags) / hours:.2f} an hour; beyond 3σ without a flag"
+        f" {len(tracks)} runs, {sum(flags) / hours:.2f} an hour; beyond 3σ without a flag"
         f" {beyond.mean():.2%} of the time, within 2σ {within.mean():.1%};"
         f" NEES {np.mean(nees):.2f} of 2; median σ at the end {sigma_c * KPA:.0f} Pa,"
         f" {sigma_t:.4f}"

@@ -203,6 +203,7 @@ def _not_shown(search: Search) -> list[str]:
         for name, likeliest in screen.best.items()
         if isinstance(name, str)
     }
+
     effects = search.problem.stack.rig.effects
     return [name for name in effects if 0.5 * size.get(name, 0.0) < screen.threshold]
 

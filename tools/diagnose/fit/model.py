@@ -98,7 +98,9 @@ def fit_model(
 def sized_model(
     problem: Problem, forms: Sequence[Freedom], start: tuple[Array, Array], sizes: Chosen
 ) -> Model:
-    """Without effects, the forms of given sizes."""
+    """Without effects, the forms of given sizes, descended to from constants (q,) and no effect
+    parameters (0,).
+    """
     fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend((), (), *start)
     marginal = Marginal(fitted, problem.tolerance, forms)
     return Model(fitted, (), marginal.log_evidence(sizes), sizes, (), marginal, sizes)

@@ -43,8 +43,8 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
-    found = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
-    noise = restless(louder(noise, found), stack.measured - predicted)
+    alone = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
+    noise = restless(louder(noise, alone), stack.measured - predicted)
 
     usual = _of_reference(again, noise, shared, ripples)
     return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)

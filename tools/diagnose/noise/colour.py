@@ -137,6 +137,7 @@ def whiten_unit(
     recursion = _recursion(gaps, colours, beside)
     pieces = list(_innovations(columns, recursion, len(columns)))
     out = np.concatenate([np.empty((len(colours), 0, columns.shape[1])), *pieces], axis=1)
+
     return out, _log_det(recursion)
 
 
@@ -188,6 +189,7 @@ def _follow(
     for place, i in enumerate(rows):
         slow *= kept[0, i]
         fast *= kept[1, i]
+
         innovation = columns[i] - slow - fast
         out[:, place] = innovation
         slow += gain[0, i] * innovation

@@ -28,32 +28,45 @@ def rig_of(
     reference: recordings of a campaign in which nothing is new; bed: whether the others drive on
     the same bed or on one prepared anew.
     """
-    if is_drive(recordings):
-        if reference:
-            raise CommandError(
-                "--reference: found a drive without soil; expected a wheel's recordings", USAGE
-            )
-        series = [drive_series(r, settings) for r in recordings]
-        names = [r.run.name or r.path.stem for r in recordings]
-        # loads scipy.signal and scipy.stats too: a second and 60 MB, which nobody pays for a wheel
-        from gritd.tools.diagnose.rig.drive import DriveRig
+    if not is_drive(recordings):
+        return _wheel_rig(recordings, settings, reference, bed)
 
-        return DriveRig(series, names, settings), TUNING.rig.drive_rate
+    if reference:
+        raise CommandError(
+            "--reference: found a drive without soil; expected a wheel's recordings", USAGE
+        )
+    return _drive_rig(recordings, settings), TUNING.rig.drive_rate
 
+
+def _drive_rig(recordings: Sequence[Recording], settings: Settings) -> Rig:
+    # loads scipy.signal and scipy.stats too: a second and 60 MB, which nobody pays for a wheel
+    from gritd.tools.diagnose.rig.drive import DriveRig
+
+    series = [drive_series(r, settings) for r in recordings]
+    names = [r.run.name or r.path.stem for r in recordings]
+    return DriveRig(series, names, settings)
+
+
+def _wheel_rig(
+    recordings: Sequence[Recording], settings: Settings, reference: Sequence[Recording], bed: Bed
+) -> tuple[Rig, float]:
     coarse = [
         [signals(r, settings, TUNING.rig.first_rate) for r in each]
         for each in (reference, recordings)
     ]
     length = sum(float(s.time[-1]) for each in coarse for s in each)
     rate = next(hertz for limit, hertz in TUNING.rig.rates if length <= limit)
+
     in_time = [
         sorted(zip(each, rough, strict=True), key=lambda pair: pair[1].start)
         for each, rough in zip((reference, recordings), coarse, strict=True)
     ]
     ordered = [r for each in in_time for r, _ in each]
     means = [signals(r, settings, rate) for r in ordered]
+
     beside, lines = with_lines(ordered, means, settings, len(reference))
     late = latencies_in(ordered[len(reference) :], means[len(reference) :], settings)
+
     rig = WheelRig(beside, settings, len(reference), bed, lines=lines, latencies=late)
     for new, each in ((False, reference), (True, recordings)):
         _check_drives(rig, new, each)
@@ -68,9 +81,11 @@ def _check_drives(rig: WheelRig, new: bool, recordings: Sequence[Recording]) -> 
     runs = [run for run, acting in zip(rig.runs, rig.new, strict=True) if acting == new]
     if not runs:
         return
+
     names = ", ".join(str(recording.path) for recording in recordings)
     measured = [c for c in rig.channels if any(np.isfinite(r.measured[c]).any() for r in runs)]
     counts = {c: sum(int(run.used[c].sum()) for run in runs) for c in measured}
+
     channel, least = min(counts.items(), key=lambda item: item[1], default=("any channel", 0))
     if not least:
         raise CommandError(

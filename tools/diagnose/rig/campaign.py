@@ -28,10 +28,12 @@ class Campaign:
     ) -> None:
         self._settings, self._channels = settings, tuple(channels)
         self._motions = [_filled(motion) for motion in motions]
+
         ends = np.cumsum([np.size(m.time) for m in self._motions])
         self.parts = [
             slice(end - np.size(m.time), end) for m, end in zip(self._motions, ends, strict=True)
         ]
+
         self._joined = _joined(self._motions)
         self._carried: dict[Hashable, Carried] = {}  # the last few
         self._last: Balance | None = None  # the next balance starts there
@@ -62,9 +64,9 @@ class Campaign:
             motion = _scaled(self._joined, weights, travelled)
             self._carried[key] = self._balanced(soil, motion, bearing, self._last)
 
-        found = self._carried[key] = self._carried.pop(key)  # the last to go
-        self._last = found.balance
-        return found
+        solved = self._carried[key] = self._carried.pop(key)  # the last to go
+        self._last = solved.balance
+        return solved
 
     def _balanced(
         self, soil: Soil, motion: Motion, effects: Sequence[Effect], near: Balance | None
@@ -72,10 +74,10 @@ class Campaign:
         order = TUNING.rig.quadrature_order
         return carried(self._settings.wheel, soil, motion, effects, near=near, order=order)
 
-    def _read(self, found: Carried, effects: Sequence[Effect]) -> Array:
+    def _read(self, solved: Carried, effects: Sequence[Effect]) -> Array:
         """(channels, n)."""
         constant = self._settings.drive.torque_constant.value
-        sensed = responded(found, effects, torque_constant=constant).sensed
+        sensed = responded(solved, effects, torque_constant=constant).sensed
         return np.stack([sensed_as(sensed, c, self._settings) for c in self._channels])
 
 

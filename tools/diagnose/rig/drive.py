@@ -113,7 +113,7 @@ class DriveRig:
 
     @property
     def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """Nothing, for the same reason."""
+        """No channel (n,) of any part, for the same reason."""
         return ()
 
     def predict(

@@ -83,7 +83,7 @@ class Prediction:
     def channels(
         self, u: Array, effects: Sequence[Effect], everywhere: bool
     ) -> list[dict[str, Array]]:
-        """See interface.Rig.predict."""
+        """Channels (n,) of each run, for constants u (q,) in prior σ; see interface.Rig.predict."""
         value = self._values(u)
         baseline = self._baseline(value)
 

@@ -29,6 +29,7 @@ def unrest_in(
     by_carriage: per run, change of every channel (n,) by ln of the carriage's speed.
     """
     each = zip(*(unrest_of(motion) for motion in motions), strict=True)
+
     return [
         [
             {channel: sign * change * part for channel, change in by_speed.items()}
@@ -50,10 +51,12 @@ def _unrest(speed: Array, moving: Bools) -> Array:
     """
     if moving.sum() < TUNING.rig.unrest_values:
         return np.zeros(speed.size)
+
     logarithm = np.log(np.where(moving, speed, 1.0))
     beside = logarithm - median_filter(logarithm, TUNING.rig.unrest_values, mode="nearest")
     usual = float(np.median(np.abs(beside[moving])))
     if usual > TUNING.rig.unrest_largest:
         return np.zeros(speed.size)
+
     counts = moving & (np.abs(beside) <= TUNING.rig.unrest_most * usual)
     return np.where(counts, beside, 0.0)

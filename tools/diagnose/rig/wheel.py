@@ -268,6 +268,7 @@ def _driven(
         motion_of(s, w.values, settings, s.start - began[n])
         for s, w, n in zip(signals, weights, new, strict=True)
     ]
+
     steps = [float(np.median(np.diff(s.time))) for s in signals]
     return Driven(motions, steps, new, weight_sets([np.asarray(m.load) for m in motions]))
 

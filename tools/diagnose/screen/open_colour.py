@@ -155,6 +155,7 @@ def _squares(
     assumed = noise.colours[number]
     innovations = innovation_variance(gaps, [assumed, *tried])
     share = innovations[1:] / innovations[0]  # of the assumed variance, by that of each colour
+
     beside = noise.beside[own][:, None] * share
     gram, log_det = products_of_innovations(columns / noise.times[own, None], gaps, tried, beside)
     return Squares(gram, log_det, len(columns))
@@ -186,6 +187,7 @@ def _log_evidence(gram: Array, prior: Array) -> Array:
     squares = np.diagonal(inner, axis1=-2, axis2=-1)
     # a column is known to a millionth: of very quiet recordings the prior is less than rounding
     own = prior + SLIGHT**2 * squares
+
     root = np.linalg.cholesky(inner + own[..., None] * np.eye(prior.size))
     taken = np.linalg.solve(root, gram[..., :-1, -1:])[..., 0]
     spread = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) - 0.5 * np.log(prior).sum()

@@ -33,8 +33,8 @@ def _suiting(model: Model) -> Model:
     if marginal is None:
         return model
     smallest = tuple(0 for _ in model.sizes)
-    found = [marginal.likeliest(start) for start in (model.sizes, smallest)]
-    sizes = max(found, key=lambda pair: pair[1])[0]
+    optima = [marginal.likeliest(start) for start in (model.sizes, smallest)]
+    sizes = max(optima, key=lambda pair: pair[1])[0]
     return replace(model, sizes=sizes, chosen=sizes)
 
 

@@ -178,4 +178,5 @@ def power(search: Search, screen: Screen) -> float:
             a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
             seen.append(screen.surprise(name, float(gain)) > screen.threshold)
+
     return sum(seen) / max(len(search.problem.stack.rig.effects), 1)

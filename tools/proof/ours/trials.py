@@ -164,6 +164,7 @@ def _drawn(
         plan = draw(settings, rng, case.lack)
         if not types:
             return plan, []
+
         base = fit_base(WheelRig(record(plan, ()), plan.settings), np.random.default_rng(0))
         span = case.strength or (STRONGER if types[0] in UNLISTED else STRONG)
         acting = [_strong(base, t, span, rng) for t in types]

@@ -82,6 +82,7 @@ class Scene:
 
     @property
     def rim_speed(self) -> Array:
+        """rω (n,) [m/s]."""
         return np.asarray(self.radius * self.motion.omega)
 
 

@@ -28,6 +28,7 @@ class Noise:
     pink: bool = False  # three correlation times, a decade apart, instead of one
 
     def drawn(self, rng: np.random.Generator, count: int, step: float) -> Array:
+        """Noise (count,) of readings that are `step` [s] apart."""
         times = (0.1 * self.time, self.time, 10.0 * self.time) if self.pink else (self.time,)
         slow = sum(
             (_autoregressive(rng, count, step / time) for time in times), start=np.zeros(count)

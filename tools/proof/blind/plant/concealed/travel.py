@@ -98,6 +98,7 @@ class BowWave(Effect):
         return cls(cls.most, float(rng.uniform(0.03, 0.08)))
 
     def fading(self, path: Array) -> Array:
+        """Share (n,) that is left after a way (n,) [m]."""
         return np.asarray((1.0 + path / self.length) ** -2)
 
     def forces(self, scene: Scene) -> Scene:

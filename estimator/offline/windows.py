@@ -113,6 +113,16 @@ class Slopes(NamedTuple):
     sigma: Array  # (n,) standard deviation of the rate
 
 
+def group_means(group: Ints, values: Array, n: int) -> tuple[Array, Ints]:
+    """Mean (n,) of the values (m,) of each group, NaN in an empty one, and how many there are (n,).
+
+    group: number of each value's group (m,), 0 … n − 1.
+    """
+    count = np.bincount(group, minlength=n)
+    means = _sums(group, values, n) / np.maximum(count, 1)
+    return np.where(count > 0, means, np.nan), count
+
+
 def block_mean(time: Array, values: Array, edges: Array) -> Array:
     """Mean of the readings in each block (n,), moved to its middle; NaN in one with too few.
 
@@ -127,9 +137,8 @@ def block_mean(time: Array, values: Array, edges: Array) -> Array:
     kept = np.abs(deviation) <= OUTLIER * scale if scale > 0.0 else np.ones(block.size, bool)
     block, time, values = block[kept], time[kept], values[kept]
 
-    count = np.bincount(block, minlength=n).astype(float)
-    mean = _sums(block, values, n) / np.maximum(count, 1.0)
-    at = _sums(block, time, n) / np.maximum(count, 1.0)
+    mean, count = group_means(block, values, n)
+    at, _ = group_means(block, time, n)
 
     usual = np.median(count[count > 0]) if (count > 0).any() else 1.0
     enough = count >= LEAST * usual

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.offline.windows import NORMAL
+from gritd.estimator.offline.windows import NORMAL, group_means
 from gritd.estimator.terramechanics.soil import Array
 
 BLOCK = 0.1  # [s] a signal is looked at in means over this time
@@ -49,13 +49,12 @@ def plateaus(seconds: Array, values: Array) -> list[Plateau]:
     """The stretches of a second and more in which the signal does not change; arrays (n,)."""
     edges = np.arange(seconds[0], seconds[-1] + BLOCK, BLOCK)
     block = np.digitize(seconds, edges) - 1
-    count = np.bincount(block, minlength=edges.size)
+    means, count = group_means(block, values, edges.size)
     filled = np.flatnonzero(count)
     if filled.size < LEAST / BLOCK:
         return []
 
-    means = (np.bincount(block, values, minlength=edges.size) / np.maximum(count, 1))[filled]
-    still = _still(means)
+    still = _still(means[filled])
     held = []
     for first, last in _stretches(still):
         begin, end = edges[filled[first]] + EDGE, edges[filled[last]] + BLOCK - EDGE

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gritd.estimator.offline.windows import group_means
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.wording import covariate_shown, number, shown
 from gritd.tools.diagnose.explain.result import Quantity, Scatter, SoilFit, Trace
@@ -288,10 +289,9 @@ def running_mean(x: Array, y: Array) -> tuple[Array, Array]:
     if x.size == 0 or np.ptp(x) == 0.0:
         return np.zeros(0), np.zeros(0)
     which = np.minimum(((x - x.min()) / np.ptp(x) * BINS).astype(int), BINS - 1)
-    count = np.bincount(which, minlength=BINS)
+    (at, count), (mean, _) = (group_means(which, values, BINS) for values in (x, y))
     kept = count >= FEWEST
-    sums = [np.bincount(which, weights=v, minlength=BINS)[kept] / count[kept] for v in (x, y)]
-    return sums[0], sums[1]
+    return at[kept], mean[kept]
 
 
 # --- estimates ---

@@ -9,6 +9,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.model.forward import Response, simulate_arrays
+from gritd.estimator.offline.windows import group_means
 from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
@@ -198,9 +199,10 @@ def _binned(change: Array, covariate: Array) -> float:
     covariate = np.round(covariate, 6)  # a plateau is one bin, whatever its rounding error
     edges = np.unique(np.quantile(covariate, np.linspace(0.0, 1.0, BINS + 1)))
     bin_ = np.clip(np.searchsorted(edges, covariate, side="right") - 1, 0, max(len(edges) - 2, 0))
-    count = np.bincount(bin_)
-    means = np.bincount(bin_, weights=change) / np.maximum(count, 1)
-    return float(np.sum(count * (means - change.mean()) ** 2) / change.size)
+    means, count = group_means(bin_, change, BINS)
+    filled = count > 0
+    spread = count[filled] * (means[filled] - change.mean()) ** 2
+    return float(np.sum(spread) / change.size)
 
 
 def _periodic(change: Array, angle: Array) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.offline.windows import group_means
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.calibrate.procedures import soil
 from gritd.tools.calibrate.procedures.datum import FORCE, POT
@@ -27,9 +28,8 @@ def read(recorded: Recording, settings: Settings, radius: float, contact: float)
     depth = volts * settings.channels["sinkage_pot"].calibration.scale.value
 
     block = ((time - time[0]) / BLOCK).astype(int)
-    count = np.maximum(np.bincount(block), 1)
-    weight, height = (np.bincount(block, values) / count for values in (load, depth))
-    filled = np.bincount(block) > 0
+    weight, height = (group_means(block, values, block.max() + 1)[0] for values in (load, depth))
+    filled = np.isfinite(weight)
     weight, height = weight[filled], height[filled]
 
     hanging = np.flatnonzero(weight < contact)

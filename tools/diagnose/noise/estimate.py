@@ -86,13 +86,8 @@ def estimate(
         for channel in stack.rig.channels
     ]
     colours = tuple(f[0] for f in posteriors)
-    return Noise(
-        stack,
-        colours,
-        tuple(f[1:] for f in posteriors),
-        uncertain(stack, predicted, residual, colours),
-        replicates.own_columns(stack, residual, colours, waves),
-    )
+    own = replicates.own_columns(stack, residual, colours, waves)
+    return _noise(stack, predicted, residual, posteriors, own)
 
 
 def estimate_of_reference(
@@ -109,18 +104,28 @@ def estimate_of_reference(
     predicted: (N,) by the equations.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
-    estimates = [
+    posteriors = [
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
+    return _noise(stack, predicted, residual, posteriors, np.zeros((stack.size, 0)))
 
-    colours = tuple(f[0] for f in estimates)
+
+def _noise(
+    stack: Stack,
+    predicted: Array,
+    residual: Array,
+    posteriors: Sequence[tuple[Colour, ...]],
+    own: Array,
+) -> Noise:
+    """Of each channel's posterior the first colour; own: columns (N, m) of each run by itself."""
+    colours = tuple(each[0] for each in posteriors)
     return Noise(
         stack,
         colours,
-        tuple(f[1:] for f in estimates),
+        tuple(each[1:] for each in posteriors),
         uncertain(stack, predicted, residual, colours),
-        np.zeros((stack.size, 0)),
+        own,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from gritd.estimator.config.names import is_file_name
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.offline.windows import Ints, group_means
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable
@@ -212,18 +213,18 @@ def _resampled(run: SeriesRun, rate: float) -> SeriesRun:
     slot = np.floor((run.seconds - run.seconds[0]) * rate).astype(np.int64)
     _, block = np.unique(slot, return_inverse=True)
 
-    columns = {name: _mean(column, block) for name, column in run.table.columns.items()}
-    seconds = np.bincount(block, run.seconds) / np.bincount(block)
+    seconds, _ = group_means(block, run.seconds, block.max() + 1)
+    columns = {
+        name: _mean(column, block, seconds.size) for name, column in run.table.columns.items()
+    }
     behind = run.seconds.size / seconds.size
     table = SeriesTable(run.table.path, columns, run.table.first, run.table.units)
     return SeriesRun(run.info, table, seconds, behind, run.repeated)
 
 
-def _mean(column: Column, block: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Column:
-    """Means of the numbers in each block; NaN where there is none."""
+def _mean(column: Column, block: Ints, n: int) -> Column:
+    """Means of the numbers in each of n blocks; NaN where there is none."""
     known = np.isfinite(column.numbers)
-    count = np.bincount(block, known)
-    with np.errstate(invalid="ignore"):
-        means = np.bincount(block, np.where(known, column.numbers, 0.0)) / count
+    means, count = group_means(block[known], column.numbers[known], n)
     digits = column.resolution or spacing(column.numbers)
-    return Column(np.where(count > 0, means, np.nan), None, digits / max(count.max(), 1.0))
+    return Column(means, None, digits / max(count.max(), 1))

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from gritd.estimator.config.configuration import Configuration
 from gritd.interface.runs import Place, Run, configured
-from gritd.tools.commands.diagnose import of_files
+from gritd.tools.commands.diagnose_files import of_files
 from gritd.tools.commands.diagnose_text import text
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.report import lab

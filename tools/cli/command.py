@@ -30,6 +30,16 @@ class Parser(argparse.ArgumentParser):
         sys.exit(USAGE)
 
 
+def add_configuration(parser: argparse.ArgumentParser, what: str, required: bool = False) -> None:
+    """The options that name a configuration, `what` it is, and say that it may be another rig's."""
+    parser.add_argument("--config", required=required, metavar="F", help=what)
+    parser.add_argument(
+        "--other-rig",
+        action="store_true",
+        help="F may be of another testbed than the recordings",
+    )
+
+
 def number(above: float = -inf, low: float = -inf) -> Callable[[str], float]:
     """An argparse type: a finite number greater than `above`, and `low` or more."""
     bounds = ((" above", above), (" from", low))

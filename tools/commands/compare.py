@@ -15,7 +15,15 @@ import numpy as np
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.command import (
+    DAMAGED,
+    DONE,
+    FAILED,
+    USAGE,
+    CommandError,
+    Parser,
+    add_configuration,
+)
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.explain.provenance import check_rig
@@ -71,14 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Draw the forward simulation over recordings, with the residual.",
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
-    parser.add_argument(
-        "--config", required=True, metavar="F", help="the testbed, its soil and its effects"
-    )
-    parser.add_argument(
-        "--other-rig",
-        action="store_true",
-        help="F may be of another testbed than the recordings",
-    )
+    add_configuration(parser, "the testbed, its soil and its effects", required=True)
     parser.add_argument(
         "--fit",
         action="store_true",

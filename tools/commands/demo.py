@@ -13,20 +13,18 @@ import time
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import get_args
 
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.topics import TOPICS
 from gritd.estimator.threads.stop_request import StopRequest
 from gritd.tools.cli.child import Child, interruptible
-from gritd.tools.cli.command import DONE, FAILED, Parser, number, whole
+from gritd.tools.cli.command import DONE, FAILED, Parser
 from gritd.tools.cli.optional import missing
 from gritd.tools.cli.terminal import LiveLine
 from gritd.tools.commands import demo_targets as targets
 from gritd.tools.testbed.plant import PlantKind
-from gritd.tools.testbed.testbed import NAME, PLAYED, SHORTEST
-from gritd.tools.testbed.wires import CanKind
+from gritd.tools.testbed.testbed import NAME, PLAYED, add_play
 
 READY = 300.0  # [s] the longest that testbed or daemon may take to start, on a starved computer
 DEVICES = 2  # of the packaged testbed
@@ -49,28 +47,9 @@ def _parser() -> Parser:
         prog="gritd demo", description="Run the daemon against the simulated testbed on real wires."
     )
     parser.add_argument(
-        "--seconds",
-        type=number(low=SHORTEST),
-        default=60.0,
-        metavar="S",
-        help="length of the run, default 60",
-    )
-    parser.add_argument(
         "--output", metavar="DIR", help="folder of the run; default runs/demo-DATE-TIME"
     )
-    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
-    parser.add_argument(
-        "--plant",
-        choices=get_args(PlantKind),
-        default="original",
-        help="Eqs. 1-10 (default), or the closed forms",
-    )
-    parser.add_argument(
-        "--can",
-        choices=get_args(CanKind),
-        default="auto",
-        help="slcan where the computer has no multicast",
-    )
+    add_play(parser)
 
     return parser
 

@@ -12,30 +12,30 @@ import json
 import os
 import shlex
 import sys
-import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.configuration import ConfigError
 from gritd.estimator.recording.mcapfile import RecordingError
-from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli import configuration_file
-from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser, whole
+from gritd.tools.cli.command import (
+    DAMAGED,
+    DONE,
+    FAILED,
+    USAGE,
+    CommandError,
+    Parser,
+    add_configuration,
+    whole,
+)
 from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.workers import add_cluster, cluster_of
 from gritd.tools.commands import diagnose_campaigns as campaigns
+from gritd.tools.commands.diagnose_files import of_files
 from gritd.tools.commands.diagnose_text import text
-from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.apply import is_known, rewritten
-from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_innovations
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.method import diagnose
-from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, read_all, read_one
-from gritd.tools.diagnose.search.parallel import meanwhile
 from gritd.tools.report import record
 from gritd.tools.report import reference as references
 
@@ -63,9 +63,13 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
     if arguments.campaigns is not None:
         return _many(arguments)
+    return _one(arguments)
+
+
+def _one(arguments: argparse.Namespace) -> int:
+    """The recordings of one campaign."""
     if arguments.scheduler is not None:
         raise CommandError("diagnose --scheduler: expected --campaigns DIR with it", USAGE)
-
     if not arguments.files or arguments.config is None:
         raise CommandError(
             "diagnose: expected recordings and --config F, or --redo FILE, or --campaigns DIR",
@@ -75,13 +79,6 @@ def main(argv: Sequence[str]) -> int:
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     reference = references.given(arguments.reference, arguments.bed)
 
-    named = [*map(str, arguments.files)]
-    if arguments.reference:
-        named += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
-    named += ["--config", str(arguments.config), "--seed", str(seed)]
-    named += ["--quick"] if arguments.quick else []
-    command = shlex.join(["gritd", "diagnose", *named])
-
     with Progress("diagnose") as progress:
         diagnosis, damage = of_files(
             arguments.files,
@@ -89,7 +86,7 @@ def main(argv: Sequence[str]) -> int:
             seed,
             _steps_of(progress),
             arguments.jobs,
-            command,
+            _command(arguments, seed),
             reference,
             arguments.quick,
             own_rig=not arguments.other_rig,
@@ -98,6 +95,16 @@ def main(argv: Sequence[str]) -> int:
     _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
     print(text(diagnosis))
     return DAMAGED if damage else DONE
+
+
+def _command(arguments: argparse.Namespace, seed: int) -> str:
+    """What does the same again in a shell."""
+    words = [*map(str, arguments.files)]
+    if arguments.reference:
+        words += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
+    words += ["--config", str(arguments.config), "--seed", str(seed)]
+    words += ["--quick"] if arguments.quick else []
+    return shlex.join(["gritd", "diagnose", *words])
 
 
 def _told(
@@ -157,7 +164,7 @@ def _many(arguments: argparse.Namespace) -> int:
 
     cluster, every = cluster_of(arguments), campaigns.find(arguments.campaigns)
     failed = False
-    for campaign, sentence in campaigns.diagnosed(every, _one, arguments.jobs, cluster):
+    for campaign, sentence in campaigns.diagnosed(every, _campaign, arguments.jobs, cluster):
         print(f"{campaign.folder.name}: {sentence}", flush=True)
         failed |= not campaign.done
 
@@ -168,7 +175,7 @@ def _many(arguments: argparse.Namespace) -> int:
     return FAILED if failed else DONE
 
 
-def _one(campaign: campaigns.Campaign) -> str:
+def _campaign(campaign: campaigns.Campaign) -> str:
     """Verdict and summary of one campaign, or the one line of what was wrong with it."""
     try:
         with contextlib.redirect_stdout(io.StringIO()):
@@ -252,64 +259,6 @@ def _apply(
         )
 
 
-def of_files(
-    files: Sequence[Path],
-    configuration: config.Configuration,
-    seed: int,
-    step: object = None,
-    jobs: int = 1,
-    command: str = "",
-    reference: references.Given = references.NONE,
-    quick: bool = False,
-    own_rig: bool = False,
-) -> tuple[Diagnosis, list[str]]:
-    """The diagnosis, and what was damaged in the files. Raises CommandError.
-
-    own_rig: recordings of another testbed than the configuration's are refused.
-    """
-    settings = configuration.settings
-    recordings, known = read_all(files), read_all(reference.files)
-    if own_rig:
-        provenance.check_rig([*recordings, *known], settings, configuration.source)
-
-    hashes = distinct([*files, *reference.files])
-    rig, rate = rig_of(recordings, settings, known, reference.bed)
-    if not rig.channels:
-        raise CommandError(
-            f"{files[0]}: found no sinkage, current or force; expected one to compare with", DAMAGED
-        )
-
-    needed = {
-        **({"command": command} if command else {}),
-        "files": {str(path): hashes[str(path)] for path in files},
-        **reference.kept(hashes),
-        **({"quick": True} if quick else {}),
-        "configuration": configuration.text,
-        "grid_hz": rate,
-        "versions": versions(),
-    }
-    damage = [f"{r.path}: {line}" for r in (*recordings, *known) for line in r.damage]
-    remarks = [*provenance.remarks(recordings, settings), *(f"Damaged: {d}" for d in damage)]
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        soil = any(constant.soil for constant in rig.constants)
-        # long recordings are large: they are let go, and read again where they are needed
-        work = Filtered if quick else partial(filtered, configuration, recordings, soil)
-        del recordings, known
-        with meanwhile(jobs, work) as before:
-            del work
-            each = step if callable(step) else lambda _: None
-            diagnosis = diagnose(rig, seed, needed, each, jobs, quick)
-            if not quick:
-                again = [partial(read_one, path) for path in files]
-                diagnosis = with_innovations(diagnosis, configuration, before(), again, jobs)
-
-    if reference.files:
-        diagnosis = references.with_reference(diagnosis, rig, reference)
-    return replace(diagnosis, caveats=(*diagnosis.caveats, *remarks)), damage
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd diagnose",
@@ -320,12 +269,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="recordings, one a run")
-    parser.add_argument("--config", metavar="F", help="the testbed and what is known of the soil")
-    parser.add_argument(
-        "--other-rig",
-        action="store_true",
-        help="the configuration may be of another testbed than the recordings",
-    )
+    add_configuration(parser, "the testbed and what is known of the soil")
     parser.add_argument(
         "--reference",
         nargs="+",

@@ -26,7 +26,15 @@ from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.recording import Recording
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
+from gritd.tools.cli.command import (
+    DAMAGED,
+    DONE,
+    FAILED,
+    USAGE,
+    CommandError,
+    Parser,
+    add_configuration,
+)
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.explain.provenance import check_rig
 
@@ -282,14 +290,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "files", nargs="+", type=Path, metavar="FILE", help="recordings of one bed, in their order"
     )
-    parser.add_argument(
-        "--config", metavar="F", help="for all runs, instead of the recorded configurations"
-    )
-    parser.add_argument(
-        "--other-rig",
-        action="store_true",
-        help="F may be of another testbed than the recordings",
-    )
+    add_configuration(parser, "for all runs, instead of the recorded configurations")
     parser.add_argument(
         "--repeatability",
         action="append",

@@ -29,7 +29,15 @@ from gritd.estimator.recording.tables import NOTHING
 from gritd.estimator.recording.topics import CHECKPOINT, TOPICS, messages_of
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, whole
+from gritd.tools.cli.command import (
+    DAMAGED,
+    DONE,
+    USAGE,
+    CommandError,
+    Parser,
+    add_configuration,
+    whole,
+)
 from gritd.tools.cli.progress import Progress
 from gritd.tools.commands import replay_jobs
 from gritd.tools.commands.estimate import check_same_rig, lines
@@ -228,16 +236,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "files", nargs="+", metavar="FILE", help="recordings (.mcap); parts of a run are found"
     )
-    parser.add_argument(
-        "--config",
-        metavar="F",
-        help="recompute with this configuration instead of the recorded one",
-    )
-    parser.add_argument(
-        "--other-rig",
-        action="store_true",
-        help="F may be of another testbed than the recordings",
-    )
+    add_configuration(parser, "recompute with this configuration instead of the recorded one")
     parser.add_argument(
         "--verify", action="store_true", help="compare every field of every /tick, bit for bit"
     )

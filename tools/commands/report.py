@@ -11,7 +11,7 @@ from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli import files
-from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, add_configuration
 from gritd.tools.cli.progress import Progress
 from gritd.tools.commands.estimate import check_same_rig, configurations_of, settings_of
 from gritd.tools.report import campaign, lab
@@ -72,14 +72,7 @@ def _parser() -> Parser:
     )
 
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
-    parser.add_argument(
-        "--config", metavar="F", help="for all runs, instead of the recorded configurations"
-    )
-    parser.add_argument(
-        "--other-rig",
-        action="store_true",
-        help="F may be of another testbed than the recordings",
-    )
+    add_configuration(parser, "for all runs, instead of the recorded configurations")
     parser.add_argument(
         "-o",
         "--output",

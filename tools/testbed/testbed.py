@@ -173,6 +173,30 @@ def _stop_on_signals() -> StopRequest:
     return stop
 
 
+def add_play(parser: argparse.ArgumentParser) -> None:
+    """The options that say what is played, also `gritd demo`'s."""
+    parser.add_argument(
+        "--seconds",
+        type=number(low=SHORTEST),
+        default=60.0,
+        metavar="S",
+        help="length of the run, default 60",
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
+    parser.add_argument(
+        "--plant",
+        choices=get_args(PlantKind),
+        default="original",
+        help="Eqs. 1-10 (default), or the closed forms",
+    )
+    parser.add_argument(
+        "--can",
+        choices=get_args(CanKind),
+        default="auto",
+        help="slcan where the computer has no multicast",
+    )
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="python -m gritd.tools.testbed.testbed",
@@ -184,23 +208,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--config", default=packaged(), help="the testbed; default: the packaged testbed.yaml"
     )
-    parser.add_argument(
-        "--seconds",
-        type=number(low=SHORTEST),
-        default=60.0,
-        metavar="S",
-        help="length of the run, default 60",
-    )
-    parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
-    parser.add_argument(
-        "--plant", choices=get_args(PlantKind), default="original", help="default original"
-    )
-    parser.add_argument(
-        "--can",
-        choices=get_args(CanKind),
-        default="auto",
-        help="slcan where the computer has no multicast",
-    )
+    add_play(parser)
     parser.add_argument(
         "--wait", action="store_true", help="play when a line comes on standard input"
     )

@@ -42,7 +42,7 @@ UNTRACED = (
         f"tests/scenarios/test_{name}.py"
         for name in (
             *("bed", "can", "clocks", "configuration", "journal"),
-            *("limits", "loop", "memory", "soil_changes", "trust"),
+            *("limits", "loop", "memory", "soil_changes", "threads", "trust"),
         )
     ),
     "tests/tools/commands/test_bench.py",

@@ -59,12 +59,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
-        caveats=(
-            *_caveats(rig, redo),
-            *doubts(rig, whole),
-            *left_over(rig, (*rig.baseline, *accepted.fitted.acting)),
-            *late(rig, (*rig.baseline, *accepted.fitted.acting)),
-        ),
+        caveats=_caveats(rig, accepted, whole, redo),
         share=decision.share,
         remaining=remainders(problem, accepted),
         remaining_words=_remaining(decision),
@@ -200,7 +195,8 @@ def _subject(rig: Rig) -> str:
     return "Model and recordings" if all(rig.new) else "Reference and new campaign"
 
 
-def _caveats(rig: Rig, redo: Mapping[str, Any]) -> list[str]:
+def _caveats(rig: Rig, accepted: Model, whole: Model, redo: Mapping[str, Any]) -> tuple[str, ...]:
+    """Sentences on what to doubt; whole: the accepted model with functions without a name."""
     sentences = list(rig.caveats)
     if redo.get("quick"):
         sentences.append(
@@ -213,7 +209,14 @@ def _caveats(rig: Rig, redo: Mapping[str, Any]) -> list[str]:
             " thirds of it were held out."
         )
 
-    return [*sentences, *rig.shortcomings]
+    acting = (*rig.baseline, *accepted.fitted.acting)
+    return (
+        *sentences,
+        *rig.shortcomings,
+        *doubts(rig, whole),
+        *left_over(rig, acting),
+        *late(rig, acting),
+    )
 
 
 def _remaining(decision: Decision) -> str:

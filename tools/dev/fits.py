@@ -1,26 +1,30 @@
 """Every fit that decides, against a full bounded optimisation of the same function.
 
-    python -m gritd.tools.dev.fits [CAMPAIGNS …] [--drawn N] [--seed S] [--starts K]
-                                   [--jobs J] [--minutes M] [--out docs/fits.md]
+    python -m gritd.tools.dev.fits [CAMPAIGNS …] [--drawn N] [--seed S] [--starts K] [--jobs J]
+                                   [--minutes M] [--rows FILE] [--out docs/fits.md]
 
-CAMPAIGNS are folders below which every folder with recordings and one configuration is a campaign
-(`gritd prove --keep` leaves such); N more are drawn from our own simulator, each with an effect or
-none. Of each search the bare model and the models within reach of the best one decide. Each is
-given to scipy's trust region reflective least squares (Branch, Coleman and Li 1999, SIAM J. Sci.
-Comput. 21, 1-23) with the same bounds and priors, from where our descent ended and from K points
-about it. A fit is off by what the best of these gains [nats].
+CAMPAIGNS are folders below which every folder with recordings and one configuration is a campaign,
+or with those of a pair in `new` and `reference` (`gritd prove --keep` leaves such). N more are
+drawn from our own simulator, each with an effect or none. They come in an order drawn by the seed.
+FILE keeps what was compared, a line of JSON for each campaign: a campaign that it holds is not
+compared again. Of each search the bare model and the models within reach of the best one decide.
+Each is given to scipy's trust region reflective least squares (Branch, Coleman and Li 1999, SIAM
+J. Sci. Comput. 21, 1-23) with the same bounds and priors, from where our descent ended and from K
+points about it. A fit is off by what the best of these gains [nats].
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import sys
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -42,6 +46,7 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, search_models
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.proof.blind.handover import NEW, REFERENCE
 from gritd.tools.proof.ours.cases import draw, record, scaled
 
 LIMIT = 0.5  # [nats] what a fit may be off by
@@ -148,6 +153,21 @@ class Case:
     seed: int
     starts: int
 
+    @property
+    def name(self) -> str:
+        if self.folder is None:
+            return f"drawn {self.seed}"
+        return str(self.folder.resolve())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All fits of a campaign; failed: why it could not be diagnosed."""
+
+    name: str
+    rows: tuple[Compared, ...]
+    failed: str = ""
+
 
 def campaigns(roots: Sequence[Path]) -> Iterator[Path]:
     """Folders that hold recordings and one configuration."""
@@ -155,14 +175,19 @@ def campaigns(roots: Sequence[Path]) -> Iterator[Path]:
         if not root.is_dir():
             raise CommandError(f"{root}: no such folder")
         for configuration in sorted(root.rglob("*.yaml")):
-            if any(configuration.parent.glob("*.mcap")):
-                yield configuration.parent
+            folder = configuration.parent
+            if any(folder.glob("*.mcap")) or _is_pair(folder):
+                yield folder
 
 
-def run_case(case: Case) -> list[Compared]:
+def _is_pair(folder: Path) -> bool:
+    return all(any((folder / part).glob("*.mcap")) for part in (NEW, REFERENCE))
+
+
+def run_case(case: Case) -> Outcome:
     """One campaign; one that cannot be diagnosed compares nothing."""
     rng = np.random.default_rng(case.seed)
-    name = str(case.folder.parent.name) if case.folder else f"drawn {case.seed}"
+    name = "/".join(Path(case.name).parts[-4:]) if case.folder else case.name
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -170,14 +195,19 @@ def run_case(case: Case) -> list[Compared]:
             rig = _recorded(case.folder) if case.folder else _drawn(rng)
             noise = np.random.default_rng(0)
             search = search_models(prepare_screening(fit_base(rig, noise), noise))
-            return compared(name, search, case.starts, rng)
-        except CommandError:
-            return []
+            return Outcome(case.name, tuple(compared(name, search, case.starts, rng)))
+        except CommandError as error:
+            return Outcome(case.name, (), str(error))
 
 
 def _recorded(folder: Path) -> Rig:
     (configuration,) = folder.glob("*.yaml")
     settings = config.load(configuration).settings
+    if _is_pair(folder):
+        new, before = (
+            read_all(sorted((folder / part).glob("*.mcap"))) for part in (NEW, REFERENCE)
+        )
+        return rig_of(new, settings, before)[0]
     return rig_of(read_all(sorted(folder.glob("*.mcap"))), settings)[0]
 
 
@@ -192,21 +222,24 @@ def _drawn(rng: np.random.Generator) -> Rig:
 # ---- the page ----------------------------------------------------------------------------------
 
 
-def page(rows: Sequence[Compared], asked: int, cases: int) -> str:
+def page(outcomes: Sequence[Outcome], asked: int) -> str:
     """The result in Markdown."""
+    rows = [row for outcome in outcomes for row in outcome.rows]
     off = [r for r in rows if max(r.gain, r.gain_elsewhere) > LIMIT]
     near = [r for r in rows if r.gain > LIMIT]
+    done = [outcome for outcome in outcomes if not outcome.failed]
 
     lines = [
         "# Fits that decide, against a full bounded optimisation",
         "",
         "Made by `python -m gritd.tools.dev.fits`; its first lines say how.",
         "",
-        f"{cases} of {asked} campaigns, {len(rows)} fits that decide:",
+        f"{len(done)} of {asked} campaigns, {len(rows)} fits that decide:",
         "",
         f"- off by more than {LIMIT} nats from where the descent ended: {len(near)};",
         f"- off by more than {LIMIT} nats from there or from a point about it: {len(off)};",
-        f"- did not converge, and are told so: {sum(not r.converged for r in rows)}.",
+        f"- did not converge, and are told so: {sum(not r.converged for r in rows)};",
+        f"- campaigns that could not be diagnosed: {len(outcomes) - len(done)}.",
     ]
 
     if off:
@@ -220,30 +253,58 @@ def page(rows: Sequence[Compared], asked: int, cases: int) -> str:
     return "\n".join([*lines, ""])
 
 
+def kept(file: Path) -> list[Outcome]:
+    """What a file of JSON lines holds."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    return [_outcome(json.loads(line)) for line in lines]
+
+
+def _outcome(line: dict[str, Any]) -> Outcome:
+    rows = (Compared(**{**row, "names": tuple(row["names"])}) for row in line["rows"])
+    return Outcome(line["name"], tuple(rows), line["failed"])
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """The command."""
     arguments = _parser().parse_args(argv)
-    folders = list(campaigns(arguments.campaigns))
-    cases = [Case(folder, arguments.seed, arguments.starts) for folder in folders]
-    cases += [Case(None, arguments.seed + 1 + k, arguments.starts) for k in range(arguments.drawn)]
-    if not cases:
-        raise CommandError("nothing to compare: name campaigns, or --drawn N")
+    cases = _cases(arguments)
+    asked = {case.name for case in cases}
+    outcomes = [o for o in kept(arguments.rows) if o.name in asked] if arguments.rows else []
+    held = {outcome.name for outcome in outcomes}
+    left = [case for case in cases if case.name not in held]
 
-    end, rows, done = time.monotonic() + 60.0 * arguments.minutes, list[Compared](), 0
+    end = time.monotonic() + 60.0 * arguments.minutes
     with (
         multiprocessing.get_context("fork").Pool(arguments.jobs, maxtasksperchild=1) as pool,
-        Progress("campaigns", len(cases)) as progress,
+        Progress("campaigns", len(left)) as progress,
     ):
-        for some in pool.imap_unordered(run_case, cases):
-            rows, done = [*rows, *some], done + 1
+        for outcome in pool.imap_unordered(run_case, left):
+            outcomes.append(outcome)
             progress.advance()
+            _keep(arguments.rows, outcome)
             if arguments.out:
-                arguments.out.write_text(page(rows, len(cases), done), encoding="utf-8")
+                arguments.out.write_text(page(outcomes, len(cases)), encoding="utf-8")
             if time.monotonic() > end:
                 pool.terminate()
                 break
-    print(page(rows, len(cases), done))
+    print(page(outcomes, len(cases)))
     return 0
+
+
+def _cases(arguments: argparse.Namespace) -> list[Case]:
+    """All that is asked for, in an order drawn by the seed."""
+    seed, starts = arguments.seed, arguments.starts
+    cases = [Case(folder, seed, starts) for folder in campaigns(arguments.campaigns)]
+    cases += [Case(None, seed + 1 + k, starts) for k in range(arguments.drawn)]
+    if not cases:
+        raise CommandError("nothing to compare: name campaigns, or --drawn N")
+    return [cases[k] for k in np.random.default_rng(seed).permutation(len(cases))]
+
+
+def _keep(file: Path | None, outcome: Outcome) -> None:
+    if file:
+        with file.open("a", encoding="utf-8") as lines:
+            lines.write(json.dumps(asdict(outcome)) + "\n")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -254,6 +315,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--starts", type=int, default=1, help="points about each optimum")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--rows", type=Path, metavar="FILE", help="keeps what was compared")
     parser.add_argument("--out", type=Path)
     return parser
 

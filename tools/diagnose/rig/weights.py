@@ -18,6 +18,7 @@ from gritd.tools.diagnose.tuning import TUNING
 class Weights(NamedTuple):
     values: Array  # (n,) [N]
     known: bool  # stated, so that the measured load can be compared with them
+    load: Array | None = None  # (n,) [N] as it was measured, where they are taken from it
 
 
 def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weights:
@@ -62,7 +63,7 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     )
     if note not in caveats:
         caveats.append(note)
-    return Weights(levels(signals.time, load), False)
+    return Weights(levels(signals.time, load), False, load)
 
 
 def _sigma(nominal: Uncertain, sensor: Calibration) -> float:

@@ -31,6 +31,7 @@ from gritd.tools.diagnose.rig.interface import (
     Run,
     Stack,
 )
+from gritd.tools.diagnose.rig.load_error import load_errors_in
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
     at_rest_with_torque,
@@ -97,7 +98,7 @@ class WheelRig:
         self.caveats = [s.left_out for s in signals if s.left_out]
         self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
 
-        weights = [weights_of(s, settings, self.caveats) for s in signals]
+        self._weights = weights = [weights_of(s, settings, self.caveats) for s in signals]
         stated = all(w.known for w in weights)
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
@@ -173,19 +174,28 @@ class WheelRig:
 
     @cached_property
     def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
-        """Of wheel and carriage, channels (n,) of each run; nothing in tables, whose speeds are
-        those of states.
+        """Of wheel, carriage and measured load, channels (n,) of each run; nothing in tables, whose
+        values are those of states.
         """
-        return () if self._tabled else unrest_in(self._driven.motions, self._by_carriage)
+        if self._tabled:
+            return ()
+        speeds = unrest_in(self._driven.motions, self._by_carriage)
+        if all(one.known for one in self._weights):
+            return speeds
+        return [*speeds, *load_errors_in(self._weights, self._by("weights"))]
 
     @cached_property
     def _by_carriage(self) -> list[dict[str, Array]]:
         """Per run, change of every channel (n,) by ln of the carriage's speed."""
+        return self._by("carriage_scale")
+
+    def _by(self, name: str) -> list[dict[str, Array]]:
+        """Per run, change of every channel (n,) by a relative constant."""
         names = [constant.name for constant in self.constants]
-        moved = np.array([float(name == "carriage_scale") for name in names])
+        moved = np.array([float(other == name) for other in names])
         told = zip(self.predict(0.0 * moved, ()), self.predict(moved, ()), strict=True)
 
-        sigma = self.constants[names.index("carriage_scale")].sigma
+        sigma = self.constants[names.index(name)].sigma
         return [{c: (two[c] - one[c]) / sigma for c in self.channels} for one, two in told]
 
     def blur(self, stack: Stack, predicted: Array) -> Array:

@@ -88,6 +88,12 @@ class Rig:
         CARRYING, "-", "of the usual load: below it the wheel hardly touches soil"
     )
 
+    # --- load_error.py ---
+    other_weights: float = tuned(
+        0.25, "-", "relative distance from a run's level: beyond it, other weights hang on the axle"
+    )
+    load_parts: int = tuned(8, "parts", "of a run, whose mean loads tell the error of all")
+
     # --- proposals.py ---
     proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")
     proposal_rate: float = tuned(10.0, "Hz", "grid of a foreseen experiment")

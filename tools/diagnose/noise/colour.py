@@ -92,9 +92,10 @@ class Noise:
 
 
 def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> sparse.csr_matrix:
-    """(n, n): n values of unit variance to innovations, as `whiten_unit` makes them, without
-    weights that are negligible. beside: (n,) variance of white noise beside it.
+    """(n, n): n values of unit variance to innovations, without weights that are negligible.
+    beside: (n,) variance of white noise beside it.
 
+    The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew.
     Diagonal by diagonal: what every value weighs in the innovation so many values later. All are
     soon forgotten, so the matrix is a narrow band.
     """
@@ -125,27 +126,13 @@ def unit_whitener(gaps: Array, colour: Colour, beside: Array | None = None) -> s
     return sparse.csr_matrix((np.concatenate(values), entries), shape=(gaps.size, gaps.size))
 
 
-def whiten_unit(
-    columns: Array, gaps: Array, colours: Sequence[Colour], beside: Array | None = None
-) -> tuple[Array, Array]:
-    """Innovations (g, n, m) of columns (n, m) under noise of g colours and unit variance; log det
-    of each covariance. beside: (n,) or (n, g) variance of white noise beside it.
-
-    The Kalman filter of two OU processes observed in white noise; a gap of inf starts anew. Linear
-    in n.
-    """
-    recursion = _recursion(gaps, colours, beside)
-    pieces = list(_innovations(columns, recursion, len(columns)))
-    out = np.concatenate([np.empty((len(colours), 0, columns.shape[1])), *pieces], axis=1)
-
-    return out, _log_det(recursion)
-
-
 def products_of_innovations(
     columns: Array, gaps: Array, colours: Sequence[Colour], beside: Array | None = None
 ) -> tuple[Array, Array]:
-    """Products (g, m, m) of the innovations of columns (n, m), which are never all in memory; log
-    det of each covariance. beside: (n,) or (n, g) as of `whiten_unit`.
+    """Products (g, m, m) of the innovations of columns (n, m) under noise of g colours and unit
+    variance; log det of each covariance. beside: (n,) or (n, g) variance of white noise beside it.
+
+    Linear in n, and the innovations are never all in memory.
     """
     recursion, (_, width) = _recursion(gaps, colours, beside), columns.shape
     rows = max(TUNING.noise.whitened_at_once // max(len(colours) * width, 1), 1)

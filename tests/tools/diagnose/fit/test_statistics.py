@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -21,13 +22,15 @@ from gritd.tools.diagnose.noise.colour import (
     Colour,
     Noise,
     _filtered,
+    _innovations,
+    _log_det,
+    _recursion,
     coloured,
     covariance,
     innovation_variance,
     products_of_innovations,
     surrogates,
     unit_whitener,
-    whiten_unit,
 )
 from gritd.tools.diagnose.noise.estimate import restricted
 from gritd.tools.diagnose.noise.saturated import saturated_mean
@@ -35,6 +38,15 @@ from gritd.tools.diagnose.screen.screen import tail_quantile
 from gritd.tools.diagnose.tuning import TUNING, replaced
 
 GAPS = np.where(np.arange(600) % 200 == 0, np.inf, 0.1)
+
+
+def whiten_unit(
+    columns: Array, gaps: Array, colours: Sequence[Colour], beside: Array | None = None
+) -> tuple[Array, Array]:
+    """All innovations (g, n, m) of columns (n, m) at once, and log det of each covariance."""
+    recursion = _recursion(gaps, colours, beside)
+    pieces = list(_innovations(columns, recursion, len(columns)))
+    return np.concatenate(pieces, axis=1), _log_det(recursion)
 
 
 def test_whitening_leaves_independent_unit_noise() -> None:

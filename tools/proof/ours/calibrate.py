@@ -6,7 +6,7 @@ of an opened batch of blind trials (`gritd prove --output FOLDER`). The temperat
 those that give the truth of every case the largest probability, on average: the logarithmic score,
 which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps
 what few cases do not tell. The truth of a case is any set of effects that holds a true one,
-weighted by how many of its effects are true; of a stranger, an explanation without names.
+weighted by how many of its effects are true; of one outside the list, an explanation without names.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class Case:
 def case_of(
     weighed: Sequence[dict[str, Any]],
     truth: Sequence[str],
-    stranger: bool,
+    unlisted: bool,
     candidates: int,
     held: Collection[str] = (),
 ) -> Case:
     """From the explanations of a diagnosis and the effects that were at work; held: names that are
     true of the rig itself, which are neither asked for nor wrong.
     """
-    right = [_true(w["names"], [] if stranger else truth, held) for w in weighed]
+    right = [_true(w["names"], [] if unlisted else truth, held) for w in weighed]
 
     return Case(
         np.array([w["evidence"] for w in weighed]),
@@ -134,11 +134,11 @@ def _batch(folder: Path) -> list[Case]:
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
         if diagnosis["explanations"] and answers["effects"]:
-            stranger = not set(answers["effects"]) & EFFECTS.keys()
+            unlisted = not set(answers["effects"]) & EFFECTS.keys()
             held = () if answers.get("bed") else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]
             cases.append(
-                case_of(diagnosis["explanations"], answers["effects"], stranger, count, held)
+                case_of(diagnosis["explanations"], answers["effects"], unlisted, count, held)
             )
 
     return cases

@@ -185,8 +185,8 @@ def _checks(diagnosis: DiagnosisRun, identified: Array, before: float, after: fl
 
 
 REASON = """
-What remains is friction that is no straight line in speed: without the lowest speeds the judge's
-own least squares moves from the published values by as much (see the table), so the weight that an
+What remains is friction that is no straight line in speed. Without the lowest speeds the judge's
+own least squares moves from the published values by as much (see the table). So the weight that an
 estimator gives to reversals decides.
 """
 

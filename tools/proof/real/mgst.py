@@ -213,8 +213,9 @@ def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]
 
 
 REASON_LOSS = """
-At one speed and one load a loss and an error of the torque constant differ only by how they go with
-the torque itself, 6.5 and 9.3 N·m, and strength of the soil takes up part of either.
+There is one speed, one load, and torque of 6.5 and 9.3 N·m. A loss and an error of the torque
+constant then differ only by how they depend on the torque, and strength of the soil takes up part
+of either.
 """
 
 DRIVETRAIN = Proof(
@@ -269,9 +270,8 @@ def _of_wall(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
 
 
 REASON_WALL = """
-At one load a drag on the wall, a tilted bed and crosstalk of the load are one and the same constant
-force, and what a sinkage that nobody measured from the surface does to the compaction resistance is
-much the same.
+At one load a drag on the wall, a tilted bed and crosstalk of the load are one constant force. A
+sinkage that is not measured from the surface changes the compaction resistance by much the same.
 """
 
 SIDE_WALL = Proof(

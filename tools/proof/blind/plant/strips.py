@@ -1,4 +1,4 @@
-"""A bed of strips that remembers: a stranger to Eqs. (3)-(7).
+"""A bed of strips that remembers: with no stress of Eqs. (3)-(7).
 
 The bed is cut across into strips. Each bears pressure by Bekker, is pressed down for good where it
 yields, and unloads on a stiff spring; each gathers its own shear displacement while the rim is on

@@ -108,6 +108,7 @@ def estimate_of_reference(
         _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
         for channel in stack.rig.channels
     ]
+
     return _noise(stack, predicted, residual, posteriors, np.zeros((stack.size, 0)))
 
 
@@ -120,6 +121,7 @@ def _noise(
 ) -> Noise:
     """Of each channel's posterior the first colour; own: columns (N, m) of each run by itself."""
     colours = tuple(each[0] for each in posteriors)
+
     return Noise(
         stack,
         colours,

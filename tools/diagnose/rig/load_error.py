@@ -32,6 +32,7 @@ def load_errors_in(
         changes_of(one.values) if one.load is not None else (0.0 * one.values, 0.0 * one.values)
         for one in weights
     ]
+
     shared = [
         [_moved(by, -part) for by, part in zip(by_load, parts, strict=True)]
         for parts in zip(*changes, strict=True)
@@ -44,6 +45,7 @@ def load_errors_in(
         for number, one in enumerate(weights)
         if one.load is not None
     ]
+
     return [*shared, *own] if own else []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from gritd.estimator.effects import EFFECTS
@@ -245,7 +245,15 @@ def _summary(decision: Decision, location: Sequence[Location], p: float, subject
 
     names = listed(list(decision.best.names))
     verb = "explains" if len(decision.best.names) == 1 else "explain"
-    alike = {r for n in decision.best.names for r in decision.groups.get(n, ())}
-    rivals = ", ".join(sorted(alike))
-    doubt = f" It cannot be told apart from {rivals} with these recordings." if alike else ""
+    doubt = "".join(f" {sentence}" for sentence in _alike_in_words(decision))
     return f"{differ}; {names} {verb} {decision.share:.0%} of it.{doubt}{where}"
+
+
+def _alike_in_words(decision: Decision) -> Iterator[str]:
+    """Of each accepted name, what it cannot be told apart from."""
+    names = decision.best.names
+    for name in names:
+        if rivals := decision.groups.get(name):
+            it = name if len(names) > 1 else "It"
+            alike = ", ".join(sorted(rivals))
+            yield f"{it} cannot be told apart from {alike} with these recordings."

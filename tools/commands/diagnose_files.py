@@ -12,13 +12,13 @@ from typing import Any
 from gritd.estimator.config import configuration as config
 from gritd.estimator.recording.metadata import versions
 from gritd.tools.cli.command import DAMAGED, CommandError
+from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.diagnose.explain import provenance
 from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_innovations
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import distinct, read_all, read_one
-from gritd.tools.diagnose.search.parallel import meanwhile
 from gritd.tools.report import reference as references
 
 

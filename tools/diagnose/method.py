@@ -62,7 +62,7 @@ def _diagnose(
 ) -> Diagnosis:
     rng = np.random.default_rng(seed)
     step("fitting the soil and the noise")
-    base = fit_base(rig, rng)
+    base = fit_base(rig, rng, jobs)
 
     screening = prepare_screening(base, rng)
     search = search_models(screening, step, jobs)
@@ -72,17 +72,21 @@ def _diagnose(
     return explain(search, decision, redo)
 
 
-def fit_base(rig: Rig, rng: np.random.Generator) -> BaseFit:
+def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:
     """The base model in noise of the recordings' own size and colour.
 
     Fitted roughly first, in white noise: what is left when everything is explained away is noise.
     With a reference campaign, what is left of it beside the discrepancy of form is noise: the rig
     does it with nothing new.
+
+    jobs: processes.
     """
     stack = Stack(rig)
     rough = fit_roughly(stack)
 
     if stack.referred:
         return fit_beside_reference(rough, rng)
-    noise = estimate(stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng)
+    noise = estimate(
+        stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng, jobs
+    )
     return refit(rough, noise)

@@ -15,9 +15,9 @@ from gritd.estimator.offline import batch
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.explain.result import Diagnosis
-from gritd.tools.diagnose.search.parallel import each
 
 NO_FILTER = "A drive without soil: no on-line filter runs over it."
 NO_UPDATE = (

@@ -18,6 +18,7 @@ from scipy.ndimage import median_filter
 
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.noise import replicates
 from gritd.tools.diagnose.noise.colour import Colour, Noise, products_of_innovations, step_of
 from gritd.tools.diagnose.noise.lines import standing
@@ -71,20 +72,23 @@ def estimate(
     explainable: Explainable,
     before: Noise,
     rng: np.random.Generator,
+    jobs: int = 1,
 ) -> Noise:
     """Size and colour of each channel from a rough prediction (N,), and what each run does for
     itself.
 
-    before: a first guess of the noise.
+    before: a first guess of the noise; jobs: processes.
     """
     residual, cells = stack.measured - predicted, replicates.cells(stack)
     waves = standing(stack, residual, explainable, cells)
     saturated = Explainable(explainable.leading, np.column_stack((explainable.whole, waves)))
 
-    posteriors = [
-        _fit_channel(stack, channel, residual, saturated, cells, before, rng)
-        for channel in stack.rig.channels
-    ]
+    told = each(
+        jobs,
+        lambda channel: _posterior(stack, channel, residual, saturated, cells, before),
+        stack.rig.channels,
+    )
+    posteriors = [_chosen(stack, posterior, rng) for posterior in told]
     colours = tuple(f[0] for f in posteriors)
     own = replicates.own_columns(stack, residual, colours, waves)
     return _noise(stack, predicted, residual, posteriors, own)
@@ -104,10 +108,11 @@ def estimate_of_reference(
     predicted: (N,) by the equations.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
-    posteriors = [
-        _fit_channel(stack, channel, residual, explainable, cells, before, rng, ~stack.new)
+    told = [
+        _posterior(stack, channel, residual, explainable, cells, before, ~stack.new)
         for channel in stack.rig.channels
     ]
+    posteriors = [_chosen(stack, posterior, rng) for posterior in told]
 
     return _noise(stack, predicted, residual, posteriors, np.zeros((stack.size, 0)))
 
@@ -186,17 +191,18 @@ def _steady(stack: Stack, channel: str, before: Noise) -> Bools:
     return steady
 
 
-def _fit_channel(
+def _posterior(
     stack: Stack,
     channel: str,
     residual: Array,
     saturated: Explainable,
     cells: Index,
     before: Noise,
-    rng: np.random.Generator,
     rows: Bools | None = None,
-) -> tuple[Colour, ...]:
-    """The colour to whiten with, then draws from the posterior; of some rows (N,) only."""
+) -> tuple[list[Colour], Array]:
+    """Every colour that is tried, with its likeliest size, and its probability (g,); by some rows
+    (N,) only.
+    """
     own = _steady(stack, channel, before)
     if rows is not None and (own & rows).any():
         own = own & rows
@@ -214,8 +220,16 @@ def _fit_channel(
         replace(c, sigma=max(float(np.sqrt(v)), least))
         for c, v in zip(tried, variance, strict=True)
     ]
-    chosen = rng.choice(len(sized), TUNING.noise.surrogate_colours, p=weight / weight.sum())
-    return _careful(sized, weight / weight.sum(), step_of(stack.gaps)), *(sized[i] for i in chosen)
+    return sized, weight / weight.sum()
+
+
+def _chosen(
+    stack: Stack, posterior: tuple[list[Colour], Array], rng: np.random.Generator
+) -> tuple[Colour, ...]:
+    """The colour to whiten with, then draws from the posterior."""
+    sized, weight = posterior
+    drawn = rng.choice(len(sized), TUNING.noise.surrogate_colours, p=weight)
+    return _careful(sized, weight, step_of(stack.gaps)), *(sized[i] for i in drawn)
 
 
 def colours() -> list[Colour]:

@@ -121,7 +121,7 @@ class _Channel:
             after = spectrum(without, axis, places)
             beside.append(replace(after, power=before.power))
 
-        self._cleaned[axis] = float(log_chance([s.only(place) for s in beside])[0])
+        self._cleaned[axis] = float(log_chance([s.at(slice(place, place + 1)) for s in beside])[0])
         return self._cleaned[axis]
 
     def near(self, axis: str, at: float) -> float:

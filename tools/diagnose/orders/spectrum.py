@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import gammaln, logsumexp
@@ -39,9 +40,8 @@ class Spectrum:
         ratio = self.power / self.level
         return np.asarray(-0.5 * self.freedom * np.log1p(2.0 * ratio / self.freedom))
 
-    def only(self, place: int) -> Spectrum:
-        """At one place (1,)."""
-        at = slice(place, place + 1)
+    def at(self, at: slice) -> Spectrum:
+        """At some of the places."""
         return Spectrum(self.power[at], self.level[at], self.freedom[at])
 
     @property
@@ -119,7 +119,16 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
 
 
 def log_chance(spectra: Sequence[Spectrum]) -> Array:
-    """Chance (o,) of all parts together; 0 where none tells."""
+    """Chance (o,) of all parts together; 0 where none tells. Found for some places at a time: all
+    of many parts are large.
+    """
+    count, parts = spectra[0].power.size, len(spectra)
+    steps = np.linspace(0, count, max(min(parts, count // parts), 1) + 1).astype(int).tolist()
+    some = [_log_chance([s.at(slice(*ends)) for s in spectra]) for ends in pairwise(steps)]
+    return np.concatenate(some)
+
+
+def _log_chance(spectra: Sequence[Spectrum]) -> Array:
     beside = -np.sum([s.log_chance for s in spectra], axis=0)
     count = np.sum([s.known for s in spectra], axis=0)
     terms = np.arange(len(spectra))[:, None]

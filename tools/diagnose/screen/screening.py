@@ -10,6 +10,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom
@@ -79,15 +80,18 @@ def prepare_screening(base: BaseFit, rng: np.random.Generator) -> Screening:
     )
 
 
-def screen_of_base(screening: Screening) -> Screen:
-    """Evidence for an effect, and for a misfit without a name, beside the base model."""
+def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
+    """Evidence for an effect, and for a misfit without a name, beside the base model.
+
+    jobs: processes.
+    """
     problem, model, drawn = screening.problem, screening.base, screening.surrogates
     if problem.stack.referred:
         screen = _screen_beside_reference(screening, model)
         return replace(screen, open=_open_form(screening, model, screen), ripple=_ripple(problem))
     effects = _signatures(problem, model)
     signatures = chain(effects, screening.functions, _strains(problem, model))
-    searched = _averages(screening, model)
+    searched = _averages(screening, model, jobs)
     projection = model.fitted.projection(drawn)
     screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
 
@@ -95,10 +99,11 @@ def screen_of_base(screening: Screening) -> Screen:
     return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
 
 
-def _averages(screening: Screening, model: Model) -> dict[Shape, Array]:
+def _averages(screening: Screening, model: Model, jobs: int) -> dict[Shape, Array]:
     """Log Bayes factor (1 + draws,) of every family of waves or steps beside a model."""
     beside = without_harmonics(screening.problem, model.fitted, screening.surrogates)
-    return {family.shape: family.average(beside) for family in screening.families}
+    every = each(jobs, lambda family: family.average(beside), screening.families)
+    return {family.shape: mean for family, mean in zip(screening.families, every, strict=True)}
 
 
 def _ripple(problem: Problem) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
@@ -20,7 +21,6 @@ from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
-from gritd.tools.diagnose.search.parallel import each
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -81,7 +81,7 @@ def search_models(
     jobs: processes that fit.
     """
     step("screening every effect")
-    search = begin(screening)
+    search = begin(screening, jobs)
     search = replace(search, models=(search.base, _bare(search, search.base)))
     if not search.first.alarmed:
         return search
@@ -99,10 +99,10 @@ def search_models(
     return search
 
 
-def begin(screening: Screening) -> Search:
+def begin(screening: Screening, jobs: int = 1) -> Search:
     """The base model and its screen."""
     base = screening.base
-    return Search(screening, (base,), screen_of_base(screening))
+    return Search(screening, (base,), screen_of_base(screening, jobs))
 
 
 def _bare(search: Search, start: Model) -> Model:

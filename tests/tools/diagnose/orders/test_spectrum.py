@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gritd.tools.diagnose.orders.lines import find_lines
-from gritd.tools.diagnose.orders.spectrum import log_chance, places_of, spectrum
+from gritd.tools.diagnose.orders.spectrum import Spectrum, log_chance, places_of, spectrum
 from gritd.tools.diagnose.orders.transform import fourier_sums
 from gritd.tools.diagnose.orders.wave import amplitude_of
 from gritd.tools.diagnose.tuning import replaced
@@ -44,6 +44,17 @@ def test_amplitude_and_phase_of_any_order_come_back_within_sigma(
     assert found.sigma == pytest.approx(np.sqrt(2.0 / made.values.size), rel=0.1)
     assert abs(found.cos - cos) < 4.5 * found.sigma
     assert abs(found.sin - sin) < 4.5 * found.sigma
+
+
+def test_chances_of_many_parts_are_those_of_each_place_alone() -> None:
+    rng = np.random.default_rng(3)
+    parts = [
+        Spectrum(rng.exponential(size=100), rng.uniform(0.5, 2.0, 100), rng.uniform(2.0, 20.0, 100))
+        for _ in range(7)
+    ]
+    parts[0].level[:40] = np.inf  # nothing is known of it there
+    alone = [log_chance([p.at(slice(i, i + 1)) for p in parts])[0] for i in range(100)]
+    np.testing.assert_allclose(log_chance(parts), alone, rtol=1e-12)
 
 
 def test_sigma_of_an_amplitude_is_its_scatter() -> None:

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from gritd.tools.diagnose.search.parallel import each, meanwhile
+from gritd.tools.cli.parallel import each, meanwhile
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

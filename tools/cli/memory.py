@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import mmap
 import resource
 from collections.abc import Iterator
+from contextlib import suppress
 
 # How C libraries say that there is no memory for them, or for a part of them.
 WORDS = ("failed to map segment", "cannot allocate", "can't start new thread", "not enough mem")
@@ -38,6 +40,12 @@ def _room() -> None:
         mmap.mmap(-1, ROOM).close()
     except OSError as error:
         raise MemoryError(str(error)) from None
+
+
+def give_back() -> None:
+    """Hand back to the system what was freed: glibc keeps gaps between what is still held."""
+    with suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def line(error: BaseException) -> str:

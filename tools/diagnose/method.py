@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from gritd.tools.cli.memory import give_back
 from gritd.tools.diagnose.explain.explanation import explain
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.fit.base import BaseFit, explainable, fit_roughly, refit
@@ -63,6 +64,7 @@ def _diagnose(
     rng = np.random.default_rng(seed)
     step("fitting the soil and the noise")
     base = fit_base(rig, rng, jobs)
+    give_back()
 
     screening = prepare_screening(base, rng)
     search = search_models(screening, step, jobs)

@@ -11,6 +11,7 @@ import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
@@ -82,6 +83,7 @@ def search_models(
     """
     step("screening every effect")
     search = begin(screening, jobs)
+    give_back()  # of all that was screened
     search = replace(search, models=(search.base, _bare(search, search.base)))
     if not search.first.alarmed:
         return search

@@ -11,21 +11,10 @@ from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.tuning import TUNING
 
-LEVELS = {  # factors on the middle speed, slips, factors on the middle load
-    "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
-    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
-    "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
-    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
-    "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
-    "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
-    "second_pass": ((1.0,), (0.2,), (1.0,)),
-    "shifted_start": ((1.0,), (0.2,), (1.0,)),
-}
-
 
 def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:
     """The motion of one experiment: its levels in turn, each for an equal time."""
-    speeds, slips, loads = LEVELS[key]
+    speeds, slips, loads = TUNING.rig.proposal_levels[key]
     time = (
         np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
         / TUNING.rig.proposal_rate
@@ -57,7 +46,7 @@ def driving(key: str) -> NDArray[np.bool_]:
     """Whether the wheel drives on the soil (n,): at rest and lifted the motor current alone tells
     something.
     """
-    speeds, _, loads = LEVELS[key]
+    speeds, _, loads = TUNING.rig.proposal_levels[key]
     time = (
         np.arange(round(TUNING.rig.proposal_seconds * TUNING.rig.proposal_rate))
         / TUNING.rig.proposal_rate

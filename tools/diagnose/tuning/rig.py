@@ -13,6 +13,17 @@ PREPARED = {"c": 0.1, "tan_phi": 0.02, "k": 0.05, "n": 0.01, "K": 0.08}
 FLOORS = {"c": 0.05, "tan_phi": 0.02, "k": 0.03, "n": 0.01, "K": 0.02}
 LEAST = {"c": 1.0, "tan_phi": 0.05, "n": 0.3}
 RATES = ((400.0, 10.0), (1200.0, 5.0), (float("inf"), 2.5))
+Levels = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+LEVELS: Mapping[str, Levels] = {  # factors on the middle speed, slips, factors on the middle load
+    "standstill": ((0.0, 1.0), (0.2,), (1.0,)),
+    "lifted_spin": ((0.4, 1.0, 2.0, -0.4, -1.0, -2.0), (0.2,), (0.0,)),
+    "reversal": ((1.0, -1.0), (0.2,), (1.0,)),
+    "load_step": ((1.0,), (0.2,), (0.5, 1.0, 1.6)),
+    "slip_step": ((1.0,), (0.03, 0.15, 0.35, 0.7), (1.0,)),
+    "speed_step": ((0.3, 1.0, 3.0), (0.2,), (1.0,)),
+    "second_pass": ((1.0,), (0.2,), (1.0,)),
+    "shifted_start": ((1.0,), (0.2,), (1.0,)),
+}
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,9 @@ class Rig:
 
     # --- proposals.py ---
     proposal_seconds: float = tuned(24.0, "s", "length of a foreseen experiment")
+    proposal_levels: Mapping[str, Levels] = tuned(
+        LEVELS, "choice", "what each experiment of the menu drives, one after the other"
+    )
     proposal_rate: float = tuned(10.0, "Hz", "grid of a foreseen experiment")
 
     # --- signals.py ---

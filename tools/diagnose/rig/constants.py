@@ -25,15 +25,13 @@ def wheel_constants(
     channels: Sequence[str],
     sets: WeightSets,
     weights_stated: bool,
-    caveats: list[str],
 ) -> tuple[Constant, ...]:
     """Soil, calibration of every channel, weights, configured effects.
 
     weights_stated: whether all runs state their weights; else the load cell tells them.
-    caveats: takes a sentence where a stated uncertainty is raised to a floor.
     """
     return (
-        *_soil(settings, caveats),
+        *_soil(settings),
         *_calibrations(settings, channels, sets, weights_stated),
         *_configured(settings),
     )
@@ -98,10 +96,24 @@ def _relative(known: Uncertain) -> float:
     return known.sigma / abs(known.value) if known.value else 0.0
 
 
-def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
+def raised_to_floors(settings: Settings) -> str:
+    """A sentence where the soil is stated more exactly than any soil is known; '' elsewhere."""
+    floors = TUNING.rig.soil_floors
+    raised = [n for n, (value, sigma, _) in _stated(settings).items() if sigma < floors[n] * value]
+    if not raised:
+        return ""
+    return (
+        f"The configuration states {', '.join(raised)} more exactly than any soil is known."
+        " The standard deviations are taken as"
+        f" {', '.join(f'{name} {floors[name]:.0%}' for name in raised)}."
+    )
+
+
+def _stated(settings: Settings) -> dict[str, tuple[float, float, str]]:
+    """Value, standard deviation and unit of each soil constant."""
     prior = settings.soil
     modulus = prior.pressure_sinkage.modulus(settings.wheel.width)
-    stated = {
+    return {
         "c": (prior.cohesion.value, prior.cohesion.sigma, "Pa"),
         "tan_phi": (prior.tan_phi.value, prior.tan_phi.sigma, "-"),
         "k": (prior.shear_modulus.value, prior.shear_modulus.sigma, "m"),
@@ -109,18 +121,8 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
         "K": (modulus, modulus * prior.modulus_sigma, "Pa/m^n"),
     }
 
-    raised = [
-        name
-        for name, (value, sigma, _) in stated.items()
-        if sigma < TUNING.rig.soil_floors[name] * value
-    ]
-    if raised:
-        least = ", ".join(f"{name} {TUNING.rig.soil_floors[name]:.0%}" for name in raised)
-        caveats.append(
-            f"The configuration states {', '.join(raised)} more exactly than any soil is known."
-            f" The standard deviations are taken as {least}."
-        )
 
+def _soil(settings: Settings) -> tuple[Constant, ...]:
     return tuple(
         Constant(
             name,
@@ -131,7 +133,7 @@ def _soil(settings: Settings, caveats: list[str]) -> tuple[Constant, ...]:
             name in ("k", "K"),
             TUNING.rig.soil_least.get(name, 0.0),
         )
-        for name, (value, sigma, unit) in stated.items()
+        for name, (value, sigma, unit) in _stated(settings).items()
     )
 
 

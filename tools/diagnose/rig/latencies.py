@@ -41,7 +41,7 @@ def latencies_in(
 
 def lags(fine: Signals, settings: Settings) -> Iterator[tuple[str, Event]]:
     """Of each channel at each event of a run, whose signals stand on a fine grid."""
-    weights = weights_of(fine, settings, [])
+    weights = weights_of(fine, settings)
     motion = motion_of(fine, weights.values, settings, 0.0)
     response = simulate_arrays(
         settings.wheel,

@@ -65,24 +65,11 @@ def sinkage_from_prior(
     ).sinkage
 
 
-def without_rest(runs: Sequence[Run], rest: Sequence[Bools]) -> list[Run]:
-    """Runs in which the motor torque does not count at rest, marked (n,) of each run."""
-    return [
-        replace(run, used={**run.used, "torque": run.used["torque"] & ~mask})
-        for run, mask in zip(runs, rest, strict=True)
-    ]
-
-
-def at_rest_with_torque(runs: Sequence[Run]) -> list[Bools]:
-    """Values (n,) of each run that count, at which the wheel stands."""
-    return [run.used["torque"] & (run.covariates["speed"] == 0.0) for run in runs]
-
-
-def torque_is_held(runs: Sequence[Run], rest: Sequence[Bools]) -> bool:
-    """Whether a servo holds torque at rest, marked (n,) of each run: the current at rest differs
-    from rest to rest, so it tells nothing.
+def torque_is_held(runs: Sequence[Run]) -> bool:
+    """Whether a servo holds torque at rest: the current at rest differs from rest to rest, so it
+    tells nothing.
     """
-    torque = [run.measured["torque"] for run in runs]
+    torque, rest = [run.measured["torque"] for run in runs], [_resting(run) for run in runs]
     means = [float(values[at].mean()) for values, at in zip(torque, rest, strict=True) if at.any()]
 
     driven = np.concatenate(
@@ -95,3 +82,17 @@ def torque_is_held(runs: Sequence[Run], rest: Sequence[Bools]) -> bool:
         return False
     usual = float(np.sqrt(np.mean(driven**2)))
     return float(np.ptp(means)) >= TUNING.rig.holding * usual
+
+
+def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:
+    """The runs, in which the torque does not count while the wheel stands."""
+    return [
+        replace(run, used={**run.used, "torque": run.used["torque"] & ~_resting(run)})
+        for run in runs
+    ]
+
+
+def _resting(run: Run) -> Bools:
+    """Values (n,) of the torque that count, at which the wheel stands."""
+    resting: Bools = run.used["torque"] & (run.covariates["speed"] == 0.0)
+    return resting

@@ -14,6 +14,11 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
+MEASURED_NOTE = (
+    "Weights are taken from the measured load in runs that do not state theirs or that change"
+    " them: friction of the load axis cannot show there."
+)
+
 
 class Weights(NamedTuple):
     values: Array  # (n,) [N]
@@ -21,7 +26,7 @@ class Weights(NamedTuple):
     load: Array | None = None  # (n,) [N] as it was measured, where they are taken from it
 
 
-def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weights:
+def weights_of(signals: Signals, settings: Settings) -> Weights:
     """Stated weights where the measured load does not contradict them, else the levels of the
     measured load.
 
@@ -57,12 +62,6 @@ def weights_of(signals: Signals, settings: Settings, caveats: list[str]) -> Weig
     ):
         return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
 
-    note = (
-        "Weights are taken from the measured load in runs that do not state theirs or that change"
-        " them: friction of the load axis cannot show there."
-    )
-    if note not in caveats:
-        caveats.append(note)
     return Weights(levels(signals.time, load), False, load)
 
 

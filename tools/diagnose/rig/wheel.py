@@ -4,7 +4,7 @@ forward model out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Literal
 
@@ -19,7 +19,7 @@ from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.blur import blur_of
 from gritd.tools.diagnose.rig.candidates import candidates, tables
-from gritd.tools.diagnose.rig.constants import UNITS, preparation, wheel_constants
+from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
 from gritd.tools.diagnose.rig.held import HeldForm
 from gritd.tools.diagnose.rig.interface import (
@@ -34,18 +34,17 @@ from gritd.tools.diagnose.rig.interface import (
 from gritd.tools.diagnose.rig.load_error import load_errors_in
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
-    at_rest_with_torque,
     measured_run,
     sinkage_from_prior,
     torque_is_held,
-    without_rest,
+    without_torque_at_rest,
 )
 from gritd.tools.diagnose.rig.prediction import SOIL, Driven, Prediction
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
-from gritd.tools.diagnose.rig.weights import Weights, weights_of
+from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_of
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
@@ -95,20 +94,17 @@ class WheelRig:
         self.settings, self.lines, self.latencies = settings, lines, latencies
         self.new = [number >= reference for number in range(len(signals))]
         self.baseline = configured(settings.effects)
-        self.caveats = [s.left_out for s in signals if s.left_out]
         self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
 
-        self._weights = weights = [weights_of(s, settings, self.caveats) for s in signals]
+        self._weights = weights = [weights_of(s, settings) for s in signals]
         stated = all(w.known for w in weights)
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
-        if self.loss_of_drive:
-            self.caveats.append(LOSS_NOTE)
 
         self._driven = _driven(signals, weights, self.new, settings)
         prepared = preparation(settings) if reference and bed == "prepared" else {}
         self.constants = (
-            *wheel_constants(settings, self.channels, self._driven.sets, stated, self.caveats),
+            *wheel_constants(settings, self.channels, self._driven.sets, stated),
             *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
         )
         self.effects = candidates(signals, _left_out(self.baseline, stated))
@@ -121,7 +117,10 @@ class WheelRig:
             self.loss_of_drive,
         )
 
-        self.runs = self._measured(signals)
+        runs = self._measured(signals)
+        holding = "torque" in self.channels and torque_is_held(runs)
+        self.runs = without_torque_at_rest(runs) if holding else runs
+        self.caveats = [*self._sentences(signals, holding)]
         self.held = self._held_form()
         self.forms = self._forms(signals)
 
@@ -230,7 +229,7 @@ class WheelRig:
     def _measured(self, signals: Sequence[Signals]) -> list[Run]:
         prior = {constant.name: constant.value for constant in self.constants}
         soil = Soil(*(prior[name] for name in SOIL))
-        runs = [
+        return [
             measured_run(
                 one,
                 motion,
@@ -242,14 +241,18 @@ class WheelRig:
             )
             for one, motion in zip(signals, self._driven.motions, strict=True)
         ]
-        if "torque" not in self.channels:
-            return runs
 
-        rest = at_rest_with_torque(runs)
-        if not torque_is_held(runs, rest):
-            return runs
-        self.caveats.append(HOLDING_NOTE)
-        return without_rest(runs, rest)
+    def _sentences(self, signals: Sequence[Signals], holding: bool) -> Iterator[str]:
+        """What to know of the comparison; holding: a servo holds torque at rest."""
+        yield from (s.left_out for s in signals if s.left_out)
+        if not all(w.known for w in self._weights):
+            yield MEASURED_NOTE
+        if self.loss_of_drive:
+            yield LOSS_NOTE
+        if sentence := raised_to_floors(self.settings):
+            yield sentence
+        if holding:
+            yield HOLDING_NOTE
 
     def _held_form(self) -> HeldForm | None:
         learnt = self.settings.discrepancy

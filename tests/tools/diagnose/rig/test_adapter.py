@@ -13,6 +13,7 @@ import pytest
 from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.rig.adapter import _check_drives
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.weights import MEASURED_NOTE
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
@@ -47,3 +48,14 @@ def test_a_channel_that_was_measured_while_the_wheel_stood_is_one() -> None:
     assert np.isfinite(rig.runs[0].measured["drawbar_pull"]).all()
     with pytest.raises(CommandError, match=r"^one\.mcap: found no value of .* drives steadily"):
         _check_drives(rig, True, FILES)
+
+
+def test_a_rig_without_motor_current_has_no_torque() -> None:
+    rig = WheelRig([_without(s, "current") for s in record(plan(), ())], settings())
+    assert "torque" not in rig.channels and "axle_torque" in rig.channels
+
+
+def test_weights_that_only_the_sensor_tells_are_a_note_once() -> None:
+    runs = [replace(s, info=replace(s.info, nominal_load=None)) for s in record(plan(), ())]
+    rig = WheelRig(runs, settings())
+    assert rig.caveats.count(MEASURED_NOTE) == 1 and "load" not in rig.channels

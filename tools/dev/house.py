@@ -20,7 +20,7 @@ WIDE = 100  # columns
 LONG = 12  # lines from which a function has steps to tell apart
 PLAIN = {0, 1, 2, -1, 0.5}  # numbers that need no name
 ARRAY = re.compile(r"\b(Array|Bools|Index|NDArray)\b")
-SHAPE = re.compile(r"\((?:[A-Za-z\d][^(),]{0,12},)[^()]{0,12}\)")  # (N,), (n, m), (1 + draws,)
+SHAPE = re.compile(r"\((?:[A-Za-z\d][^(),]{0,12},)[^()]{0,16}\)")  # (N,), (n, m), (1 + draws,)
 TUNING = "tuning"  # the folder of named numbers
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

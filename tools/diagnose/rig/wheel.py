@@ -229,6 +229,7 @@ class WheelRig:
     def _measured(self, signals: Sequence[Signals]) -> list[Run]:
         prior = {constant.name: constant.value for constant in self.constants}
         soil = Soil(*(prior[name] for name in SOIL))
+
         return [
             measured_run(
                 one,

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
@@ -18,13 +16,16 @@ def doubts(rig: Rig, model: Model) -> tuple[str, ...]:
     return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model))
 
 
+def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
+    """Constants far from what is known of them [σ], the farthest first."""
+    told = [(c.name, float(u)) for c, u in zip(rig.constants, model.fitted.u, strict=True)]
+    far = [(name, u) for name, u in told if abs(u) >= TUNING.explain.doubtful_constant]
+    return sorted(far, key=lambda each: -abs(each[1]))
+
+
 def _strained(rig: Rig, model: Model) -> Iterator[str]:
-    """Constants far from what is known of them, the farthest first."""
-    for place in np.argsort(-np.abs(model.fitted.u)).tolist():
-        strain = float(model.fitted.u[place])
-        if abs(strain) >= TUNING.explain.doubtful_constant:
-            name = rig.constants[place].name
-            yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
+    for name, strain in strains(rig, model):
+        yield f"Strained: {name} stands {strain:+.1f} σ from what is known of it."
 
 
 def _bounded(rig: Rig, model: Model) -> Iterator[str]:

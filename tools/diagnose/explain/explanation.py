@@ -8,7 +8,7 @@ from typing import Any
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.wording import listed
-from gritd.tools.diagnose.explain.doubts import doubts
+from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
@@ -62,7 +62,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         caveats=_caveats(rig, accepted, whole, redo),
         share=decision.share,
         remaining=remainders(problem, accepted),
-        remaining_words=_remaining(decision),
+        remaining_words=_remaining(decision, strains(rig, accepted)),
         discrepancy=discrepancies(problem, accepted),
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
@@ -219,7 +219,13 @@ def _caveats(rig: Rig, accepted: Model, whole: Model, redo: Mapping[str, Any]) -
     )
 
 
-def _remaining(decision: Decision) -> str:
+def _remaining(decision: Decision, strained: Sequence[tuple[str, float]]) -> str:
+    """strained: constants far from what is known of them [σ]: where nothing else remains, they hold
+    what does.
+    """
+    if decision.beside is None and strained:
+        held = listed([f"{name} ({strain:+.1f} σ)" for name, strain in strained])
+        return f"What remains is in constants far from what is known of them: {held}."
     if decision.beside is None:
         return "Nothing above the noise remains."
     kinds = ", ".join(dict.fromkeys(described(f.shape) for f in decision.beside.functions))

@@ -7,6 +7,11 @@ model with and without the effect as the other stretches tell them, and the gain
 those of the two stretches where the effect gains most and the two where it loses most. What is
 there gains elsewhere too, and no formula of it is right everywhere (leave-one-group-out prediction:
 Vehtari, Gelman and Gabry 2017, Stat. Comput. 27, 1413-1432).
+
+Calibrations are measurements too. Where motor and axle torque are both measured, a loss of the
+drive may pass for an offset between the two, far from what is known of it, and every stretch is
+predicted as well. No soil acts there. So what a loss gains in the calibrations is added. Elsewhere
+it is not: where soil acts, calibrations strain because the form of its model is off.
 """
 
 from __future__ import annotations
@@ -45,14 +50,30 @@ class Breadth:
         return counted
 
     def broad(self, model: Model, name: str) -> bool:
-        """Whether an effect of a model gains in more than two stretches."""
+        """Whether an effect of a model gains in more than two stretches, or relieves calibrations
+        of a strain.
+        """
         gains, apart = np.sort(self.gains(model, name)), TUNING.verdict.stretches_apart
         rest = gains[apart:-apart]
-        return bool(rest.size == 0 or rest.sum() > TUNING.verdict.broad)
+        if not rest.size:
+            return True
+        return bool(rest.sum() + self.relieved(model, name) > TUNING.verdict.broad)
 
     def gains(self, model: Model, name: str) -> Array:
         """Log density (b,) of each stretch given the others, above that without the effect."""
         return self._predicted(model) - self._predicted(self.without(model, name))
+
+    def relieved(self, model: Model, name: str) -> float:
+        """By how much nearer the calibrations stand to what is known of them [nats, not below 0]
+        than without an effect of the drive, where its loss is measured.
+        """
+        rig = self._search.problem.stack.rig
+        if rig.effects[name].stage != "drivetrain" or not any(form.drive for form in rig.forms):
+            return 0.0
+        known = np.array([not c.soil for c in rig.constants])
+        strains = (m.fitted.u[known] for m in (self.without(model, name), model))
+        before, after = (0.5 * float(u @ u) for u in strains)
+        return max(before - after, 0.0)
 
     def without(self, model: Model, name: str) -> Model:
         """The model less one of its effects."""

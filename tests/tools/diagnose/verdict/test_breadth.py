@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,30 @@ from gritd.tools.diagnose.verdict.breadth import Breadth
 
 
 class _Model:
-    def __init__(self, evidence: float, *names: str) -> None:
+    """strains: of the soil's constant and of the two of an instrument."""
+
+    def __init__(
+        self, evidence: float, *names: str, strains: tuple[float, ...] = (0.0, 0.0, 0.0)
+    ) -> None:
         self.evidence, self.names = evidence, names
+        self.fitted = SimpleNamespace(u=np.array(strains))
 
 
 class _Search:
     """A base model, one without effects, and two with effects."""
 
-    def __init__(self, habit: float = 0.0) -> None:
-        self.models = (_Model(0.0), _Model(0.0), _Model(50.0, "a"), _Model(80.0, "a", "b"))
+    def __init__(self, habit: float, strains: tuple[float, ...], stage: str) -> None:
+        without_b = _Model(50.0, "a", strains=strains)
+        self.models = (_Model(0.0), _Model(0.0), without_b, _Model(80.0, "a", "b"))
         self.first = type("Screen", (), {"habit": {"b": habit}})()
+        constants = [SimpleNamespace(soil=soil) for soil in (True, False, False)]
+        rig = SimpleNamespace(
+            constants=constants,
+            effects=dict.fromkeys("ab", SimpleNamespace(stage=stage)),
+            forms=(SimpleNamespace(drive=False), SimpleNamespace(drive=True)),
+        )
+        stack = SimpleNamespace(rig=rig)
+        self.problem = SimpleNamespace(stack=stack)
 
     def news(self, model: _Model) -> float:
         return model.evidence - TUNING.screen.habit * self.first.habit["b"] * ("b" in model.names)
@@ -29,12 +44,19 @@ class _Search:
     weight = news
 
 
-def _counted(gains: Any, monkeypatch: pytest.MonkeyPatch, habit: float = 0.0) -> float:
-    """The evidence of both effects together, where the second gains as given."""
-    search: Any = _Search(habit)
+def _counted(
+    gains: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    habit: float = 0.0,
+    strains: tuple[float, ...] = (0.0, 0.0, 0.0),
+    stage: str = "drivetrain",
+) -> float:
+    """The evidence of both effects together, where the second gains as given and relieves these
+    strains, on a rig that measures the loss of the drive.
+    """
+    search: Any = _Search(habit, strains, stage)
     own = {"a": np.full(20, 5.0), "b": np.asarray(gains)}
     monkeypatch.setattr("gritd.tools.diagnose.verdict.breadth.stretches", lambda _: [])
-    search.problem = type("Problem", (), {"stack": None})()
     test = Breadth(search)
     monkeypatch.setattr(test, "gains", lambda model, name: own[name])
     monkeypatch.setattr(
@@ -54,3 +76,14 @@ def test_many_small_gains_do(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_the_reference_shows_is_no_gain(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = 30.0 / TUNING.screen.habit
     assert _counted([1.5] * 20, monkeypatch, habit=shown) == 50.0
+
+
+def test_a_loss_of_the_drive_gains_what_it_relieves_the_instruments_of(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A sensor 3 σ off its calibration predicts every stretch as well as the loss does."""
+    nothing = [0.0] * 20
+    assert _counted(nothing, monkeypatch, strains=(0.0, 3.0, 0.0)) == 80.0
+    assert _counted(nothing, monkeypatch, strains=(0.0, 1.5, 0.0)) == -np.inf
+    assert _counted(nothing, monkeypatch, strains=(5.0, 0.0, 0.0)) == -np.inf  # the soil's
+    assert _counted(nothing, monkeypatch, strains=(0.0, 3.0, 0.0), stage="testbed") == -np.inf

@@ -4,7 +4,8 @@ itself.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,15 @@ class Campaign:
         self._joined = _joined(self._motions)
         self._carried: dict[Hashable, Carried] = {}  # the last few
         self._last: Balance | None = None  # the next balance starts there
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """See interface.Rig."""
+        carried, last = dict(self._carried), self._last
+        try:
+            yield
+        finally:
+            self._carried, self._last = carried, last
 
     def readings(
         self, soil: Soil, weights: Array, travelled: float, effects: Sequence[Effect]

@@ -14,6 +14,7 @@ in units of its usual speed; what is said is in newton metres and radians a seco
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,6 +116,10 @@ class DriveRig:
     def unrest(self) -> Sequence[Sequence[Mapping[str, Array]]]:
         """No channel (n,) of any part, for the same reason."""
         return ()
+
+    def aside(self) -> AbstractContextManager[None]:
+        """Nothing is kept of a prediction."""
+        return nullcontext()
 
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False

@@ -8,6 +8,7 @@ The other rooms work on the arrays defined here and know a rig by this interface
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -223,6 +224,11 @@ class Rig(Protocol):
     ) -> list[dict[str, Array]]:
         """Every channel of every run, for constants u (q,) in prior σ and effects beyond the
         baseline; everywhere: the effects act in the reference campaign too.
+        """
+
+    def aside(self) -> AbstractContextManager[None]:
+        """What is predicted inside leaves no trace: predictions begin at earlier ones, so their
+        last digits depend on what was predicted before.
         """
 
     def unit_factor(self, unit: str) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,18 @@ class Prediction:
         self._inner = np.ones(sum(sizes), bool)  # with a neighbour of the same run on either side
         for part in self._parts:
             self._inner[[part.start, part.stop - 1]] = False
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """See interface.Rig."""
+        readings = dict(self._true_readings)
+        with ExitStack() as campaigns:
+            for _, campaign in self._campaigns:
+                campaigns.enter_context(campaign.aside())
+            try:
+                yield
+            finally:
+                self._true_readings = readings
 
     def channels(
         self, u: Array, effects: Sequence[Effect], everywhere: bool

@@ -5,6 +5,7 @@ forward model out.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import Literal
 
@@ -137,6 +138,10 @@ class WheelRig:
             {channel: values + mean[channel] for channel, values in run.items()}
             for run, mean in zip(told, self.held.means, strict=True)
         ]
+
+    def aside(self) -> AbstractContextManager[None]:
+        """See interface.Rig."""
+        return self._prediction.aside()
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen:
         """See interface.Rig; constants u (q,)."""

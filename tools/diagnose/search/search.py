@@ -148,7 +148,12 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
     """With fits of the model and one more effect each."""
     candidates = [p for p in promises(search, model) if p.gain > TUNING.search.promising]
     fresh = [p for p in candidates if not search.has((*model.names, p.effect.name))]
-    made = each(jobs, lambda promise: _with_effect(search, model, promise), fresh[:most])
+
+    def fitted(promise: Promise) -> Model:
+        with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
+            return _with_effect(search, model, promise)
+
+    made = each(jobs, fitted, fresh[:most])
     return replace(search, models=(*search.models, *made))
 
 

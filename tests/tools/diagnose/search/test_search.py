@@ -13,7 +13,7 @@ from gritd.tools.diagnose.fit.settings import _smaller, settings_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import _bare, _tried, begin, promises
+from gritd.tools.diagnose.search.search import _bare, _tried, begin, extended, promises
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -27,6 +27,24 @@ def test_settings_are_smaller_and_begin_with_the_models_own(sizes: tuple[int, ..
     assert len(set(found)) == len(found)
     assert all(0 <= a <= b for other in found for a, b in zip(other, sizes, strict=True))
     assert tuple(0 for _ in sizes) in found
+
+
+def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
+    """Also where another fit stood between: a prediction begins at the one before."""
+    rig = WheelRig(record(plan(), (make("bulldozing", {"share": 0.75}),)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    bare = _bare(search, search.base)
+    found = []
+    for jobs in (1, 2):
+        with rig.aside():
+            found.append(extended(search, bare, 3, jobs).models[1:])
+
+    assert len(found[0]) == 3
+    assert [m.evidence for m in found[0]] == [m.evidence for m in found[1]]
+    for alone, beside in zip(*found, strict=True):
+        assert alone.fitted.u.tobytes() == beside.fitted.u.tobytes()
+        assert alone.fitted.x.tobytes() == beside.fitted.x.tobytes()
 
 
 def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:

@@ -156,7 +156,7 @@ def _names(diagnosis: DiagnosisRun, what: str, wanted: Sequence[str], reason: st
     )
 
 
-def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str) -> Check:
+def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str, reason: str) -> Check:
     before, after = (rms(np.array(e)) for e in zip(*(h.errors for h in held), strict=True))
     better = sum(h.errors[1] < h.errors[0] for h in held)
 
@@ -165,9 +165,7 @@ def _nearer(diagnosis: DiagnosisRun, held: Sequence[Held], unit: str) -> Check:
         f"in all {len(held)}, error more than halved",
         f"in {better}; error {before:.2f} {unit} before, {after:.2f} after",
         better == len(held) and after < 0.5 * before,
-        ""
-        if diagnosis.accepted
-        else "No effect was accepted, so only the strain of the channel's calibration frees it.",
+        reason,
     )
 
 
@@ -208,14 +206,14 @@ def _of_drivetrain(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]
             abs(loss - LOSS) <= LOSS_ABOUT,
             REASON_LOSS,
         ),
-        _nearer(diagnosis, held, "N·m"),
+        _nearer(diagnosis, held, "N·m", REASON_LOSS),
     ]
 
 
 REASON_LOSS = """
-There is one speed, one load, and torque of 6.5 and 9.3 N·m. A loss and an error of the torque
-constant then differ only by how they depend on the torque, and strength of the soil takes up part
-of either.
+Motor torque alone does not tell a loss here. At one speed and one load, stronger soil, within what
+is known of it, and the discrepancy of form give the same torques at both slips: a loss beside what
+is named does not raise the evidence. What is named is that sinkage grows with slip, which it does.
 """
 
 DRIVETRAIN = Proof(
@@ -265,13 +263,14 @@ def _of_wall(diagnosis: DiagnosisRun, held: Sequence[Held]) -> list[Check]:
             abs(taken - WALL) <= WALL_ABOUT,
             REASON_WALL,
         ),
-        _nearer(diagnosis, held, "N"),
+        _nearer(diagnosis, held, "N", REASON_WALL),
     ]
 
 
 REASON_WALL = """
-At one load a drag on the wall, a tilted bed and crosstalk of the load are one constant force. A
-sinkage that is not measured from the surface changes the compaction resistance by much the same.
+At one load a drag on the wall, a tilted bed and crosstalk of the load are one constant force.
+Weaker soil, within what is known of it, and the discrepancy of form give the same pull at both
+slips: a wall beside what is named raises the evidence by less than 1 nat.
 """
 
 SIDE_WALL = Proof(

@@ -86,20 +86,26 @@ class Ground(Protocol[Linearised, Tried]):
 
 def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one."""
-    here, damping = start, TUNING.fit.damping_start
+    here, damping, again = start, TUNING.fit.damping_start, False
     for _ in range(rounds):
         held = ground.bounds.held(here.centre, here.gradient)
         better = None
         while better is None and damping < TUNING.fit.damping_most:
             step = bounded_step(here, ground.bounds, held, damping)
             foretold = _gain(here, step)
-            if foretold < TUNING.fit.gain:
-                return here, True
+            if abs(foretold) < TUNING.fit.gain:
+                if again or damping <= TUNING.fit.damping_start:
+                    return here, True
+                again, damping = True, TUNING.fit.damping_start  # the damping alone made it small
+                continue
+            if foretold < 0.0:  # bounds cut the step into one that loses
+                damping *= TUNING.fit.damping_harder
+                continue
 
             tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
             share = (here.nats - nats) / foretold
             if np.isfinite(nats) and share > TUNING.fit.fulfilled:
-                better = tried
+                better, again = tried, False
                 damping = max(
                     damping * (TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0),
                     TUNING.fit.damping_least,
@@ -111,7 +117,7 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
             return here, False
         near = foretold < TUNING.fit.near and share > TUNING.fit.good
         here = ground.moved(here, better) if near else ground.linearised(better)
-    return here, _gain(here, _undamped(here, ground.bounds)) < TUNING.fit.gain
+    return here, abs(_gain(here, _undamped(here, ground.bounds))) < TUNING.fit.gain
 
 
 def _undamped(here: Place, bounds: Bounds) -> Array:

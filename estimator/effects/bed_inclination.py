@@ -27,6 +27,7 @@ class BedInclination(Effect):
     )
 
     stage = "testbed"
+    course = ("position",)
     fingerprint = Fingerprint(
         "sinkage", "position", "sinkage drifts along the bed; drawbar pull off by a share of load"
     )

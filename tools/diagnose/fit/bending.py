@@ -9,7 +9,9 @@ with one h for all channels: the strength itself varies smoothly with the condit
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
-begins: soil has to move first. A ripple may also have other harmonics. What the parameters of the
+begins: soil has to move first. A ripple may also have other harmonics. Where no law says how an
+effect goes, as a zero creeps with time or a surface rises and falls along the bed, our formula is
+but one course of many: it may have another, of up to twice its size. What the parameters of the
 model's effects can do is taken out of all this, so that a strength is what its effect does on the
 whole. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the
 best one to name an effect by, but the soil is never told as if it were exact: where the soil can
@@ -18,12 +20,15 @@ absorb most of an effect, another form of it changes the soil and hardly the fit
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from gritd.estimator.effects.base import Effect
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
-from gritd.tools.diagnose.fit.functions import shares
+from gritd.tools.diagnose.fit.functions import along, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -40,13 +45,18 @@ def bending_sizes() -> Sizes:
 
 
 def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
-    """One for each effect of a fit that changes anything."""
+    """Of each effect of a fit that changes anything: its other courses, and its other forms."""
     freedoms = []
     functions = shares(stack, np.ones(stack.size, bool))
 
     for number, effect in enumerate(fitted.acting):
         added = _added(stack, fitted, number)
         if np.any(added):
+            # first, as the narrower: other forms can imitate them
+            for courses in _courses(stack, effect, _where_most(stack, noise, added)):
+                columns = _beside(noise, courses, fitted)
+                freedoms.append(freedom(effect.name, columns, noise, _course_sizes()))
+
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
@@ -56,7 +66,12 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
             freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
+
     return tuple(freedoms)
+
+
+def _course_sizes() -> Sizes:
+    return Sizes(TUNING.fit.course_sizes, TUNING.fit.course_prior)
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
@@ -82,6 +97,26 @@ def _following(stack: Stack, added: Array) -> Array:
         share = -np.expm1(-turned / arc)
         columns += [followed(added, share, group) - added, -added * np.exp(-rolled / arc)]
     return np.column_stack(columns)
+
+
+def _courses(stack: Stack, effect: Effect, added: Array) -> Iterator[Array]:
+    """Other courses (N, m) of what an effect adds to a channel, over each covariate along which no
+    law says how it goes. A zero is off by as much whatever is measured.
+    """
+    if effect.stage in EXACT:
+        acting = added != 0.0
+        added = np.sqrt(np.mean(added[acting] ** 2)) * acting
+    for covariate in effect.course:
+        columns = along(stack, covariate)
+        if columns.shape[1]:
+            yield added[:, None] * columns / np.sqrt(columns.shape[1])
+
+
+def _where_most(stack: Stack, noise: Noise, added: Array) -> Array:
+    """What an effect adds (N,) to the channel in which it stands out most; else 0."""
+    whitened = whiten(noise, added[:, None])[:, 0]
+    shown = {c: float(np.sum(whitened[stack.of(c)] ** 2)) for c in stack.rig.channels}
+    return np.where(stack.of(max(shown, key=lambda c: shown[c])), added, 0.0)
 
 
 def _beside(noise: Noise, columns: Array, fitted: Fitted) -> Array:

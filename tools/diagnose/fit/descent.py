@@ -75,6 +75,12 @@ class Ground(Protocol[Linearised, Tried]):
     @property
     def bounds(self) -> Bounds: ...
 
+    @property
+    def curved(self) -> Bools:
+        """Coordinates (n,) along which the function bends: valleys are curved there, and the other
+        coordinates have to follow.
+        """
+
     def tried(self, centre: Array) -> tuple[Tried, float]:
         """The function at coordinates (n,), not linearised, and its objective [nats]."""
 
@@ -95,16 +101,15 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
             foretold = _gain(here, step)
             if abs(foretold) < TUNING.fit.gain:
                 if again or damping <= TUNING.fit.damping_start:
-                    return here, True
+                    return here, _gain(here, _undamped(here, ground.bounds)) < TUNING.fit.near
                 again, damping = True, TUNING.fit.damping_start  # the damping alone made it small
                 continue
             if foretold < 0.0:  # bounds cut the step into one that loses
                 damping *= TUNING.fit.damping_harder
                 continue
 
-            tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
-            share = (here.nats - nats) / foretold
-            if np.isfinite(nats) and share > TUNING.fit.fulfilled:
+            tried, share, bent = _attempt(ground, here, step, foretold)
+            if share > TUNING.fit.fulfilled:
                 better, again = tried, False
                 damping = max(
                     damping * (TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0),
@@ -115,9 +120,27 @@ def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here
 
         if better is None:
             return here, False
-        near = foretold < TUNING.fit.near and share > TUNING.fit.good
+        near = foretold < TUNING.fit.near and not bent
         here = ground.moved(here, better) if near else ground.linearised(better)
     return here, abs(_gain(here, _undamped(here, ground.bounds))) < TUNING.fit.gain
+
+
+def _attempt(
+    ground: Ground[Here, Tried], here: Here, step: Array, foretold: float
+) -> tuple[Tried, float, bool]:
+    """Where a step (n,) leads, its share of the gain foretold [nats], and whether the step alone
+    misses it because the valley is curved: then all that is not curved follows what is.
+    """
+    tried, nats = ground.tried(ground.bounds.clipped(here.centre + step))
+    share = (here.nats - nats) / foretold
+    if share > TUNING.fit.good or not np.isfinite(nats) or not ground.curved.any():
+        return tried, share, share <= TUNING.fit.good
+
+    there = ground.moved(here, tried)
+    held = ground.curved | ground.bounds.held(there.centre, there.gradient)
+    follow = bounded_step(there, ground.bounds, held, TUNING.fit.damping_least)
+    beside, lower = ground.tried(ground.bounds.clipped(there.centre + follow))
+    return (beside, (here.nats - lower) / foretold, True) if lower < nats else (tried, share, True)
 
 
 def _undamped(here: Place, bounds: Bounds) -> Array:

@@ -83,6 +83,19 @@ def shares(stack: Stack, own: Bools) -> Array:
     return _scaled(np.column_stack(columns), own, 1.0)
 
 
+def along(stack: Stack, covariate: str) -> Array:
+    """Functions (N, m) of unit size: of time, place or heat cosines, of runs one each; (N, 0) where
+    the covariate does not vary.
+    """
+    if covariate == "run":
+        runs = (stack.run[:, None] == np.arange(len(stack.rig.runs))).astype(float)
+        columns = runs if len(stack.rig.runs) > 1 else runs[:, :0]
+    else:
+        waves = _waves(stack.covariate(covariate))
+        columns = np.zeros((stack.size, 0)) if waves is None else waves
+    return _scaled(columns, np.ones(stack.size, bool), 1.0)
+
+
 def _families(stack: Stack) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Covariates, and functions of them (N, m) while the wheel turns."""
     moving = np.where(stack.covariate("speed") > 0.0, 1.0, 0.0)

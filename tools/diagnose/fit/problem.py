@@ -274,6 +274,8 @@ class Ground:
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
         self.bounds = descent.Bounds(low, high)
+        shapes = [f.parameter.role != "strength" for f in free]
+        self.curved = np.array([False] * self._count + shapes)
 
     def tried(self, centre: Array) -> tuple[Tried, float]:
         """See descent.Ground; constants, then effect parameters (n,)."""

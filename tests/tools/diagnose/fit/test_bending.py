@@ -78,3 +78,38 @@ def test_every_run_and_channel_begins_anew() -> None:
         own = np.flatnonzero(stack.of(channel) & (stack.run == number))
         np.testing.assert_allclose(columns[own[0], 1::2], -1.0)
         np.testing.assert_allclose(columns[own, 0::2], 0.0, atol=1e-12)
+
+
+def _drifting(course: np.ndarray) -> float:
+    """Share of a drift of the drawbar pull's zero, of a course (N,), that is outside the freedom of
+    `sensor_drift`.
+    """
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, effect = problem.stack, EFFECTS["sensor_drift"]
+    free = free_of((effect,))
+    start = np.array([float(f.parameter.name == "drawbar_pull") for f in free])
+    none = np.zeros(len(stack.rig.constants))
+    fitted = problem.descend((effect,), free, none, start, rounds=0)
+
+    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(none) :]])
+    drift = np.where(stack.of("drawbar_pull"), course, 0.0)
+    left = drift - every @ np.linalg.lstsq(every, drift, rcond=None)[0]
+    return float(np.linalg.norm(left) / np.linalg.norm(drift))
+
+
+def test_a_zero_may_creep_in_any_way_and_be_set_anew_before_each_run() -> None:
+    stack = _stack()
+    time = stack.covariate("time")
+    along = (time - time.min()) / np.ptp(time)
+    assert _drifting(np.sin(2.0 * np.pi * along)) < 0.05
+    assert _drifting(np.cos(stack.run.astype(float))) < 1e-6
+    assert _drifting(np.sin(50.0 * np.pi * along)) > 0.9
+
+
+def test_only_effects_without_a_law_for_their_course_have_others() -> None:
+    courses = {name: effect.course for name, effect in EFFECTS.items() if effect.course}
+    assert courses["sensor_drift"] == ("time", "run")
+    known = {"time", "run", "position"}
+    assert all(set(course) <= known for course in courses.values())
+    assert not {"coulomb_friction", "motor_heating", "grousers"} & set(courses)

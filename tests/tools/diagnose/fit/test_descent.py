@@ -26,6 +26,8 @@ class _Place:
 class _Bowl:
     """½ |A x − b|² in nats, with unknowns that can hardly be told apart."""
 
+    curved = np.zeros(UNKNOWNS, bool)
+
     def __init__(self, rng: np.random.Generator) -> None:
         directions = np.linalg.qr(rng.standard_normal((UNKNOWNS, UNKNOWNS)))[0]
         self.a = directions * np.geomspace(1.0, 300.0, UNKNOWNS) @ directions.T
@@ -54,3 +56,57 @@ def test_a_converged_descent_ends_at_the_optimum_within_the_bounds(seed: int) ->
     reached, converged = descend(bowl, start, 200)
     assert converged
     assert reached.nats == pytest.approx(bowl.least(), abs=0.5)
+
+
+class _Bend:
+    """½ |r|² of Rosenbrock's valley: a strength that has to follow a curve of a shape.
+
+    steep: of the valley's flanks.
+    """
+
+    bounds = Bounds(np.full(2, -20.0), np.full(2, 20.0))
+
+    def __init__(self, told: bool, steep: float = 10.0) -> None:
+        """told: whether the descent knows along which unknown the valley is curved."""
+        self.curved = np.array([False, told])
+        self.steep = steep
+        self.linearisations = 0
+
+    def _residual(self, centre: Array) -> Array:
+        strength, shape = centre
+        return np.array([self.steep * (strength - shape**2), 1.0 - shape])
+
+    def tried(self, centre: Array) -> tuple[Array, float]:
+        return centre, 0.5 * float(np.sum(self._residual(centre) ** 2))
+
+    def linearised(self, tried: Array) -> _Place:
+        self.linearisations += 1
+        return self._place(tried, tried)
+
+    def moved(self, here: _Place, tried: Array) -> _Place:
+        return self._place(here.centre, tried)
+
+    def _place(self, slopes_at: Array, centre: Array) -> _Place:
+        slopes = np.array([[self.steep, -2.0 * self.steep * slopes_at[1]], [0.0, -1.0]])
+        gradient = slopes.T @ self._residual(centre)
+        return _Place(centre, self.tried(centre)[1], gradient, slopes.T @ slopes)
+
+
+def _rounds(told: bool, start: float) -> int:
+    bend = _Bend(told)
+    reached, converged = descend(bend, bend.linearised(np.array([start**2, start])), 300)
+    assert converged and reached.nats < 0.01
+    return bend.linearisations
+
+
+@pytest.mark.parametrize("start", [-2.0, -1.0, 3.0])
+def test_in_a_curved_valley_a_strength_follows_the_shape(start: float) -> None:
+    """Where the descent knows what is curved, it needs fewer linearisations."""
+    assert _rounds(True, start) < _rounds(False, start)
+
+
+def test_a_descent_that_finds_no_way_out_of_a_narrow_valley_says_so() -> None:
+    bend = _Bend(False, steep=300.0)
+    reached, converged = descend(bend, bend.linearised(np.array([9.0, 3.0])), 300)
+    assert reached.nats > 1.0
+    assert not converged

@@ -59,9 +59,11 @@ def _weighed(signals: Signals, noise: float, rng: np.random.Generator) -> Signal
     return replace(signals, info=info, analogue={**signals.analogue, "load": load})
 
 
-def test_slow_noise_of_the_measured_load_raises_no_alarm() -> None:
-    rng = np.random.default_rng(3)
-    runs = [_weighed(s, 3.0, rng) for s in record(plan(loads=(20.0, 35.0, 100.0)), [])]
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_slow_noise_of_the_measured_load_raises_no_alarm(seed: int) -> None:
+    """Of up to 8 % of the smallest load. Without the errors of the load all three alarm."""
+    rng = np.random.default_rng(seed)
+    runs = [_weighed(s, 1.5, rng) for s in record(plan(loads=(20.0, 35.0, 100.0)), [])]
     rig = WheelRig(runs, settings())
     assert "load" not in rig.channels
 

@@ -75,10 +75,11 @@ def _course_sizes() -> Sizes:
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
-    """Prediction with an effect less that without it (N,)."""
+    """Prediction with an effect less that without it (N,); 0 where the others alone run away."""
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)
-    return fitted.predicted - stack.predict(fitted.u, others)
+    added = fitted.predicted - stack.predict(fitted.u, others)
+    return added if np.isfinite(added).all() else np.zeros_like(added)
 
 
 def _following(stack: Stack, added: Array) -> Array:

@@ -113,3 +113,21 @@ def test_only_effects_without_a_law_for_their_course_have_others() -> None:
     known = {"time", "run", "position"}
     assert all(set(course) <= known for course in courses.values())
     assert not {"coulomb_friction", "motor_heating", "grousers"} & set(courses)
+
+
+def test_an_effect_beside_others_that_run_away_has_no_other_forms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The prediction without it is no number, and says nothing of what it adds."""
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, effects = problem.stack, (EFFECTS["bulldozing"], EFFECTS["motor_heating"])
+    free = free_of(effects)
+    none = np.zeros(len(stack.rig.constants))
+    fitted = problem.descend(effects, free, none, np.ones(len(free)), rounds=0)
+    assert {f.name for f in bending_freedoms(stack, problem.noise, fitted)} == {
+        "bulldozing",
+        "motor_heating",
+    }
+
+    monkeypatch.setattr(Stack, "predict", lambda *_: np.full(stack.size, np.nan))
+    assert not bending_freedoms(stack, problem.noise, fitted)

@@ -134,7 +134,7 @@ class Effect:
     by_run: ClassVar[bool] = False
     # the load stage needs a predicted sinkage: the balance is solved twice
     needs_sinkage: ClassVar[bool] = False
-    # covariates over which no law says how strong the effect is: the formula is one course of many
+    # covariates over which no law says how a zero goes: the formula is one course of many
     course: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:

@@ -27,7 +27,6 @@ class BedInclination(Effect):
     )
 
     stage = "testbed"
-    course = ("position",)
     fingerprint = Fingerprint(
         "sinkage", "position", "sinkage drifts along the bed; drawbar pull off by a share of load"
     )

@@ -23,7 +23,6 @@ class BedSlope(Effect):
     angle: float = strength("slope, uphill positive, α", "rad", typical=0.02, low=-0.35, high=0.35)
 
     stage = "testbed"
-    course = ("position",)
     fingerprint = Fingerprint(
         "drawbar_pull", "load", "drawbar pull lower by a fixed share of the load, either way driven"
     )

@@ -23,7 +23,6 @@ class SideWallRubbing(Effect):
     share: float = strength("pull lost over load, s", "", typical=0.04, low=0.0, high=1.0)
 
     stage = "testbed"
-    course = ("position",)
     fingerprint = Fingerprint(
         "drawbar_pull", "load", "drawbar pull lost in proportion to load, always against travel"
     )

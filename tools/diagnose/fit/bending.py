@@ -9,9 +9,9 @@ with one h for all channels: the strength itself varies smoothly with the condit
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
-begins: soil has to move first. A ripple may also have other harmonics. Where no law says how an
-effect goes, as a zero creeps with time or a surface rises and falls along the bed, our formula is
-but one course of many: it may have another, of up to twice its size. What the parameters of the
+begins: soil has to move first. A ripple may also have other harmonics. No law says how a zero
+creeps, or how it is set before each run: our formula is but one course of many, and it may have
+another, of up to twice its size. What the parameters of the
 model's effects can do is taken out of all this, so that a strength is what its effect does on the
 whole. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the
 best one to name an effect by, but the soil is never told as if it were exact: where the soil can
@@ -101,16 +101,15 @@ def _following(stack: Stack, added: Array) -> Array:
 
 
 def _courses(stack: Stack, effect: Effect, added: Array) -> Iterator[Array]:
-    """Other courses (N, m) of what an effect adds to a channel, over each covariate along which no
-    law says how it goes. A zero is off by as much whatever is measured.
+    """Other courses (N, m) of a zero that adds so much (N,) to a channel, over each covariate along
+    which no law says how it goes. It is off by as much whatever is measured.
     """
-    if effect.stage in EXACT:
-        acting = added != 0.0
-        added = np.sqrt(np.mean(added[acting] ** 2)) * acting
+    acting = added != 0.0
+    size = np.sqrt(np.mean(added**2, where=acting)) if acting.any() else 0.0
     for covariate in effect.course:
         columns = along(stack, covariate)
         if columns.shape[1]:
-            yield added[:, None] * columns / np.sqrt(columns.shape[1])
+            yield size * acting[:, None] * columns / np.sqrt(columns.shape[1])
 
 
 def _where_most(stack: Stack, noise: Noise, added: Array) -> Array:

@@ -107,12 +107,10 @@ def test_a_zero_may_creep_in_any_way_and_be_set_anew_before_each_run() -> None:
     assert _drifting(np.sin(50.0 * np.pi * along)) > 0.9
 
 
-def test_only_effects_without_a_law_for_their_course_have_others() -> None:
+def test_only_zeros_have_other_courses() -> None:
     courses = {name: effect.course for name, effect in EFFECTS.items() if effect.course}
-    assert courses["sensor_drift"] == ("time", "run")
-    known = {"time", "run", "position"}
-    assert all(set(course) <= known for course in courses.values())
-    assert not {"coulomb_friction", "motor_heating", "grousers"} & set(courses)
+    assert courses == {"sensor_drift": ("time", "run"), "sinkage_datum": ("run",)}
+    assert all(EFFECTS[name].stage == "sensor" for name in courses)
 
 
 def test_an_effect_beside_others_that_run_away_has_no_other_forms(

@@ -116,8 +116,12 @@ def test_every_reading_arrives_as_it_was_sent(bus, tmp_path):
     with Rig(TESTBED.settings, bus) as rig:
         path = rig_config.write(TESTBED, rig.devices, "linear", tmp_path)
         with Daemon(path) as daemon:
+            begin = time.monotonic_ns() - readings[0].stamp
             for start in range(0, len(readings), 30):  # no faster than the wires' buffers
-                for reading in readings[start : start + 30]:
+                part = readings[start : start + 30]
+                # nor than the devices: a device whose clock runs ahead of ours is not believed
+                assert wait_until(lambda last=part[-1]: time.monotonic_ns() - begin >= last.stamp)
+                for reading in part:
                     rig.send(reading)
                 assert wait_until(lambda goal=start + 30: daemon.take() >= min(goal, len(readings)))
         assert not any(rig.lost.values())

@@ -53,7 +53,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
         added = _added(stack, fitted, number)
         if np.any(added):
             # first, as the narrower: other forms can imitate them
-            for courses in _courses(stack, effect, _where_most(stack, noise, added)):
+            for courses in _courses(stack, noise, effect, added):
                 columns = _beside(noise, courses, fitted)
                 freedoms.append(freedom(effect.name, columns, noise, _course_sizes()))
 
@@ -100,12 +100,16 @@ def _following(stack: Stack, added: Array) -> Array:
     return np.column_stack(columns)
 
 
-def _courses(stack: Stack, effect: Effect, added: Array) -> Iterator[Array]:
-    """Other courses (N, m) of a zero that adds so much (N,) to a channel, over each covariate along
-    which no law says how it goes. It is off by as much whatever is measured.
+def _courses(stack: Stack, noise: Noise, effect: Effect, added: Array) -> Iterator[Array]:
+    """Other courses (N, m) of a zero that adds so much (N,), in the channel where it stands out
+    most, over each covariate along which no law says how it goes. It is off by as much whatever is
+    measured.
     """
-    acting = added != 0.0
-    size = np.sqrt(np.mean(added**2, where=acting)) if acting.any() else 0.0
+    if not effect.course:
+        return
+    own = _where_most(stack, noise, added)
+    acting = own != 0.0
+    size = np.sqrt(np.mean(own**2, where=acting)) if acting.any() else 0.0
     for covariate in effect.course:
         columns = along(stack, covariate)
         if columns.shape[1]:

@@ -2,8 +2,9 @@
 
 Levenberg (1944) and Marquardt (1963) with the curvature of least squares; a coordinate whose
 gradient points out of its bounds is held there (active set, Bertsekas 1982, SIAM J. Control
-Optim. 20, 221-246). The descent ends where the undamped step would gain next to nothing, so a fit
-that says `converged` stands at an optimum and not where the rounds ran out.
+Optim. 20, 221-246). The descent ends where the undamped step would gain next to nothing, by the
+slopes of the very place, so a fit that says `converged` stands at an optimum and not where the
+rounds ran out.
 """
 
 from __future__ import annotations
@@ -93,40 +94,44 @@ class Ground(Protocol[Linearised, Tried]):
 def descend(ground: Ground[Here, Tried], start: Here, rounds: int) -> tuple[Here, bool]:
     """The optimum that is reached from a start in so many linearisations; whether it is one."""
     here, damping, again = start, TUNING.fit.damping_start, False
+    unsure: Tried | None = None  # here, if its slopes are those of a place before
+
     for _ in range(rounds):
-        held = ground.bounds.held(here.centre, here.gradient)
-        better = None
+        held, better = ground.bounds.held(here.centre, here.gradient), None
         while better is None and damping < TUNING.fit.damping_most:
             step = bounded_step(here, ground.bounds, held, damping)
             foretold = _gain(here, step)
-            if abs(foretold) < TUNING.fit.gain:
-                if again or damping <= TUNING.fit.damping_start:
-                    return here, _gain(here, _undamped(here, ground.bounds)) < TUNING.fit.near
-                again, damping = True, TUNING.fit.damping_start  # the damping alone made it small
-                continue
-            if foretold < 0.0:  # bounds cut the step into one that loses
-                damping *= TUNING.fit.damping_harder
-                continue
+            small = abs(foretold) < TUNING.fit.gain
 
-            tried, share, bent = _attempt(ground, here, step, foretold)
+            tried, share, bent = None, 0.0, False
+            if not small and foretold > 0.0:  # bounds may cut a step into one that loses
+                tried, share, bent = _attempt(ground, here, step, foretold, damping)
+
             if share > TUNING.fit.fulfilled:
                 better, again = tried, False
-                damping = max(
-                    damping * (TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0),
-                    TUNING.fit.damping_least,
-                )
-            else:
+                softer = TUNING.fit.damping_softer if share > TUNING.fit.good else 1.0
+                damping = max(damping * softer, TUNING.fit.damping_least)
+            elif small and unsure is not None:
+                here, unsure = ground.linearised(unsure), None
+                held = ground.bounds.held(here.centre, here.gradient)
+                damping = TUNING.fit.damping_start
+            elif not small:
                 damping *= TUNING.fit.damping_harder
+            elif again or abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.flat:
+                return here, _undamped_gain(here, ground.bounds) < TUNING.fit.near
+            else:
+                again, damping = True, TUNING.fit.damping_least  # the damping alone made it small
 
         if better is None:
             return here, False
         near = foretold < TUNING.fit.near and not bent
         here = ground.moved(here, better) if near else ground.linearised(better)
-    return here, abs(_gain(here, _undamped(here, ground.bounds))) < TUNING.fit.gain
+        unsure = better if near else None
+    return here, abs(_undamped_gain(here, ground.bounds)) < TUNING.fit.gain
 
 
 def _attempt(
-    ground: Ground[Here, Tried], here: Here, step: Array, foretold: float
+    ground: Ground[Here, Tried], here: Here, step: Array, foretold: float, damping: float
 ) -> tuple[Tried, float, bool]:
     """Where a step (n,) leads, its share of the gain foretold [nats], and whether the step alone
     misses it because the valley is curved: then all that is not curved follows what is.
@@ -138,15 +143,15 @@ def _attempt(
 
     there = ground.moved(here, tried)
     held = ground.curved | ground.bounds.held(there.centre, there.gradient)
-    follow = bounded_step(there, ground.bounds, held, TUNING.fit.damping_least)
+    follow = bounded_step(there, ground.bounds, held, damping)
     beside, lower = ground.tried(ground.bounds.clipped(there.centre + follow))
     return (beside, (here.nats - lower) / foretold, True) if lower < nats else (tried, share, True)
 
 
-def _undamped(here: Place, bounds: Bounds) -> Array:
-    return bounded_step(
-        here, bounds, bounds.held(here.centre, here.gradient), TUNING.fit.damping_least
-    )
+def _undamped_gain(here: Place, bounds: Bounds) -> float:
+    """What the step without damping would gain by the linearised function [nats]."""
+    held = bounds.held(here.centre, here.gradient)
+    return _gain(here, bounded_step(here, bounds, held, TUNING.fit.damping_least))
 
 
 def _gain(here: Place, step: Array) -> float:

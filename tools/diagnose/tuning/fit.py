@@ -48,6 +48,11 @@ class Fit:
 
     # --- descent.py ---
     gain: float = tuned(0.005, "nats", "a step that would gain less ends the descent")
+    flat: float = tuned(
+        0.1,
+        "nats",
+        "a step that would gain more without its damping is tried before a descent ends",
+    )
     near: float = tuned(1.0, "nats", "a good step that gains less leaves the slopes as they are")
     damping_start: float = tuned(1e-3, "-", "of the curvature: first damping")
     damping_least: float = tuned(1e-7, "-", "of the curvature")

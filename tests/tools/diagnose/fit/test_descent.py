@@ -105,8 +105,55 @@ def test_in_a_curved_valley_a_strength_follows_the_shape(start: float) -> None:
     assert _rounds(True, start) < _rounds(False, start)
 
 
-def test_a_descent_that_finds_no_way_out_of_a_narrow_valley_says_so() -> None:
-    bend = _Bend(False, steep=300.0)
+@pytest.mark.parametrize("steep", [30.0, 100.0, 300.0, 1000.0])
+def test_in_a_narrow_valley_a_converged_descent_is_near_the_optimum(steep: float) -> None:
+    """Also one that does not know what is curved: every step along the valley leaves it."""
+    bend = _Bend(False, steep)
     reached, converged = descend(bend, bend.linearised(np.array([9.0, 3.0])), 300)
-    assert reached.nats > 1.0
-    assert not converged
+    assert reached.nats < 0.5
+    assert converged
+
+
+@pytest.mark.parametrize("shape", [1.5, 1.9, 2.0])
+def test_a_gain_that_damping_hides_is_taken(shape: float) -> None:
+    """Along the valley a damped step is short: it foretells next to nothing, the undamped more."""
+    bend = _Bend(True, steep=100.0)
+    start = bend.linearised(np.array([shape**2, shape]))
+    assert start.nats > 0.1
+    reached, converged = descend(bend, start, 300)
+    assert converged
+    assert reached.nats < 0.01
+
+
+class _Hidden:
+    """½ |r|² of r = (x − ½, 1 − x y, y/100): at x = 0 nothing shows that y could gain."""
+
+    curved = np.zeros(2, bool)
+    bounds = Bounds(np.full(2, -20.0), np.full(2, 20.0))
+
+    def tried(self, centre: Array) -> tuple[Array, float]:
+        return centre, 0.5 * float(np.sum(self._residual(centre) ** 2))
+
+    def _residual(self, centre: Array) -> Array:
+        x, y = centre
+        return np.array([x - 0.5, 1.0 - x * y, 0.01 * y])
+
+    def linearised(self, tried: Array) -> _Place:
+        return self._place(tried, tried)
+
+    def moved(self, here: _Place, tried: Array) -> _Place:
+        return self._place(here.centre, tried)
+
+    def _place(self, slopes_at: Array, centre: Array) -> _Place:
+        x, y = slopes_at
+        slopes = np.array([[1.0, 0.0], [-y, -x], [0.0, 0.01]])
+        gradient = slopes.T @ self._residual(centre)
+        return _Place(centre, self.tried(centre)[1], gradient, slopes.T @ slopes)
+
+
+def test_a_descent_ends_by_the_slopes_of_the_place_where_it_ends() -> None:
+    """A small step keeps the slopes of its start, which say that nothing is left to gain."""
+    hidden = _Hidden()
+    reached, converged = descend(hidden, hidden.linearised(np.zeros(2)), 30)
+    assert converged
+    assert reached.nats < 0.01

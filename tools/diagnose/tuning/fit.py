@@ -69,7 +69,7 @@ class Fit:
         FORM_SIZES, "-", "of a channel's size: what a model of a wheel in soil misses", PUBLISHED
     )
     form_prior: tuple[float, ...] = tuned(
-        FORM_PRIOR, "prior", "probability of each: half of it lies at 5 to 20 %", PUBLISHED
+        FORM_PRIOR, "prior", "probability of each: half of it is at 3 and 10 %", PUBLISHED
     )
     drive_sizes: tuple[float, ...] = tuned(
         DRIVE_SIZES, "-", "of a channel's size: what a model of a drive misses"

@@ -30,6 +30,7 @@ from gritd.tools.diagnose.screen.scans import Family, candidates, families, with
 from gritd.tools.diagnose.screen.screen import (
     Screen,
     screen_signatures,
+    some_of,
     tail_chance,
     whitened,
 )
@@ -187,17 +188,20 @@ def _strains(problem: Problem, model: Model) -> Iterator[Signature]:
 
 def _open(screening: Screening, model: Model, screen: Screen) -> float:
     """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
-    the search.
+    the search. What surprises most with one colour need not be what slow noise cannot be, so all
+    are weighed.
     """
     chosen = _standing_out(screening, model, screen)
     if not chosen:
         return np.inf
 
-    weighed, most = OpenNoise(screening.problem, model.fitted, chosen), -np.inf
-    for number in range(len(chosen)):
-        most = max(most, weighed.gain(number))
-        if most > TUNING.screen.sure:
-            break
+    most = -np.inf
+    for some in some_of(chosen):
+        weighed = OpenNoise(screening.problem, model.fitted, some)
+        for number in range(len(some)):
+            most = max(most, weighed.gain(number))
+            if most > TUNING.screen.sure:
+                return most
     return most
 
 
@@ -219,17 +223,14 @@ def _covered(screening: Screening) -> float:
 
 
 def _standing_out(screening: Screening, model: Model, screen: Screen) -> list[Signature]:
-    """The most surprising candidates, each as it is likeliest."""
+    """The candidates that stand out, the most surprising first, each as it is likeliest."""
     every = {**screen.best, **_peaks(screening, model, screen)}
-    return [every[of] for of in _most_surprising(screen) if of in every]
+    return [every[of] for of in screen.stands_out if of in every]
 
 
 def _peaks(screening: Screening, model: Model, screen: Screen) -> dict[Candidate, Signature]:
-    """Of the waves and steps among these each where it is likeliest."""
-    searched = [f for f in screening.families if f.shape in _most_surprising(screen)]
+    """Of the waves and steps that stand out each where it is likeliest."""
+    outstanding = set(screen.stands_out)
+    searched = [f for f in screening.families if f.shape in outstanding]
     peaks = candidates(searched, screening.problem, model.fitted)
     return {s.shape.family: s for s in reversed(peaks)}
-
-
-def _most_surprising(screen: Screen) -> list[Candidate]:
-    return screen.stands_out[: TUNING.screen.weighed]

@@ -34,13 +34,10 @@ class Screen:
     counted: float = tuned(10.0, "nulls", "that must reach a value for its chance to be counted")
     trusted_tail: float = tuned(0.1, "-", "of the least chance that can be counted", TAIL)
 
-    at_once: int = tuned(12, "signatures", "whitened and projected at once", "memory")
+    at_once: int = tuned(12, "signatures", "whitened and projected, or weighed, at once", "memory")
 
     # --- screening.py ---
     nulls: int = tuned(300, "draws", "of noise alone", "run time")
-    weighed: int = tuned(
-        6, "candidates", "whose evidence is weighed with the noise's colour open", "run time"
-    )
     strained: float = tuned(3.0, "σ", "expected size of a constant's error that was not foreseen")
 
     # --- ripples.py ---

@@ -4,7 +4,7 @@ not.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +13,11 @@ from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import make
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import Signature
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen import screening as module
 from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, begin
@@ -90,6 +93,26 @@ def test_a_loss_of_the_drive_that_is_read_off_stands_out_too() -> None:
     friction = search.first.best["coulomb_friction"]
     gain = OpenNoise(search.problem, search.base.fitted, [friction]).gain(0)
     assert gain > 20.0 * TUNING.screen.sure
+
+
+def test_what_no_slow_noise_can_be_counts_wherever_it_ranks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With the colour assumed many candidates stand out further than what slow noise cannot be."""
+    search = begun(plan(), "coulomb_friction", axle=False)
+    screening, model, screen = search.screening, search.base, search.first
+    last = [of for of in screen.stands_out if of in screen.best][-1]
+    assert len(screen.stands_out) > 2 * TUNING.screen.at_once
+
+    class _Open:
+        def __init__(self, problem: Problem, fitted: Fitted, some: Sequence[Signature]) -> None:
+            self._of = [s.of for s in some]
+
+        def gain(self, number: int) -> float:
+            return 100.0 if self._of[number] == last else 1.0
+
+    monkeypatch.setattr(module, "OpenNoise", _Open)
+    assert module._open(screening, model, screen) == 100.0
 
 
 def test_products_of_very_quiet_recordings_keep_their_root() -> None:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gritd
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.fit.shared import rippling_columns
 from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.rig.adapter import rig_of as recorded_rig
 from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.full_rate import beside_lines, restored
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
@@ -37,6 +41,14 @@ def test_no_campaign_with_nothing_in_it_has_a_line() -> None:
         signals, full = zip(*made, strict=True)
         reads = [lambda read=read: read for read in full]
         assert beside_lines(signals, reads, 1.0)[1].every == (), seed
+
+
+def test_steps_of_the_load_are_no_ripple(tmp_path: Path) -> None:
+    """The packaged schedule changes the load while the wheel drives on, alike in every run."""
+    paths = [tmp_path / f"run-{seed}.mcap" for seed in (11, 12, 13)]
+    for seed, path in zip((11, 12, 13), paths, strict=True):
+        gritd.simulate(seed=seed).write(path)
+    assert recorded_rig(read_all(paths), settings())[0].lines.every == ()
 
 
 @pytest.mark.parametrize("order", [37.0, 73.0])

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
@@ -98,6 +99,7 @@ class Motion:
     time: Array  # [s]
     wheel_speed: Array  # [rad/s]
     carriage_speed: Array  # in any unit
+    load: Array | None = None  # as measured, in any unit
 
 
 def steady_samples(
@@ -136,7 +138,7 @@ def stretches(motion: Motion) -> tuple[Array, Array]:
 
 
 def _steady(motion: Motion) -> NDArray[np.bool_]:
-    """(n,) the wheel drives one way, settled, and no speed changes."""
+    """(n,) the wheel drives one way, settled, and neither a speed nor the load changes."""
     speed, step = motion.wheel_speed, float(np.median(np.diff(motion.time)))
     known = np.isfinite(speed) & np.isfinite(motion.carriage_speed)
     moving = np.abs(speed[known & (np.abs(speed) > 0.0)])
@@ -146,14 +148,22 @@ def _steady(motion: Motion) -> NDArray[np.bool_]:
     way = np.where(driving, np.sign(np.nan_to_num(speed)), 0.0)
     turned = np.diff(way, prepend=way[:1]) != 0.0
     ramp = _changes(speed, step) | _changes(motion.carriage_speed, step)
+    if motion.load is not None:
+        ramp |= _changes(_without_pulses(motion.load, step), step)
     settling = round(TUNING.orders.settled / step)
     return driving & ~_widened(turned, settling) & ~ramp
 
 
-def _changes(speed: Array, step: float) -> NDArray[np.bool_]:
-    """(n,) a speed changes by more than its noise about here."""
+def _without_pulses(load: Array, step: float) -> Array:
+    """A load (n,) whose steps stay and whose ripples and pulses are gone."""
+    width = 2 * round(0.5 * TUNING.orders.shortest / step) + 1
+    return np.asarray(median_filter(np.nan_to_num(load), size=width, mode="nearest"))
+
+
+def _changes(held: Array, step: float) -> NDArray[np.bool_]:
+    """(n,) a speed or a load changes by more than its noise about here."""
     reach = max(round(TUNING.orders.apart / step), 1)
-    known = np.nan_to_num(speed)
+    known = np.nan_to_num(held)
     change = (
         np.abs(known[2 * reach :] - known[: -2 * reach]) if known.size > 2 * reach else known[:0]
     )

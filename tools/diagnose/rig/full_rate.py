@@ -94,7 +94,8 @@ def aligned(signals: Sequence[Signals], line: Line | None) -> list[Signals]:
 
 
 def _motion(signals: Signals) -> Motion:
-    return Motion(signals.time, signals.wheel_speed, signals.carriage_rate)
+    load = signals.analogue.get("load")
+    return Motion(signals.time, signals.wheel_speed, signals.carriage_rate, load)
 
 
 def _since(signals: Signals, read: Series) -> Series:

@@ -18,9 +18,9 @@ class Orders:
     # --- stretches.py ---
     creep: float = tuned(0.05, "-", "of the usual speed: a slower wheel does not drive")
     settled: float = tuned(0.5, "s", "after a start and before a stop nothing is steady")
-    changed: float = tuned(0.02, "-", "relative change of a speed within `apart`: a ramp")
-    apart: float = tuned(0.3, "s", "over which a change of speed is looked for")
-    change_noise: float = tuned(5.0, "σ", "of the speeds' own noise: less is no ramp")
+    changed: float = tuned(0.02, "-", "relative change of a speed or load within `apart`: a ramp")
+    apart: float = tuned(0.3, "s", "over which a change of speed or load is looked for")
+    change_noise: float = tuned(5.0, "σ", "of their own noise: less is no ramp")
     shortest: float = tuned(1.0, "s", "a shorter stretch is not used")
     most_samples: int = tuned(1_500_000, "samples", "of a channel in all runs", "memory")
     longest_seconds: float = tuned(300.0, "s", "likewise", "memory")

@@ -327,6 +327,10 @@ def _runs(stack: Stack, residual: Array, own: Bools, places: Sequence[float], sa
             f"{span} {say(float(residual[inside].mean()))}, in the other runs {_brief(say(rest))}"
         )
 
+    levels = np.array(list(means.values()))
+    if levels.size > 1 and np.ptp(levels) < TUNING.explain.means_alike * np.abs(levels).min():
+        return f"in all runs {say(float(levels.mean()))}"
+
     told = list(names)
     if len(told) > TUNING.explain.runs_named:
         told = sorted(sorted(told, key=lambda n: -abs(means[n]))[: TUNING.explain.runs_far_named])

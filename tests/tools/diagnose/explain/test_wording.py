@@ -1,0 +1,32 @@
+"""What a misfit is told to be, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gritd.tools.diagnose.explain.wording import sentence
+from gritd.tools.diagnose.fit.shape import Shape
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan
+
+BY_RUN = Shape("torque", ("run",), "smooth")
+
+
+@pytest.fixture(scope="module")
+def stack() -> Stack:
+    drawn = plan(standstill=False)
+    return Stack(WheelRig(record(drawn, []), drawn.settings))
+
+
+def test_a_misfit_that_is_one_in_every_run_is_told_once(stack: Stack) -> None:
+    told = sentence(stack, np.full(stack.size, 0.5), BY_RUN, (), 0.99)
+    assert told.startswith("Torque, in all runs 0.50 N·m more than the model")
+
+
+def test_one_that_differs_from_run_to_run_is_told_of_each(stack: Stack) -> None:
+    told = sentence(stack, 0.1 * (1.0 + stack.run), BY_RUN, (), 0.99)
+    assert "from run to run" in told
+    assert "0.10 N·m more" in told and "0.30 N·m more" in told

@@ -134,8 +134,8 @@ class Effect:
     by_run: ClassVar[bool] = False
     # the load stage needs a predicted sinkage: the balance is solved twice
     needs_sinkage: ClassVar[bool] = False
-    # covariates over which no law says how a zero goes: the formula is one course of many
-    course: ClassVar[tuple[str, ...]] = ()
+    # covariates over which no law says how a zero changes: there it may follow any smooth function
+    free_along: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]

@@ -39,7 +39,7 @@ class SensorDrift(Effect):
     )
 
     stage = "sensor"
-    course = ("time", "run")
+    free_along = ("time", "run")
     fingerprint = Fingerprint(
         "drawbar_pull", "time", "one channel's zero moves, at rest and in the air too"
     )

@@ -23,7 +23,7 @@ class SinkageDatum(Effect):
     )
 
     stage = "sensor"
-    course = ("run",)
+    free_along = ("run",)
     fingerprint = Fingerprint(
         "sinkage", "constant", "sinkage off by the same amount everywhere, also when lifted"
     )

@@ -17,6 +17,7 @@ from gritd.tools.diagnose.explain.result import (
 from gritd.tools.report.words import quantity
 
 SHOWN = 4  # places and hypotheses
+DIGITS = 2  # of a probability
 NAMES = {"c": "c", "tan_phi": "tan φ"}
 
 
@@ -26,7 +27,7 @@ def text(diagnosis: Diagnosis) -> str:
         f"verdict: {diagnosis.verdict}",
         diagnosis.summary,
         *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:SHOWN]),
-        *map(_hypothesis, diagnosis.hypotheses[:SHOWN]),
+        *(_hypothesis(of) for of in diagnosis.hypotheses[:SHOWN] if _told(of)),
     ]
     if diagnosis.law is not None:
         lines.append(f"  law: {diagnosis.law.expression} (takes {diagnosis.law.share:.0%})")
@@ -41,10 +42,17 @@ def text(diagnosis: Diagnosis) -> str:
     return "\n".join(map(visible, lines))
 
 
+def _told(of: Hypothesis) -> bool:
+    """Whether a hypothesis is accepted, or has a probability in the digits that are printed."""
+    return of.accepted or of.probability >= 0.5 * 10.0**-DIGITS
+
+
 def _hypothesis(of: Hypothesis) -> str:
-    head = f"  {'*' if of.accepted else ' '} {of.effect} {of.probability:.2f}"
+    chance = f"probability {of.probability:.{DIGITS}f}"
+    head = f"  {'accepted' if of.accepted else 'rival'}: {of.effect}, {chance}"
     values = ", ".join(f"{name} {quantity(q)}" for name, q in of.parameters.items())
-    alike = f"; like {', '.join(of.indistinguishable_from)}" if of.indistinguishable_from else ""
+    others = of.indistinguishable_from
+    alike = f"; cannot be told apart from {', '.join(others)}" if others else ""
     return f"{head}{f': {values}' if values else ''}{alike}"
 
 

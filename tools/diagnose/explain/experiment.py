@@ -15,42 +15,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS, Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import NextExperiment
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
-from gritd.tools.diagnose.rig.interface import Foreseen
+from gritd.tools.diagnose.rig.interface import Foreseen, Rig
 from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
-
-DRIVEN = (  # by effort
-    "standstill",
-    "reversal",
-    "slip_step",
-    "speed_step",
-    "shifted_start",
-    "second_pass",
-    "load_step",
-    "lifted_spin",
-)
-ALONG = {  # the covariate along which a misfit lives -> what shows its shape
-    "slip": "slip_step",
-    "speed": "speed_step",
-    "acceleration": "speed_step",
-    "load": "load_step",
-    "sinkage": "load_step",
-    "position": "shifted_start",
-    "time": "long_run",
-    "heat": "long_run",
-    "run": "second_pass",
-    "direction": "reversal",
-    "velocity": "reversal",
-    "wheel_angle": "lifted_spin",
-    "constant": "lifted_spin",
-}
 
 
 def next_experiment(search: Search, decision: Decision) -> NextExperiment | None:
@@ -66,7 +39,10 @@ def next_experiment(search: Search, decision: Decision) -> NextExperiment | None
 
 def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
     """What tells most rivals from the first; of equals the least effort."""
-    gains = {key: _told_apart(search, rivals, key) for key in DRIVEN} | _measured(rivals)
+    rig = search.problem.stack.rig
+    gains = {key: _told_apart(search, rivals, key) for key in rig.menu.driven} | _measured(
+        rig, rivals
+    )
     settled = {
         key: sum(gain >= TUNING.explain.gain_enough for gain in each) for key, each in gains.items()
     }
@@ -82,7 +58,7 @@ def _between(search: Search, rivals: list[Model]) -> NextExperiment | None:
         dict.fromkeys(n for m in (rivals[0], *told) for n in m.names if n not in _common(rivals))
     )
 
-    return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(names)
+    return _foretold(key, float(np.mean(gains[key])), names) if told else _by_hand(rig, names)
 
 
 def _most_shown(gains: Mapping[str, float]) -> NextExperiment | None:
@@ -96,10 +72,10 @@ def _foretold(key: str, gain: float, separates: tuple[str, ...] = ()) -> NextExp
     )
 
 
-def _by_hand(names: Sequence[str]) -> NextExperiment | None:
+def _by_hand(rig: Rig, names: Sequence[str]) -> NextExperiment | None:
     """What the rivals' own files name, where nothing is foreseen to tell."""
     for name in names:
-        for other, key in EFFECTS[name].confusable_with.items():
+        for other, key in rig.effects[name].confusable_with.items():
             if other in names:
                 return NextExperiment(
                     key, EXPERIMENTS[key], tuple(names), float("nan"), float("nan")
@@ -137,7 +113,7 @@ def _told_apart(search: Search, rivals: list[Model], key: str) -> list[float]:
     return gains
 
 
-def _measured(rivals: list[Model]) -> dict[str, list[float]]:
+def _measured(rig: Rig, rivals: list[Model]) -> dict[str, list[float]]:
     """What instruments that the rivals' own files name would tell between the first and every
     other.
     """
@@ -146,21 +122,23 @@ def _measured(rivals: list[Model]) -> dict[str, list[float]]:
         k
         for m in rivals
         for n in m.names
-        for k in EFFECTS[n].confusable_with.values()
-        if k not in DRIVEN
+        for k in rig.effects[n].confusable_with.values()
+        if k not in rig.menu.driven
     }
 
-    return {key: [_read(first, other, key) for other in others] for key in sorted(keys)}
+    return {key: [_read(rig, first, other, key) for other in others] for key in sorted(keys)}
 
 
-def _read(one: Model, other: Model, key: str) -> float:
+def _read(rig: Rig, one: Model, other: Model, key: str) -> float:
     """Half the squared larger strength, over what the instrument can tell; 0 where it does not tell
     these two.
     """
     gain = 0.0
     for model, rival in ((one, other), (other, one)):
         for f, x in zip(model.fitted.free, model.fitted.x, strict=True):
-            tells = any(EFFECTS[f.name].confusable_with.get(name) == key for name in rival.names)
+            tells = any(
+                rig.effects[f.name].confusable_with.get(name) == key for name in rival.names
+            )
             if tells and f.parameter.role == "strength":
                 gain = max(
                     gain,
@@ -181,7 +159,7 @@ def _unseen_shown(search: Search) -> dict[str, float]:
     unseen = [_expected(rig.effects[name]) for name in _not_shown(search)]
 
     out = {}
-    for key in DRIVEN if unseen else ():
+    for key in rig.menu.driven if unseen else ():
         here = rig.foresee(key, base.fitted.u, ())
         if here is None:
             continue
@@ -228,8 +206,8 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
     if not evidence:
         return None
 
-    shape = max(evidence, key=lambda s: evidence[s])
-    key = ALONG.get(shape.along[0], "slip_step")
+    shape, menu = max(evidence, key=lambda s: evidence[s]), search.problem.stack.rig.menu
+    key = menu.along.get(shape.along[0], menu.otherwise)
     gain = float(
         np.clip(
             evidence[shape] / max(len(search.problem.stack.rig.runs), 1),

@@ -226,8 +226,10 @@ def _remaining(decision: Decision, strained: Sequence[tuple[str, float]]) -> str
     if decision.beside is None and strained:
         held = listed([f"{name} ({strain:+.1f} σ)" for name, strain in strained])
         return f"What remains is in constants far from what is known of them: {held}."
+
     if decision.beside is None:
         return "Nothing above the noise remains."
+
     kinds = ", ".join(dict.fromkeys(described(f.shape) for f in decision.beside.functions))
     return (
         f"Something without a name remains: {kinds}. It gains {decision.beside.gain:.0f} nats of"

@@ -10,12 +10,12 @@ along the bed, as another formula for it would have it. Beside h each channel ha
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
 begins: soil has to move first. A ripple may also have other harmonics. No law says how a zero
-creeps, or how it is set before each run: our formula is but one course of many, and it may have
-another, of up to twice its size. What the parameters of the
-model's effects can do is taken out of all this, so that a strength is what its effect does on the
-whole. ρ is how far published forms differ; its prior is over 0 to 40 %. Our own form may be the
-best one to name an effect by, but the soil is never told as if it were exact: where the soil can
-absorb most of an effect, another form of it changes the soil and hardly the fit.
+creeps, or how it is set before each run: it may follow any smooth function, of up to twice the size
+of our formula. What the parameters of the model's effects can do is taken out of all this, so that
+a strength is what its effect does on the whole. ρ is how far published forms differ; its prior is
+over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is never told as
+if it were exact: where the soil can absorb most of an effect, another form of it changes the soil
+and hardly the fit.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def bending_sizes() -> Sizes:
 
 
 def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
-    """Of each effect of a fit that changes anything: its other courses, and its other forms."""
+    """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
     freedoms = []
     functions = shares(stack, np.ones(stack.size, bool))
 
@@ -53,9 +53,9 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
         added = _added(stack, fitted, number)
         if np.any(added):
             # first, as the narrower: other forms can imitate them
-            for courses in _courses(stack, noise, effect, added):
-                columns = _beside(noise, courses, fitted)
-                freedoms.append(freedom(effect.name, columns, noise, _course_sizes()))
+            for zeros in _free_zeros(stack, noise, effect, added):
+                columns = _beside(noise, zeros, fitted)
+                freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
 
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
@@ -70,8 +70,8 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
     return tuple(freedoms)
 
 
-def _course_sizes() -> Sizes:
-    return Sizes(TUNING.fit.course_sizes, TUNING.fit.course_prior)
+def _free_zero_sizes() -> Sizes:
+    return Sizes(TUNING.fit.free_zero_sizes, TUNING.fit.free_zero_prior)
 
 
 def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
@@ -100,17 +100,19 @@ def _following(stack: Stack, added: Array) -> Array:
     return np.column_stack(columns)
 
 
-def _courses(stack: Stack, noise: Noise, effect: Effect, added: Array) -> Iterator[Array]:
-    """Other courses (N, m) of a zero that adds so much (N,), in the channel where it stands out
-    most, over each covariate along which no law says how it goes. It is off by as much whatever is
-    measured.
+def _free_zeros(stack: Stack, noise: Noise, effect: Effect, added: Array) -> Iterator[Array]:
+    """What a zero that adds so much (N,) may be instead: columns (N, m) over each covariate along
+    which no law says how it goes, in the channel where it stands out most. It is off by as much
+    whatever is measured.
     """
-    if not effect.course:
+    if not effect.free_along:
         return
+
     own = _where_most(stack, noise, added)
     acting = own != 0.0
     size = np.sqrt(np.mean(own**2, where=acting)) if acting.any() else 0.0
-    for covariate in effect.course:
+
+    for covariate in effect.free_along:
         columns = along(stack, covariate)
         if columns.shape[1]:
             yield size * acting[:, None] * columns / np.sqrt(columns.shape[1])

@@ -101,7 +101,7 @@ def lag_of(time: Array, read: Array, model: Array, speed: Array) -> Event | None
         return None
     products = np.linalg.inv(columns.T @ columns)
     colour = np.sqrt(TUNING.orders.event_colour * float(np.var(left)) * products[2, 2])
-    usual = float(np.mean(speed[speed >= 0.5 * speed.max()]))
+    usual = float(np.mean(speed[speed >= TUNING.orders.fast * speed.max()]))
     sigma = float(colour / size)
     return Event(lag, sigma, max(usual, SPEED)) if 0.0 < sigma < np.inf else None
 

@@ -33,6 +33,7 @@ from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
 from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run, Stack
+from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -56,6 +57,7 @@ class DriveRig:
     held: Held | None = None
     lines = NO_LINES
     latencies: Sequence[Latency] = ()
+    menu = MENU
     heated = channels
     smooth = (
         ("speed",),

@@ -86,6 +86,20 @@ class Foreseen:
 
 
 @dataclass(frozen=True)
+class Menu:
+    """Experiments that may be proposed.
+
+    driven:    those that a rig may foresee, the least effort first.
+    along:     of a covariate, the experiment that shows the shape of a misfit along it.
+    otherwise: the experiment where none of these does.
+    """
+
+    driven: tuple[str, ...]
+    along: Mapping[str, str]
+    otherwise: str
+
+
+@dataclass(frozen=True)
 class LawForm:
     """How an effect of the library expresses a misfit without a name: a sum of few terms in one
     channel.
@@ -238,6 +252,10 @@ class Rig(Protocol):
         """Error (N,) of a prediction (N,) where it changes, by how motion and channels are
         averaged, in the channels' units.
         """
+
+    @property
+    def menu(self) -> Menu:
+        """What may be driven next."""
 
     def foresee(self, experiment: str, u: Array, effects: Sequence[Effect]) -> Foreseen | None:
         """Every channel under an experiment, for constants u (q,) and effects; None where the rig

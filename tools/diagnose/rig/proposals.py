@@ -9,7 +9,37 @@ from numpy.typing import NDArray
 
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Menu
 from gritd.tools.diagnose.tuning import TUNING
+
+MENU = Menu(
+    driven=(
+        "standstill",
+        "reversal",
+        "slip_step",
+        "speed_step",
+        "shifted_start",
+        "second_pass",
+        "load_step",
+        "lifted_spin",
+    ),
+    along={
+        "slip": "slip_step",
+        "speed": "speed_step",
+        "acceleration": "speed_step",
+        "load": "load_step",
+        "sinkage": "load_step",
+        "position": "shifted_start",
+        "time": "long_run",
+        "heat": "long_run",
+        "run": "second_pass",
+        "direction": "reversal",
+        "velocity": "reversal",
+        "wheel_angle": "lifted_spin",
+        "constant": "lifted_spin",
+    },
+    otherwise="slip_step",
+)
 
 
 def proposed(key: str, driven: Sequence[Motion], radius: float) -> Motion:

@@ -47,7 +47,7 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
 
     load = _bridged(measured)
     near, lifted = (
-        np.abs(load - stated) <= TUNING.rig.close_load * stated + 1.0,
+        np.abs(load - stated) <= TUNING.rig.close_load * stated + TUNING.rig.close_force,
         load <= TUNING.rig.raised * stated,
     )
 
@@ -60,7 +60,7 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
         and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
         and np.mean(near) > np.mean(lifted)
     ):
-        return Weights(np.where(load > 0.5 * stated, constant, 0.0), True)
+        return Weights(np.where(load > TUNING.rig.carried * stated, constant, 0.0), True)
 
     return Weights(levels(signals.time, load), False, load)
 

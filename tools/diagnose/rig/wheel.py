@@ -41,6 +41,7 @@ from gritd.tools.diagnose.rig.measured_runs import (
     without_torque_at_rest,
 )
 from gritd.tools.diagnose.rig.prediction import SOIL, Driven, Prediction
+from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.unrest import unrest_in
@@ -71,6 +72,7 @@ class WheelRig:
     """See interface.Rig."""
 
     units: Mapping[str, str] = UNITS
+    menu = MENU
     heated = ("torque",)
     smooth = (
         ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"),

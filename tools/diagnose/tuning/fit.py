@@ -33,10 +33,10 @@ class Fit:
         (0.2, 0.3, 0.35, 0.15), "prior", "probability of each of the sizes", FORMS
     )
 
-    course_sizes: tuple[float, ...] = tuned(
+    free_zero_sizes: tuple[float, ...] = tuned(
         (0.0, 0.1, 0.5, 2.0), "-", "of an effect, over what no law says how it goes"
     )
-    course_prior: tuple[float, ...] = tuned(
+    free_zero_prior: tuple[float, ...] = tuned(
         (0.25, 0.25, 0.25, 0.25), "prior", "probability of each of the sizes", "judgement"
     )
     following_arcs: tuple[float, ...] = tuned(

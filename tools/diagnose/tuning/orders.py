@@ -77,6 +77,9 @@ class Orders:
     farthest_lag: float = tuned(0.6, "s", "of an event: a later channel follows something else")
     lag_rounds: int = tuned(6, "rounds", "of fit and shift in turn")
     followed: float = tuned(0.9, "share", "of a channel's changes that the model must follow")
+    fast: float = tuned(
+        0.5, "-", "of the largest speed about an event: its usual speed is of these"
+    )
     event_colour: float = tuned(
         8.0, "-", "values that are wrong together: what a model misses about a change is slow"
     )

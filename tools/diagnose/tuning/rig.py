@@ -156,6 +156,8 @@ class Rig:
     close_load: float = tuned(
         0.15, "-", "relative distance of measured and stated load at which both mean the same"
     )
+    close_force: float = tuned(1.0, "N", "beside this: weights are not stated to less")
+    carried: float = tuned(0.5, "-", "of the stated load: above it the wheel carries it")
     raised: float = tuned(0.2, "-", "of the stated load: below it the wheel is lifted")
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
     load_doubt: float = tuned(

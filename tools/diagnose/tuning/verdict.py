@@ -21,6 +21,9 @@ class Verdict:
     tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
 
     # --- decide.py ---
+    nameless_most: float = tuned(
+        0.5, "share", "of the probability, without an effect: more is `unlisted`"
+    )
     alike: float = tuned(2.0, "nats", "log odds: effects less apart cannot be told apart")
     explained_share: float = tuned(
         0.1, "share", "of the misfit that names must take to be an explanation"

@@ -85,7 +85,7 @@ def judged(
     share = taken_share(search, best) if best.names else 0.0
     named = (
         bool(best.names)
-        and unlisted < 0.5 * (1.0 - calibration.lapse)
+        and unlisted < TUNING.verdict.nameless_most * (1.0 - calibration.lapse)
         and share > TUNING.verdict.explained_share
     )
     return Decision(

@@ -80,8 +80,8 @@ def test_every_run_and_channel_begins_anew() -> None:
         np.testing.assert_allclose(columns[own, 0::2], 0.0, atol=1e-12)
 
 
-def _drifting(course: np.ndarray) -> float:
-    """Share of a drift of the drawbar pull's zero, of a course (N,), that is outside the freedom of
+def _drifting(zero: np.ndarray) -> float:
+    """Share of a drift (N,) of the drawbar pull's zero that is outside the freedom of
     `sensor_drift`.
     """
     problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
@@ -93,7 +93,7 @@ def _drifting(course: np.ndarray) -> float:
 
     freedoms = bending_freedoms(stack, problem.noise, fitted)
     every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(none) :]])
-    drift = np.where(stack.of("drawbar_pull"), course, 0.0)
+    drift = np.where(stack.of("drawbar_pull"), zero, 0.0)
     left = drift - every @ np.linalg.lstsq(every, drift, rcond=None)[0]
     return float(np.linalg.norm(left) / np.linalg.norm(drift))
 
@@ -107,10 +107,10 @@ def test_a_zero_may_creep_in_any_way_and_be_set_anew_before_each_run() -> None:
     assert _drifting(np.sin(50.0 * np.pi * along)) > 0.9
 
 
-def test_only_zeros_have_other_courses() -> None:
-    courses = {name: effect.course for name, effect in EFFECTS.items() if effect.course}
-    assert courses == {"sensor_drift": ("time", "run"), "sinkage_datum": ("run",)}
-    assert all(EFFECTS[name].stage == "sensor" for name in courses)
+def test_only_zeros_are_free() -> None:
+    free = {name: effect.free_along for name, effect in EFFECTS.items() if effect.free_along}
+    assert free == {"sensor_drift": ("time", "run"), "sinkage_datum": ("run",)}
+    assert all(EFFECTS[name].stage == "sensor" for name in free)
 
 
 def test_an_effect_beside_others_that_run_away_has_no_other_forms(

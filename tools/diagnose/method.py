@@ -10,7 +10,8 @@
     verdict      probabilities, groups, "unlisted"                       verdict/decide.py
     explanation  where, how sure, how much better, what to do next       explain/explanation.py
 
-Each step is one call, and hands one frozen value to the next.
+`rig/adapter.py` makes a rig of recordings, which are the first three lines; `diagnose` begins with
+it. Each step is one call, and hands one frozen value to the next.
 """
 
 from __future__ import annotations

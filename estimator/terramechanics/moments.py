@@ -206,20 +206,23 @@ class Arrays:
 
     @staticmethod
     def sign(x: Array) -> Array:
+        """±1 (n,), + at 0."""
         return np.copysign(1.0, x)
 
     @staticmethod
     def clip(x: Array, low: float, high: float) -> Array:
+        """Values (n,) within bounds."""
         return np.clip(x, low, high)
 
     @staticmethod
     def divide(a: Array, b: Array) -> Array:
+        """a / b (n,), infinite where b is 0."""
         with np.errstate(divide="ignore"):
             return np.divide(a, b)
 
     @staticmethod
     def straight(eta: Array) -> tuple[Triple, Triple]:
-        """μ and δ at y = 0."""
+        """μ and δ (n,) at y = 0, for η (n,)."""
         step = -np.expm1(-eta)
         small = eta < SMALL
         _, near = backward(0.0, eta, 1.0, step)
@@ -228,7 +231,7 @@ class Arrays:
 
     @staticmethod
     def turning(angle: Array, eta: Array) -> tuple[Triple, Triple]:
-        """μ and δ at y = i·angle."""
+        """μ and δ (n,) at y = i·angle, for angles (n,) [rad] and η (n,)."""
         y, end = 1j * angle, np.exp(-1j * angle)
         step = -np.expm1(-eta) * end
         mu_near, delta_near = backward(y, eta, end, step)

@@ -106,8 +106,8 @@ class Accepted(NamedTuple):
         return self._since(changed, self.members.size > 0, ends)
 
     def nearly_still(self, ends: Ints, near: Callable[[Ints], Array]) -> Ints:
-        """The same (n,) [ns] but for a dither between two values no further apart than `near` of the
-        stamps; 0 in a window that holds a third. See wheel.windows.MeanWindow.
+        """The same (n,) [ns] but for a dither between two values no further apart than `near` of
+        the stamps; 0 in a window that holds a third. See wheel.windows.MeanWindow.
         """
         windows, two = self.members, self.members.hold_two(self.values)
         # a window of three values is not still, whatever came before: look as far as the others go

@@ -4,7 +4,9 @@ so what the work needs is there already.
 
 from __future__ import annotations
 
+import io
 import multiprocessing
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -22,26 +24,63 @@ ENDED = "a child process ended before its work was done"
 _work: Callable[[Any], Any] | None = None  # what the children find when they are forked
 
 
-def each(jobs: int, work: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
+def each(
+    jobs: int, work: Callable[[Item], Made], items: Sequence[Item], kept: Sequence[object] = ()
+) -> list[Made]:
     """`work` of every item, in order. The result must be picklable, `work` and the items need not
     be. Raises what `work` raised, and ChildProcessError where a child ended otherwise: a Pool would
     begin another child in its place for ever.
+
+    kept: large objects that results hold and that are here already. They come back as they are
+    here, not as copies.
     """
     if jobs < 2 or len(items) < 2:
         return [work(item) for item in items]
 
     global _work
     # a closure is the point: it is inherited, never pickled
-    _work = lambda place: work(items[place])  # noqa: E731
+    _work = lambda place: _packed(work(items[place]), kept)  # noqa: E731
     try:
         fork = multiprocessing.get_context("fork")
         count = min(jobs, len(items))
         with ProcessPoolExecutor(count, fork, initializer=ends_with_us()) as pool:
-            return list(pool.map(_forked, range(len(items))))
+            return [_unpacked(made, kept) for made in pool.map(_forked, range(len(items)))]
     except BrokenProcessPool:
         raise ChildProcessError(ENDED) from None
     finally:
         _work = None
+
+
+class _Pickler(pickle.Pickler):
+    """Tells of kept objects only which they are."""
+
+    def __init__(self, to: io.BytesIO, kept: Sequence[object]) -> None:
+        super().__init__(to, pickle.HIGHEST_PROTOCOL)
+        self._places = {id(one): place for place, one in enumerate(kept)}
+
+    def persistent_id(self, obj: object) -> int | None:
+        return self._places.get(id(obj))
+
+
+class _Unpickler(pickle.Unpickler):
+    """Finds them again."""
+
+    def __init__(self, read: io.BytesIO, kept: Sequence[object]) -> None:
+        super().__init__(read)
+        self._kept = kept
+
+    def persistent_load(self, pid: int) -> object:
+        return self._kept[pid]
+
+
+def _packed(made: object, kept: Sequence[object]) -> bytes:
+    to = io.BytesIO()
+    _Pickler(to, kept).dump(made)
+    return to.getvalue()
+
+
+def _unpacked(packed: bytes, kept: Sequence[object]) -> Any:
+    return _Unpickler(io.BytesIO(packed), kept).load()
 
 
 def _forked(place: int) -> Any:

@@ -76,6 +76,10 @@ def _one(arguments: argparse.Namespace) -> int:
             USAGE,
         )
 
+    if arguments.bed is not None and not arguments.reference:
+        raise CommandError("diagnose --bed: expected --reference REF… with it", USAGE)
+    arguments.bed = arguments.bed or "prepared"
+
     configuration, seed = config.load(arguments.config), arguments.seed or 0
     reference = references.given(arguments.reference, arguments.bed)
 
@@ -282,7 +286,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--bed",
         choices=("same", "prepared"),
-        default="prepared",
         help="with --reference: FILEs were driven in the bed of the reference as it was left, or in"
         " one prepared anew; default: prepared",
     )

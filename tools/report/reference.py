@@ -14,6 +14,7 @@ from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.diagnose.explain.coverage import coverage
 from gritd.tools.diagnose.explain.result import Diagnosis, Reference
 from gritd.tools.diagnose.rig.interface import Rig, Stack
+from gritd.tools.diagnose.rig.signals import sha256
 from gritd.tools.diagnose.rig.wheel import Bed
 
 WELL = 0.9  # share of the new campaign that must be covered for nothing to be told of it
@@ -45,7 +46,7 @@ def given(paths: Sequence[Path], bed: Bed) -> Given:
     for path in paths:
         if path.suffix == ".json":
             earlier = _earlier(path)
-            files += [_beside(path, name) for name in earlier["redo"]["files"]]
+            files += [_recorded(path, *each) for each in earlier["redo"]["files"].items()]
             verdicts.append(str(earlier["verdict"]))
         else:
             files.append(path)
@@ -95,6 +96,16 @@ def _earlier(path: Path) -> Mapping[str, Any]:
     return diagnosis  # type: ignore[no-any-return]
 
 
-def _beside(path: Path, name: str) -> Path:
-    """A recording that a diagnosis names: as it is, or in the folder of its JSON."""
-    return Path(name) if Path(name).exists() else path.parent / Path(name).name
+def _recorded(path: Path, name: str, digest: str) -> Path:
+    """A recording that a diagnosis names: as it is, or in the folder of its JSON. Raises
+    CommandError where it is missing, or another one by its SHA-256.
+    """
+    beside = path.parent / Path(name).name
+    recording = Path(name) if Path(name).exists() else beside
+    if not recording.exists():
+        reason = f"found neither {name} nor {beside}; expected a recording that it diagnosed"
+        raise CommandError(f"{path}: {reason}", USAGE)
+    if sha256(recording) != str(digest):
+        reason = f"found another {recording}; expected the one that it diagnosed, by its SHA-256"
+        raise CommandError(f"{path}: {reason}", DAMAGED)
+    return recording

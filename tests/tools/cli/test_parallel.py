@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
 import pytest
 
 from gritd.tools.cli.parallel import each, meanwhile
@@ -39,3 +40,12 @@ def test_a_child_that_is_killed_is_told_and_nobody_waits_for_it() -> None:
 def test_a_child_that_ends_is_said_and_not_replaced_for_ever() -> None:
     with pytest.raises(ChildProcessError, match="before its work was done"):
         each(2, lambda item: os._exit(item), [1, 2, 3])
+
+
+def test_what_is_here_already_comes_back_as_it_is() -> None:
+    """And not as a copy: results of many children that hold the same arrays take them once."""
+    large = [np.arange(5.0), np.arange(3.0)]
+    made = each(2, lambda n: (n, large[1], large[1] + n), [1, 2, 3], large)
+    assert [number for number, _, _ in made] == [1, 2, 3]
+    assert all(held is large[1] for _, held, _ in made)
+    np.testing.assert_array_equal(made[2][2], large[1] + 3)

@@ -4,6 +4,7 @@ work is done.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,8 @@ from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.commands import simulate
 from gritd.tools.commands.diagnose import main
 from gritd.tools.diagnose.explain import provenance
-from gritd.tools.diagnose.rig.signals import read_all, signals
+from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
+from gritd.tools.report.reference import given
 
 SCHEDULE = "segments:\n  - {duration: 3 s, load: 60 N, slip: 0.2, speed: 20 mm/s}\n"
 
@@ -160,3 +162,28 @@ def test_the_configuration_of_another_testbed_is_refused(
         packaged().read_text(encoding="utf-8").replace("25 mm/V", "30 mm/V", 1), "", tmp_path
     )
     provenance.check_rig(read_all([run]), mended.settings, "mended.yaml")
+
+
+def test_a_bed_without_a_reference_is_refused(run: Path) -> None:
+    line, code = said(run, "--config", packaged(), "--bed", "same")
+    assert line == "diagnose --bed: expected --reference REF… with it" and code == USAGE
+
+
+def test_a_reference_is_the_recording_that_was_diagnosed(run: Path, tmp_path: Path) -> None:
+    """By its SHA-256; one that is gone is named with both places where it was looked for."""
+    earlier = tmp_path / "earlier.json"
+    files = {str(run): sha256(run)}
+    told: dict[str, object] = {"verdict": "consistent", "redo": {"files": files}}
+
+    earlier.write_text(json.dumps(told))
+    assert given([earlier], "same").files == (run,)
+
+    files[str(run)] = "0" * 64
+    earlier.write_text(json.dumps(told))
+    line, code = said(run, "--config", packaged(), "--reference", earlier)
+    assert "expected the one that it diagnosed, by its SHA-256" in line and code == DAMAGED
+
+    told["redo"] = {"files": {"/nowhere/gone.mcap": "0" * 64}}
+    earlier.write_text(json.dumps(told))
+    line, code = said(run, "--config", packaged(), "--reference", earlier)
+    assert "/nowhere/gone.mcap" in line and str(tmp_path / "gone.mcap") in line and code == USAGE

@@ -34,7 +34,8 @@ def _bounded(rig: Rig, model: Model) -> Iterator[str]:
         if held:
             yield f"At its bound: {constant.name}, as far from what is known of it as it may go."
     for number, free in enumerate(fitted.free):
-        if fitted.held[len(fitted.u) + number] and free.parameter.role == "shape":
+        nothing = free.parameter.role == "strength" and fitted.x[number] == 0.0
+        if fitted.held[len(fitted.u) + number] and not nothing:
             value = f"{free.value(float(fitted.x[number])):.3g} {free.parameter.unit}".rstrip()
             yield f"At its bound: {free.parameter.name} of {free.name} is {value}."
 

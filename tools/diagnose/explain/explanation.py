@@ -13,7 +13,7 @@ from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
-from gritd.tools.diagnose.explain.remainder import discrepancies, remainders
+from gritd.tools.diagnose.explain.remainder import discrepancies, missed_words, remainders
 from gritd.tools.diagnose.explain.result import (
     Diagnosis,
     Explanation,
@@ -21,6 +21,7 @@ from gritd.tools.diagnose.explain.result import (
     Hypothesis,
     Location,
     Quantity,
+    Remainder,
     Test,
 )
 from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
@@ -49,9 +50,10 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     hypotheses = _hypotheses(search, decision, folds)
     soil = soil_of(rig, base.fitted, decision)
+    left = remainders(problem, accepted)
     return Diagnosis(
         verdict=decision.verdict,
-        summary=_summary(decision, location, search.first.p, _subject(rig)),
+        summary=_summary(decision, location, search.first.p, _subject(rig), strains(rig, base)),
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
@@ -61,8 +63,8 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         next_experiment=next_experiment(search, decision),
         caveats=_caveats(rig, accepted, whole, redo),
         share=decision.share,
-        remaining=remainders(problem, accepted),
-        remaining_words=_remaining(decision, strains(rig, accepted)),
+        remaining=left,
+        remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),
         discrepancy=discrepancies(problem, accepted),
         nuisance=constants_of(rig, accepted.fitted, soil=False),
         noise=_noise(problem),
@@ -219,14 +221,24 @@ def _caveats(rig: Rig, accepted: Model, whole: Model, redo: Mapping[str, Any]) -
     )
 
 
-def _remaining(decision: Decision, strained: Sequence[tuple[str, float]]) -> str:
+def _remaining(
+    decision: Decision,
+    strained: Sequence[tuple[str, float]],
+    left: Mapping[str, Remainder],
+    formed: bool,
+) -> str:
     """strained: constants far from what is known of them [σ]: where nothing else remains, they hold
-    what does.
+    what does; left: what the equations and the accepted names miss of each channel; formed: whether
+    the rig has a discrepancy of form.
     """
     if decision.beside is None and strained:
         held = listed([f"{name} ({strain:+.1f} σ)" for name, strain in strained])
         return f"What remains is in constants far from what is known of them: {held}."
 
+    missed = [words for channel, each in left.items() if (words := missed_words(channel, each))]
+    if decision.beside is None and decision.verdict == "explained" and missed:
+        without = "Without its discrepancy of form, the model" if formed else "The model"
+        return f"{without} misses {listed(missed)}."
     if decision.beside is None:
         return "Nothing above the noise remains."
 
@@ -237,10 +249,19 @@ def _remaining(decision: Decision, strained: Sequence[tuple[str, float]]) -> str
     )
 
 
-def _summary(decision: Decision, location: Sequence[Location], p: float, subject: str) -> str:
+def _summary(
+    decision: Decision,
+    location: Sequence[Location],
+    p: float,
+    subject: str,
+    strained: Sequence[tuple[str, float]] = (),
+) -> str:
+    """strained: constants far from what is known of them [σ]."""
     differ = f"{subject} differ (p = {p:.2g})"
     if decision.verdict == "consistent":
-        return f"{subject} agree (p = {p:.2g})."
+        far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
+        only = f" only with {far} from what is known" if far else ""
+        return f"{subject} agree (p = {p:.2g}){only}."
     if decision.verdict == "insufficient":
         return (
             f"No mismatch shows (p = {p:.2g}), but these recordings could not show most effects"

@@ -7,14 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.wording import shown, spaced, spelled
 from gritd.tools.diagnose.explain.result import Discrepancy, Remainder
-from gritd.tools.diagnose.explain.wording import value_of
+from gritd.tools.diagnose.explain.wording import signed, value_of
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
+WITHIN = "within the noise"
 ALONG = ("slip", "load", "speed", "position", "time", "wheel_angle")
 
 
@@ -33,7 +35,7 @@ def remainders(problem: Problem, model: Model) -> Mapping[str, Remainder]:
         where = (
             _where(stack, channel, left)
             if size > TUNING.explain.remainder_noise * colour.sigma
-            else "within the noise"
+            else WITHIN
         )
         told[channel] = Remainder(size, rig.units[channel], where)
 
@@ -50,13 +52,13 @@ def _where(stack: Stack, channel: str, left: Array) -> str:
     shares = {name: _share(stack.covariate(name)[own], left[own]) for name in known}
     name = max(shares, key=lambda n: shares[n])
     if shares[name] < TUNING.explain.remainder_share:
-        return f"{mean:+.2g} {unit} on average, along no condition"
+        return f"{signed(mean, unit)} on average, along no condition"
 
     along = stack.covariate(name)[own]
     edges = np.quantile(along, np.linspace(0.0, 1.0, TUNING.explain.remainder_parts + 1))
     low, high = along <= edges[1], along >= edges[-2]
     ends = [
-        f"{float(np.mean(left[own][part])):+.2g} {unit} at "
+        f"{signed(float(np.mean(left[own][part])), unit)} at "
         f"{value_of(stack, name, float(along[part].mean()))}"
         for part in (low, high)
     ]
@@ -74,13 +76,27 @@ def _share(along: Array, left: Array) -> float:
     return 1.0 - float(np.sum((left - fitted) ** 2)) / spread if spread > 0.0 else 0.0
 
 
+def missed_words(channel: str, left: Remainder) -> str:
+    """A channel and what is missed of it; empty where that is within the noise."""
+    if left.where == WITHIN:
+        return ""
+    unit, factor = shown(left.unit)
+    return f"{spelled(channel)} by {spaced(left.rms * factor, unit, 2)} ({left.where})"
+
+
 def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
-    """Of each channel, the standard deviation that the learnt discrepancy of form has there."""
-    stack, rig, fitted = problem.stack, problem.stack.rig, model.fitted
-    count = problem.tolerance.shape[1]
-    spread = np.sqrt(np.sum(fitted.allowance.carried**2, axis=1))
+    """Of each channel, the standard deviation that the learnt discrepancy of form has there,
+    averaged over its sizes.
+    """
+    stack, rig, marginal = problem.stack, problem.stack.rig, model.marginal
+    squares, freedoms = np.zeros(stack.size), marginal.freedoms if marginal else ()
+    for number, freedom in enumerate(freedoms):
+        assert marginal is not None
+        size = marginal.size_of(model.chosen, number)
+        squares += size**2 * np.sum(freedom.columns**2, axis=1)
+
     source = "reference" if stack.referred else "recordings"
-    learnt = source if fitted.slack.size > count else "prior"
+    learnt, spread = source if freedoms else "prior", np.sqrt(squares)
 
     told = {}
     for channel in rig.channels:

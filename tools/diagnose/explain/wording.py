@@ -125,8 +125,8 @@ def term(stack: Stack, shape: Shape, size: float) -> str:
     if shape.kind == "wave":
         amplitude = _amplitude(stack, shape.channel, abs(size))
         return f"{amplitude} every {_wavelength(stack, axis, 1.0 / at)}"
-    signed = _signed(size, stack.rig.units[shape.channel])
-    return f"{signed} beyond {value_of(stack, axis, at)}"
+    step = signed(size, stack.rig.units[shape.channel])
+    return f"{step} beyond {value_of(stack, axis, at)}"
 
 
 def _wavelength(stack: Stack, axis: str, length: float) -> str:
@@ -136,7 +136,7 @@ def _wavelength(stack: Stack, axis: str, length: float) -> str:
 
 def strain(channel: str, what: str, value: float, unit: str, sigmas: float) -> str:
     """A calibration constant that the fit pulls off what is known of it."""
-    size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else _signed(value, unit)
+    size = f"{fixed(100.0 * value, 2)} %" if what == "scale" else signed(value, unit)
     moved = f"the fit moves its {what} by {size}, {number(abs(sigmas), 2)} σ of its calibration"
     return _started(f"{spelled(channel)}, {moved}")
 
@@ -180,7 +180,8 @@ def _brief(words: str) -> str:
     return words.replace(" than the model", "")
 
 
-def _signed(value: float, unit: str) -> str:
+def signed(value: float, unit: str) -> str:
+    """A value in the unit that is shown, with its sign."""
     seen, factor = shown(unit)
     return ("+" if value >= 0.0 else "") + spaced(value * factor, seen, 2)
 

@@ -101,9 +101,11 @@ def _level(power: Array, low: int, high: int, cells: float) -> tuple[Array, Arra
     total = np.concatenate(([0.0], np.cumsum(np.log(np.maximum(power, SQUARE)))))
     near, far = (max(round(c / cells), 1) for c in (TUNING.orders.near, TUNING.orders.far))
     at = np.arange(power.size, dtype=np.int64)
+    first_known = min(low, power.size)
+    last_known = min(max(high, low), power.size)
 
     def side(begin: Ints, end: Ints) -> tuple[Array, Array]:
-        first, last = (np.clip(i, low, max(high, low)) for i in (begin, end))
+        first, last = (np.clip(i, first_known, last_known) for i in (begin, end))
         count = last - first
         mean = np.asarray((total[last] - total[first]) / np.maximum(count, 1), dtype=float)
         return mean, np.asarray(count * cells, dtype=float)

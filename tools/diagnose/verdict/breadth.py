@@ -10,7 +10,9 @@ Vehtari, Gelman and Gabry 2017, Stat. Comput. 27, 1413-1432).
 
 Calibrations are measurements too. Where motor and axle torque are both measured, a loss of the
 drive may pass for an offset between the two, far from what is known of it, and every stretch is
-predicted as well. No soil acts there. So what a loss gains in the calibrations is added. Elsewhere
+predicted as well. No soil acts there. And an effect of a sensor, as an error of the torque
+constant, does what a calibration does: without it the calibration strains, and every stretch is
+predicted as well. So what such effects gain in the calibrations is added. For effects of the soil
 it is not: where soil acts, calibrations strain because the form of its model is off.
 """
 
@@ -65,10 +67,11 @@ class Breadth:
 
     def relieved(self, model: Model, name: str) -> float:
         """By how much nearer the calibrations stand to what is known of them [nats, not below 0]
-        than without an effect of the drive, where its loss is measured.
+        than without an effect of a sensor, or of the drive where its loss is measured.
         """
         rig = self._search.problem.stack.rig
-        if rig.effects[name].stage != "drivetrain" or not any(form.drive for form in rig.forms):
+        stages = {"sensor", "drivetrain"} if any(form.drive for form in rig.forms) else {"sensor"}
+        if rig.effects[name].stage not in stages:
             return 0.0
         known = np.array([not c.soil for c in rig.constants])
         strains = (m.fitted.u[known] for m in (self.without(model, name), model))

@@ -33,7 +33,7 @@ def decide(search: Search) -> Decision:
         verdict: Verdict = (
             "consistent" if power(search, screen) >= TUNING.verdict.power else "insufficient"
         )
-        return Decision(verdict, search.bare, 1.0, None, _quiet(screen), 0.0, {})
+        return Decision(verdict, search.bare, 0.0, None, _quiet(screen), 0.0, {})
 
     evidence = Breadth(search).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])

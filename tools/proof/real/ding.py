@@ -12,6 +12,7 @@ from gritd.tools.proof.real.judge import Judge, rms
 from gritd.tools.proof.real.proof import Check, Finding, Panel, Proof, Table, listed
 
 COHESION, FRICTION = 250.0, 31.9  # [Pa], [degrees] measured
+NEW = "With the smooth wheel as reference, does it name what the other wheel has?"
 CHANNELS = {
     "torque": ("torque [N·m]", 1.0),
     "drawbar_pull": ("drawbar pull [N]", 1.0),
@@ -23,9 +24,10 @@ SIGMAS = 2.0
 
 def _run(bench: Bench) -> Finding:
     folder = bench.imported("table", "ding", files=["ding"])
-    recordings = sorted(folder.glob("*.mcap"))
+    recordings, lugged = [folder / "ding2011_smooth.mcap"], [folder / "ding2011_lug10.mcap"]
     configuration = folder / "ding2011_smooth.yaml"
-    diagnosis = bench.diagnosis(recordings, configuration, "ding-points")
+    diagnosis = bench.diagnosis(recordings, configuration, "ding-smooth")
+    lugs = bench.diagnosis(lugged, configuration, "ding-lugs", reference=recordings)
 
     judge = Judge(recordings, configuration)
     published = bench.imported("table", "published", "--soil-strength", "table", files=["ding"])
@@ -45,7 +47,7 @@ def _run(bench: Bench) -> Finding:
         panels.append(Panel(label, means[[0, 1, 3, 4]], "slip [–]", label, LABELS, points=True))
         columns.append(means)
 
-    return Finding([diagnosis], _checks(diagnosis), _table(columns), panels)
+    return Finding([diagnosis, lugs], _checks(diagnosis, lugs), _table(columns), panels)
 
 
 def _table(columns: list[Array]) -> Table:
@@ -70,7 +72,7 @@ def _four(values: Array) -> str:
     return " / ".join(f"{v:.1f}" for v in values)
 
 
-def _checks(diagnosis: DiagnosisRun) -> list[Check]:
+def _checks(diagnosis: DiagnosisRun, lugs: DiagnosisRun) -> list[Check]:
     after = diagnosis.result["soil"]["after"]
     c, tan_phi = (after[n] for n in ("c", "tan_phi"))
     phi = np.degrees(np.arctan(tan_phi["value"]))
@@ -80,6 +82,7 @@ def _checks(diagnosis: DiagnosisRun) -> list[Check]:
     near = abs(c["value"] - COHESION) <= SIGMAS * c["sigma"], abs(phi - FRICTION) <= SIGMAS * sigma
     grows = "Does it find that sinkage grows with slip, as that paper does?"
     answer = listed(diagnosis.accepted) or diagnosis.result["verdict"]
+    new = listed(lugs.accepted) or lugs.result["verdict"]
 
     return [
         Check("Is the measured cohesion within two sigma?", f"{COHESION:g} Pa", cohesion, near[0]),
@@ -91,6 +94,7 @@ def _checks(diagnosis: DiagnosisRun) -> list[Check]:
             REASON,
         ),
         Check(grows, "slip_sinkage", answer, "slip_sinkage" in diagnosis.group),
+        Check(NEW, "grousers", new, "grousers" in lugs.accepted),
     ]
 
 
@@ -114,7 +118,8 @@ STRENGTH = Proof(
     saw="""
         The six points as segments, with the errors of reading a figure (0.5 N, 0.25 mm, 0.1 N·m);
         moduli, exponent and shear modulus as published; cohesion 500 ± 500 Pa and tan φ 0.6 ± 0.15,
-        dry sands in general.
+        dry sands in general. Then six points of a wheel with lugs of 10 mm, as if they were of the
+        smooth one, with the smooth wheel as reference.
     """,
     run=_run,
 )

@@ -173,7 +173,7 @@ def _checks(diagnosis: DiagnosisRun, identified: Array, before: float, after: fl
 
     checks.append(
         Check(
-            "Does it say that something remains?", "yes", remains, remains.startswith("Something")
+            "Does it say that something remains?", "yes", remains, not remains.startswith("Nothing")
         )
     )
 

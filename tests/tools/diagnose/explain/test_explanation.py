@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from gritd.tools.diagnose.explain.explanation import _summary
+from gritd.tools.diagnose.explain.explanation import _remaining, _summary
+from gritd.tools.diagnose.explain.result import Remainder
 
 
 @pytest.mark.parametrize(
@@ -35,3 +36,26 @@ def test_it_says_which_name_has_rivals(
     assert _summary(decision, (), 0.003, "Model and recordings") == (
         f"Model and recordings differ (p = 0.003); {told}"
     )
+
+
+def test_agreement_with_a_strained_constant_says_so() -> None:
+    decision: Any = SimpleNamespace(verdict="consistent")
+    alone = _summary(decision, (), 0.3, "Model and recordings")
+    assert alone == "Model and recordings agree (p = 0.3)."
+    strained = _summary(decision, (), 0.08, "Model and recordings", [("k", 3.4)])
+    assert strained == (
+        "Model and recordings agree (p = 0.08) only with k +3.4 σ from what is known."
+    )
+
+
+@pytest.mark.parametrize("formed", [True, False])
+def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool) -> None:
+    decision: Any = SimpleNamespace(verdict="explained", beside=None)
+    left = {
+        "torque": Remainder(0.001, "N·m", "within the noise"),
+        "sinkage": Remainder(0.0046, "m", "−2.8 mm at 5 % slip, +6.8 mm at 49 % slip"),
+    }
+    told = _remaining(decision, [], left, formed)
+    who = "Without its discrepancy of form, the model" if formed else "The model"
+    assert told == (f"{who} misses sinkage by 4.6 mm (−2.8 mm at 5 % slip, +6.8 mm at 49 % slip).")
+    assert _remaining(decision, [], {}, formed) == "Nothing above the noise remains."

@@ -95,3 +95,11 @@ def test_neither_noise_nor_drift_makes_a_line(slow: float, drift: float) -> None
         with replaced("orders", level=1.0, most_lines=1):
             least += [line.p for line in find_lines(campaign(runs))]
     assert np.sum(np.array(least) < 1.0 / 30.0) <= 6
+
+
+@pytest.mark.parametrize("seconds", [1.0, 1.5, 2.0, 4.0])
+def test_a_part_too_short_for_a_spectrum_tells_nothing(seconds: float) -> None:
+    part = readings(np.random.default_rng(5), seconds=seconds)
+    places = places_of([part], "angle")
+    found = spectrum(part, "angle", places)
+    assert found.power.shape == found.level.shape

@@ -87,3 +87,12 @@ def test_a_loss_of_the_drive_gains_what_it_relieves_the_instruments_of(
     assert _counted(nothing, monkeypatch, strains=(0.0, 1.5, 0.0)) == -np.inf
     assert _counted(nothing, monkeypatch, strains=(5.0, 0.0, 0.0)) == -np.inf  # the soil's
     assert _counted(nothing, monkeypatch, strains=(0.0, 3.0, 0.0), stage="testbed") == -np.inf
+
+
+def test_an_effect_of_a_sensor_gains_what_its_calibration_is_relieved_of(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A torque constant 5 % off predicts no better than a calibration 5 σ off."""
+    nothing = [0.0] * 20
+    assert _counted(nothing, monkeypatch, strains=(0.0, 5.0, 0.0), stage="sensor") == 80.0
+    assert _counted(nothing, monkeypatch, strains=(5.0, 0.0, 0.0), stage="sensor") == -np.inf

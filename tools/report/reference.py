@@ -103,7 +103,8 @@ def _recorded(path: Path, name: str, digest: str) -> Path:
     beside = path.parent / Path(name).name
     recording = Path(name) if Path(name).exists() else beside
     if not recording.exists():
-        reason = f"found neither {name} nor {beside}; expected a recording that it diagnosed"
+        places = " nor ".join(dict.fromkeys((name, str(beside))))
+        reason = f"found no {places}; expected a recording that it diagnosed"
         raise CommandError(f"{path}: {reason}", USAGE)
     if sha256(recording) != str(digest):
         reason = f"found another {recording}; expected the one that it diagnosed, by its SHA-256"

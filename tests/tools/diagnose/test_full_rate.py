@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,12 +21,6 @@ from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def _ripple(order: float) -> tuple[object, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -18,12 +17,6 @@ from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import BentRail, CableDrag
 from tests.tools.diagnose.campaigns import diagnosed, group, plan, settings, soil
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def test_a_friction_is_named_and_frees_the_soil() -> None:

@@ -236,7 +236,7 @@ def _remaining(
         return f"What remains is in constants far from what is known of them: {held}."
 
     missed = [words for channel, each in left.items() if (words := missed_words(channel, each))]
-    if decision.beside is None and decision.verdict == "explained" and missed:
+    if decision.beside is None and decision.verdict in ("explained", "unlisted") and missed:
         without = "Without its discrepancy of form, the model" if formed else "The model"
         return f"{without} misses {listed(missed)}."
     if decision.beside is None:

@@ -89,19 +89,18 @@ def discrepancies(problem: Problem, model: Model) -> Mapping[str, Discrepancy]:
     averaged over its sizes.
     """
     stack, rig, marginal = problem.stack, problem.stack.rig, model.marginal
-    squares, freedoms = np.zeros(stack.size), marginal.freedoms if marginal else ()
-    for number, freedom in enumerate(freedoms):
-        assert marginal is not None
-        size = marginal.size_of(model.chosen, number)
-        squares += size**2 * np.sum(freedom.columns**2, axis=1)
+    squares, learnt = np.zeros(stack.size), "prior"
 
-    source = "reference" if stack.referred else "recordings"
-    learnt, spread = source if freedoms else "prior", np.sqrt(squares)
+    if marginal is not None and marginal.freedoms:
+        learnt = "reference" if stack.referred else "recordings"
+        for number, freedom in enumerate(marginal.freedoms):
+            size = marginal.size_of(model.chosen, number)
+            squares += size**2 * np.sum(freedom.columns**2, axis=1)
 
     told = {}
     for channel in rig.channels:
         own = stack.of(channel)
-        size = float(np.sqrt(np.mean(spread[own] ** 2))) if own.any() else 0.0
+        size = float(np.sqrt(np.mean(squares[own]))) if own.any() else 0.0
         told[channel] = Discrepancy(size, rig.units[channel], learnt)
 
     return told

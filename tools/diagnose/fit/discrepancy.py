@@ -1,7 +1,7 @@
 """The discrepancy of form δ: what every model of a wheel in soil misses, as freedoms of the fit.
 
 The size of δ is learnt from the recordings, under a prior that says how far published models miss
-measurements of drawbar pull and torque: half of it is at 3 and 10 %. (Shibly, Iagnemma
+published measurements of drawbar pull and torque: half of it is at 3 and 10 %. (Shibly, Iagnemma
 and Dubowsky (2005) report 2.0 and 2.6 % for their linearisation alone; docs/diagnosis.md has what
 the equations miss of a published measurement.) δ is never zero by assumption. A rig that obeys the
 equations shows so by itself.

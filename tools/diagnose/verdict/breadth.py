@@ -73,6 +73,7 @@ class Breadth:
         stages = {"sensor", "drivetrain"} if any(form.drive for form in rig.forms) else {"sensor"}
         if rig.effects[name].stage not in stages:
             return 0.0
+
         known = np.array([not c.soil for c in rig.constants])
         strains = (m.fitted.u[known] for m in (self.without(model, name), model))
         before, after = (0.5 * float(u @ u) for u in strains)

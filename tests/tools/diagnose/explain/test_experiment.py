@@ -4,9 +4,6 @@ takes it up.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
 import pytest
 
 from gritd.estimator.effects import make
@@ -15,12 +12,6 @@ from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.unlisted import CableDrag
 from tests.tools.diagnose.campaigns import diagnosed, plan
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def proposed(found: Diagnosis) -> str:

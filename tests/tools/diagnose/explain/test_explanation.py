@@ -48,9 +48,10 @@ def test_agreement_with_a_strained_constant_says_so() -> None:
     )
 
 
+@pytest.mark.parametrize("verdict", ["explained", "unlisted"])
 @pytest.mark.parametrize("formed", [True, False])
-def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool) -> None:
-    decision: Any = SimpleNamespace(verdict="explained", beside=None)
+def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool, verdict: str) -> None:
+    decision: Any = SimpleNamespace(verdict=verdict, beside=None)
     left = {
         "torque": Remainder(0.001, "N·m", "within the noise"),
         "sinkage": Remainder(0.0046, "m", "−2.8 mm at 5 % slip, +6.8 mm at 49 % slip"),

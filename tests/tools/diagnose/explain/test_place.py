@@ -4,7 +4,6 @@ words with numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -31,12 +30,6 @@ from gritd.tools.proof.ours.unlisted import NextDoor
 from tests.tools.diagnose.campaigns import plan
 
 PATCH = {"friction_change": -0.15, "centre": 0.2, "length": 0.1}
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def prepared(rig: WheelRig) -> Screening:

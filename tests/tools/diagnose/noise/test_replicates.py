@@ -4,7 +4,6 @@ no physics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -27,12 +26,6 @@ from tests.tools.diagnose.campaigns import group, plan, settings
 
 RUNS, VALUES, STEP = 6, 200, 0.1
 NOISE = Colour(0.01, 1.0, 0.5, 0.0)
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def stack_of(slip: float = 0.2) -> Any:

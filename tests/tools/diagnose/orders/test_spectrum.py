@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gritd.tools.diagnose.orders.lines import find_lines
 from gritd.tools.diagnose.orders.spectrum import Spectrum, log_chance, places_of, spectrum
+from gritd.tools.diagnose.orders.stretches import Samples
 from gritd.tools.diagnose.orders.transform import fourier_sums
 from gritd.tools.diagnose.orders.wave import amplitude_of
 from gritd.tools.diagnose.tuning import replaced
@@ -97,9 +98,9 @@ def test_neither_noise_nor_drift_makes_a_line(slow: float, drift: float) -> None
     assert np.sum(np.array(least) < 1.0 / 30.0) <= 6
 
 
-@pytest.mark.parametrize("seconds", [1.0, 1.5, 2.0, 4.0])
-def test_a_part_too_short_for_a_spectrum_tells_nothing(seconds: float) -> None:
-    part = readings(np.random.default_rng(5), seconds=seconds)
-    places = places_of([part], "angle")
-    found = spectrum(part, "angle", places)
-    assert found.power.shape == found.level.shape
+def test_stretches_too_short_for_a_spectrum_tell_nothing() -> None:
+    """Two readings a second, and stretches of one: no ripple has a cycle in one and is no alias."""
+    time = np.concatenate([at + np.arange(0.0, 1.0, 0.5) for at in (0.0, 8.0, 16.0)])
+    part = Samples(time, 0.05 * time, np.sin(time), np.repeat(np.arange(3), 2))
+    places = places_of([part], "time")
+    assert np.isinf(spectrum(part, "time", places).level).all()

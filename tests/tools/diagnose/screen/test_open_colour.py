@@ -4,7 +4,7 @@ not.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +24,6 @@ from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import Plan, record
 from tests.tools.diagnose.campaigns import plan
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def test_the_evidence_is_that_of_a_multivariate_normal() -> None:

@@ -4,7 +4,6 @@ of the noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -31,12 +30,6 @@ from gritd.tools.proof.ours.unlisted import NextDoor, RailJoint
 from tests.tools.diagnose.campaigns import plan
 
 RUNS, LENGTH, STEP = 3, 250, 0.1
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def stack() -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gritd.tools.diagnose.explain.result import Diagnosis
+from gritd.tools.diagnose.explain.result import Diagnosis, Discrepancy
 from tests.tools.diagnose.campaigns import diagnosed, plan, soil
 
 
@@ -26,4 +26,12 @@ def test_a_strained_constant_is_no_agreement() -> None:
 
 
 def test_a_constant_within_what_is_known_of_it_is() -> None:
-    assert _of_modulus(1.04).verdict == "consistent"
+    found = _of_modulus(1.04)
+    assert found.verdict == "consistent"
+    assert found.share == 0.0
+    assert all(d.size > 0.0 and d.learnt_from == "recordings" for d in _formed(found))
+
+
+def _formed(found: Diagnosis) -> list[Discrepancy]:
+    """Of the channels that have a discrepancy of form: averaged over its sizes, it is never 0."""
+    return [found.discrepancy[channel] for channel in ("axle_torque", "drawbar_pull", "sinkage")]

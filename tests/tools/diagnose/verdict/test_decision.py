@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -28,12 +28,6 @@ from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.other_forms import LorentzStribeck
 from tests.tools.diagnose.campaigns import plan, settings
-
-
-@pytest.fixture(autouse=True)
-def _quiet() -> Iterator[None]:
-    with np.errstate(all="ignore"):
-        yield
 
 
 def test_an_alarm_counts_what_noise_shows_under_the_same_name() -> None:

@@ -72,7 +72,7 @@ def test_the_estimate_says_which_runs_are_not_believed(day: tuple[Path, dict[str
 def test_the_diagnosis_names_a_friction_of_the_drive(day: tuple[Path, dict[str, str]]) -> None:
     (said,) = of(day[1], "gritd diagnose")
     assert said.startswith("verdict: explained")
-    accepted = re.findall(r"^  \* (\w+)", said, re.MULTILINE)
+    accepted = re.findall(r"^  accepted: (\w+)", said, re.MULTILINE)
     assert accepted and all(name.endswith("_friction") for name in accepted)
 
 

@@ -22,6 +22,8 @@ import yaml
 MAX_BYTES = 256 * 1024
 MAX_DEPTH = 20
 MAX_NODES = 5000
+TOO_DEEP = f"nesting deeper than {MAX_DEPTH}"
+PARSERS_DEPTH = "maximum nesting depth"  # PyYAML from 6.0.4 on has a limit too, deeper than ours
 
 # A text that is cut anywhere must not pass for a whole one: see docs/decisions/0008.
 CLOSING = "'...' as the last line, since the first is '---'"
@@ -205,6 +207,8 @@ class _Composer:
         try:
             yield from yaml.parse(text, Loader=_PARSER)
         except yaml.MarkedYAMLError as error:
+            if PARSERS_DEPTH in (error.problem or ""):
+                raise self._blamed(error).error(TOO_DEEP, "a configuration") from None
             problem = shown(error.problem or "a syntax error").removeprefix("found ")
             raise self._blamed(error).error(problem, "valid YAML") from None
         except (yaml.YAMLError, UnicodeError):
@@ -244,7 +248,7 @@ class _Composer:
         if self._count > MAX_NODES:
             raise here.error(f"more than {MAX_NODES} values", "a configuration")
         if depth > MAX_DEPTH:
-            raise here.error(f"nesting deeper than {MAX_DEPTH}", "a configuration")
+            raise here.error(TOO_DEEP, "a configuration")
 
         anchor, tag = getattr(event, "anchor", None), getattr(event, "tag", None)
         if anchor is not None:

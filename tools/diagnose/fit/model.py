@@ -71,28 +71,32 @@ def fit_model(
 ) -> Model:
     """Fit and sizes in turns, until the sizes stay.
 
+    Every fit has all its freedoms. Without the other forms that its effects need, it would strain
+    the constants, to where linear algebra tells nothing.
+
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins.
     """
-    allowed = problem.with_freedoms(forms, _values(forms, sizes))
-    fitted = allowed.descend(effects, free, *start)
-    for _ in range(TUNING.fit.size_rounds):
-        bends = bending_freedoms(problem.stack, problem.noise, fitted)
-        every = (*forms, *bends)
-
-        before = sizes
+    fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend(effects, free, *start)
+    for left in reversed(range(TUNING.fit.size_rounds)):
+        every = (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
+        of_fit = _padded(sizes, len(forms), len(every))
         marginal = Marginal(fitted, problem.tolerance, every)
-        chosen, evidence = marginal.likeliest((*sizes, *(0 for _ in bends)))
-        sizes = chosen[: len(forms)]
-        if sizes == before:
+
+        sizes, evidence = marginal.likeliest(of_fit)
+        if sizes == of_fit or not left:
             break
-        fitted = problem.with_freedoms(forms, _values(forms, sizes)).refit(fitted)
+        fitted = problem.with_freedoms(every, _values(every, sizes)).refit(fitted)
 
     names = tuple(effect.name for effect in fitted.acting)
-    bent = problem.with_freedoms(every, _values(every, chosen))
-    final = bent.refit(fitted)
-    shapes = tuple(_values(bends, chosen[len(forms) :]))
-    return Model(final, names, evidence, sizes, shapes, marginal, chosen)
+    of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
+    bends = tuple(_values(every[len(forms) :], of_bends))
+    return Model(fitted, names, evidence, of_forms, bends, marginal, of_fit)
+
+
+def _padded(sizes: Chosen, forms: int, count: int) -> Chosen:
+    """Sizes of so many freedoms, the forms first; those of the bends 0 where there were others."""
+    return sizes if len(sizes) == count else sizes[:forms] + (0,) * (count - forms)
 
 
 def sized_model(

@@ -227,13 +227,12 @@ class Problem:
     ) -> Fitted:
         """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,)."""
         ground = self.ground(effects, free)
-        start, nats = ground.tried(ground.bounds.clipped(np.concatenate((u, x))))
-        if not np.isfinite(nats):  # an effect that runs away: begin with none of it
-            start = ground.tried(ground.bounds.clipped(np.concatenate((u, np.zeros_like(x)))))[0]
+        if rounds == 0:  # as it stands there
+            return ground.linearised(ground.tried(ground.at(u, x))[0])
 
-        here = ground.linearised(start)
         most = TUNING.fit.rounds if rounds is None else rounds
-        fitted, converged = descent.descend(ground, here, most) if most else (here, False)
+        start = ground.linearised(ground.begun(u, x))
+        fitted, converged = descent.descend(ground, start, most)
         return replace(fitted, converged=converged)
 
     def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
@@ -292,6 +291,37 @@ class Ground:
         strain = np.sum((self.penalty[: centre.size] * centre) ** 2)
         objective = float(left @ left + slack @ slack + strain)
         return Tried(centre, predicted, residual, slack, objective), 0.5 * objective
+
+    def begun(self, u: Array, x: Array) -> Tried:
+        """Where a descent begins, from constants u (q,) and effect parameters x (p,): strengths of
+        the last effect are halved while the recordings are less likely with them than without.
+
+        In the linear algebra that foretells strengths the constants follow. At the start they do
+        not, so a strong effect may stand beyond a ridge.
+        """
+        strong = self._strengths_of_last()
+        none, most = self.tried(self.at(u, np.where(strong, 0.0, x)))
+        if not np.isfinite(most):  # an effect that runs away
+            none, most = self.tried(self.at(u, np.zeros_like(x)))
+        if not strong.any():
+            return none
+
+        for halvings in range(TUNING.fit.halvings):
+            begun, nats = self.tried(self.at(u, np.where(strong, 0.5**halvings * x, x)))
+            if nats <= most:
+                return begun
+        return begun if np.isfinite(nats) else none
+
+    def _strengths_of_last(self) -> Bools:
+        """Marks the strengths of the last effect among the effect parameters (p,)."""
+        last = [f.effect is self._effects[-1] for f in self._free]
+        strength = [f.parameter.role == "strength" for f in self._free]
+        marks: Bools = np.array(last, bool) & np.array(strength, bool)
+        return marks
+
+    def at(self, u: Array, x: Array) -> Array:
+        """Constants u (q,) and effect parameters x (p,) within the bounds (q + p,)."""
+        return self.bounds.clipped(np.concatenate((u, x)))
 
     def linearised(self, tried: Tried) -> Fitted:
         raw = self._derivatives(tried.centre, tried.predicted)

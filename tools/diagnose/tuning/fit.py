@@ -133,6 +133,10 @@ class Fit:
         3.0, "-", "a strength's prior standard deviation, in expected sizes"
     )
 
+    halvings: int = tuned(
+        7, "times", "the strengths of a new effect at its start, while it makes the fit worse"
+    )
+
     # --- projection.py ---
     projected_prior: float = tuned(
         3.0, "-", "prior standard deviation of what is projected out, in expected sizes"

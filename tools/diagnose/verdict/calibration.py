@@ -16,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gritd.estimator.terramechanics.soil import Array
+
 TABLE = Path(__file__).with_name("calibration.json")
 
 
@@ -30,12 +32,15 @@ class Calibration:
     lapse: float  # share of cases in which the evidence misleads: no probability exceeds 1 less it
     candidates: int = 1
 
-    def weight(self, evidence: float, count: int, nameless: bool) -> float:
-        """Log weight of an explanation by so many effects, with functions without a name or not."""
-        weight = evidence / self.temperature
-        if count:
-            weight += self.listed + (count - 1) * self.more - count * np.log(self.candidates)
-        return float(weight + (self.nameless if nameless else 0.0))
+    def weights(self, evidence: Array, count: Array, nameless: Array) -> Array:
+        """Log weights (k,) of explanations.
+
+        evidence: above the discrepancy of form alone [nats] (k,); count: of listed effects (k,);
+        nameless: 1 where functions without a name act too (k,).
+        """
+        odds = np.where(count > 0, self.listed + (count - 1) * self.more, 0.0)
+        odds = odds - count * np.log(self.candidates) + nameless * self.nameless
+        return np.asarray(evidence / self.temperature + odds)
 
 
 @cache

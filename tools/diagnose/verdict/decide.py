@@ -76,7 +76,11 @@ def judged(
     search: Search, weighed: Sequence[Weighed], beside: Nameless | None, calibration: Calibration
 ) -> Decision:
     """The decision from the evidence of all explanations."""
-    weights = np.array([calibration.weight(w.evidence, len(w.names), w.nameless) for w in weighed])
+    weights = calibration.weights(
+        np.array([w.evidence for w in weighed]),
+        np.array([len(w.names) for w in weighed]),
+        np.array([float(w.nameless) for w in weighed]),
+    )
     shares = np.exp(weights - logsumexp(weights)) * (1.0 - calibration.lapse)
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 

@@ -27,7 +27,8 @@ SHARES = {
     "pair": 0.23,
 }
 STRATA = tuple(SHARES)
-LEVELS = {"weak": 1.5, "medium": 4.0, "strong": 12.0}  # times the detection limit
+# times the detection limit; the strongest is what bends the form of the model most
+LEVELS = {"weak": 1.5, "medium": 4.0, "strong": 12.0, "very strong": 40.0}
 PLAIN = ("medium", "strong")  # levels in foreign worlds and of what is new
 # What one case in so many conceals, in foreign worlds and as what is new: one of the list,
 # nothing, or physics outside the list.

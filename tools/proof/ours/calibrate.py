@@ -15,7 +15,7 @@ import argparse
 import json
 import sys
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -84,9 +84,9 @@ def _true(names: Sequence[str], truth: Sequence[str], held: Collection[str]) -> 
 
 def log_truth(case: Case, by: Calibration) -> float:
     """Log probability of the truth of a case."""
-    listed = np.where(case.count > 0, by.listed, 0.0)
-    more = by.more * np.maximum(case.count - 1, 0) - case.count * np.log(case.candidates)
-    weight = case.evidence / by.temperature + listed + more + by.nameless * case.nameless
+    weight = replace(by, candidates=case.candidates).weights(
+        case.evidence, case.count, case.nameless
+    )
     given_truth = float(np.sum(np.exp(weight - logsumexp(weight)) * case.right))
     return float(np.log(by.lapse / OTHERS + (1.0 - by.lapse) * given_truth))
 

@@ -1,0 +1,66 @@
+"""A model's fit: where it begins, and with which freedoms it stands."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gritd.estimator.effects import EFFECTS, make
+from gritd.tools.diagnose.fit.base import BaseFit
+from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.model import fit_model
+from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+PEAK = EFFECTS["stress_peak_shift"]
+
+
+@cache
+def shifted() -> BaseFit:
+    """A stress peak three expected sizes off: without the effect, constants are strained far."""
+    acting = (make("stress_peak_shift", {"share": -0.3}),)
+    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    return fit_base(rig, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("start", [(-3.0, 0.0), (4.5, 0.8), (-5.0, 5.0)])
+def test_a_strong_effect_is_found_from_wherever_linear_algebra_starts_it(
+    start: tuple[float, float],
+) -> None:
+    """Beside strained constants the linear estimate of a strength may lie beyond a ridge."""
+    base, free = shifted(), free_of((PEAK,))
+    fitted = base.problem.descend((PEAK,), free, base.fitted.u, np.array(start))
+    assert fitted.converged
+    assert fitted.x == pytest.approx([-3.0, 0.0], abs=0.1)
+
+
+def test_a_fit_of_no_rounds_stands_where_it_is_put() -> None:
+    base, free = shifted(), free_of((PEAK,))
+    fitted = base.problem.descend((PEAK,), free, base.fitted.u, np.array([4.5, 0.8]), rounds=0)
+    assert fitted.x == pytest.approx([4.5, 0.8])
+
+
+def test_a_fit_stands_where_its_evidence_is_told() -> None:
+    """Beside a gain of the potentiometer, bent far enough, sinkage that grows with slip needs no
+    discrepancy of form. A fit with neither of the two would strain the constants, and the evidence
+    would be told from there.
+    """
+    acting = (make("slip_sinkage", {"growth": 0.4}),)
+    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    base = fit_base(rig, np.random.default_rng(0))
+    forms = form_freedoms(base.problem.stack, base.problem.noise)
+
+    effects = (EFFECTS["sinkage_gain"],)
+    begins, sizes = (base.fitted.u, np.array([1.0])), tuple(3 for _ in forms)
+    model = fit_model(base.problem, forms, effects, free_of(effects), begins, sizes)
+
+    mean, _ = model.constants()
+    of_soil = np.array([c.soil for c in rig.constants])
+    assert model.bends[0] > 0.0
+    assert np.abs(mean - model.fitted.u)[of_soil].max() < 1.0
+    assert model.evidence > -1200.0  # -1250 without its freedoms

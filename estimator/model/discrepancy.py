@@ -23,8 +23,8 @@ from gritd.estimator.terramechanics.soil import Array
 
 LEVEL, ALONG, TOGETHER = 0.3, 0.35, 0.35  # shares of the variance of δ
 
-# Lengths over which δ changes by its own size, of each condition. Published misfits of drawbar pull
-# and torque vary over a quarter of the range of slip, and over half an octave of load.
+# Lengths over which δ changes by its own size, of each condition. A judgement: a misfit of drawbar
+# pull or torque changes over a quarter of the range of slip, and over a factor of 1.6 of load.
 SLIP = 0.25  # slip [-]
 LOAD = 0.5  # ln(W / usual W)
 SPEED = 1.0  # ln(rω / usual rω)

@@ -1,4 +1,4 @@
-"""The traps of DESIGN 7, each a test, on small campaigns with a known truth."""
+"""The traps that were measured, each a test, on small campaigns with a known truth."""
 
 from __future__ import annotations
 

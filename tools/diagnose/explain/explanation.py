@@ -258,13 +258,14 @@ def _summary(
 ) -> str:
     """strained: constants far from what is known of them [σ]."""
     differ = f"{subject} differ (p = {p:.2g})"
+    far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
     if decision.verdict == "consistent":
-        far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
         only = f" only with {far} from what is known" if far else ""
         return f"{subject} agree (p = {p:.2g}){only}."
     if decision.verdict == "insufficient":
+        but = f" but for {far} from what is known" if far else ""
         return (
-            f"No mismatch shows (p = {p:.2g}), but these recordings could not show most effects"
+            f"No mismatch shows (p = {p:.2g}){but}, and these recordings could not show most effects"
             " at their usual size."
         )
 

@@ -19,10 +19,10 @@ from gritd.tools.diagnose.tuning import TUNING
 class Model:
     """The base model with some effects, fitted together with the constants.
 
-    fitted:   with every freedom at its likeliest size.
-    evidence: log evidence, averaged over the sizes of the freedoms.
+    fitted:   with every freedom at the size that `chosen` says; of a plain model without any.
+    evidence: log evidence, averaged over the sizes of the freedoms about these.
     sizes:    of each freedom of form, which one.
-    bends:    of each effect, how far its form differs.
+    bends:    of each freedom of an effect, its size: how far the effect's form differs.
     """
 
     fitted: Fitted
@@ -69,10 +69,10 @@ def fit_model(
     start: tuple[Array, Array],
     sizes: Chosen,
 ) -> Model:
-    """Fit and sizes in turns, until the sizes stay.
+    """Fit and sizes in turns, until the sizes stay, a few rounds at most.
 
-    Every fit has all its freedoms. Without the other forms that its effects need, it would strain
-    the constants, to where linear algebra tells nothing.
+    Every fit but the first has the freedoms of its effects too. Without the other forms that these
+    need, it would strain the constants, to where linear algebra tells nothing.
 
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins.
@@ -111,7 +111,7 @@ def sized_model(
 
 
 def plain_model(problem: Problem, fitted: Fitted) -> Model:
-    """A fit without freedoms."""
+    """A fit without freedoms, with its evidence."""
     names = tuple(effect.name for effect in fitted.acting)
     return Model(fitted, names, Marginal(fitted, problem.tolerance, ()).likeliest(())[1])
 

@@ -15,6 +15,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
+from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -26,7 +27,7 @@ Maker = Callable[..., Effect]  # an effect's class, or one with some parameters 
 
 @dataclass(frozen=True)
 class Free:
-    """One parameter of an effect in the fit: its value is off + x · size, inside its bounds."""
+    """One parameter of an effect in the fit: its value is centre + x · sigma, inside its bounds."""
 
     effect: Maker
     parameter: Parameter
@@ -43,48 +44,9 @@ class Free:
 
 
 @dataclass(frozen=True, eq=False)
-class Allowance:
-    """What a fit may be off by beside constants and effects: columns of unit normal weights.
-
-    They are many, and most are shared between fits: so they are put together when asked for.
-    parts: columns (N, m) in the channels' units, the same whitened, and their size; fixed: how many
-    parts every fit has; those after them are predicted elsewhere too.
-    """
-
-    parts: tuple[tuple[Array, Array, float], ...]
-    fixed: int
-
-    def with_parts(self, more: Sequence[tuple[Array, Array, float]]) -> Allowance:
-        """With more columns (N, m), the same whitened, and their size."""
-        return replace(self, parts=(*self.parts, *more))
-
-    def without_size(self) -> Allowance:
-        """The same columns, all nought."""
-        return replace(self, parts=tuple((c, w, 0.0) for c, w, _ in self.parts))
-
-    @property
-    def columns(self) -> Array:
-        """(N, t) in the channels' units."""
-        return np.column_stack([size * columns for columns, _, size in self.parts])
-
-    @property
-    def whitened(self) -> Array:
-        """(N, t)."""
-        return np.column_stack([size * whitened for _, whitened, size in self.parts])
-
-    @property
-    def carried(self) -> Array:
-        """(N, m) in the channels' units: those that are predicted elsewhere too."""
-        none = self.parts[0][0][:, :0]
-        return np.column_stack(
-            [none, *(size * columns for columns, _, size in self.parts[self.fixed :])]
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class Fitted:
-    """An optimum of the posterior. x: constants in prior σ, then effect parameters in expected
-    sizes, then the weights of what is allowed.
+    """Where a descent stands: u, constants in prior σ; x, effect parameters in expected sizes;
+    slack, the weights of what is allowed.
     """
 
     effects: tuple[Maker, ...]
@@ -225,7 +187,10 @@ class Problem:
         x: Array,
         rounds: int | None = None,
     ) -> Fitted:
-        """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,)."""
+        """The nearest optimum within bounds from constants u (q,) and effect parameters x (p,); the
+        strengths of the last effect may be less at the start (`Ground.begun`). rounds: of
+        linearisation at most; 0: it stands where it is put.
+        """
         ground = self.ground(effects, free)
         if rounds == 0:  # as it stands there
             return ground.linearised(ground.tried(ground.at(u, x))[0])
@@ -236,7 +201,7 @@ class Problem:
         return replace(fitted, converged=converged)
 
     def refit(self, fitted: Fitted, rounds: int | None = None) -> Fitted:
-        """The nearest optimum from a fit with other tolerances, whose slopes are a start."""
+        """The nearest optimum from where a fit with other freedoms stands, first by its slopes."""
         ground = self.ground(fitted.effects, fitted.free)
         start = ground.tried(fitted.centre)[0]
         most = TUNING.fit.rounds if rounds is None else rounds
@@ -294,10 +259,9 @@ class Ground:
 
     def begun(self, u: Array, x: Array) -> Tried:
         """Where a descent begins, from constants u (q,) and effect parameters x (p,): strengths of
-        the last effect are halved while the recordings are less likely with them than without.
-
-        In the linear algebra that foretells strengths the constants follow. At the start they do
-        not, so a strong effect may stand beyond a ridge.
+        the last effect are halved while the recordings are less likely with them than without, to
+        1/64 at most. In the linear algebra that foretells strengths the constants follow. At the
+        start they do not, so a strong effect may stand beyond a ridge.
         """
         strong = self._strengths_of_last()
         none, most = self.tried(self.at(u, np.where(strong, 0.0, x)))

@@ -10,7 +10,7 @@ FORM_SIZES = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)
 FORM_PRIOR = (0.12, 0.12, 0.14, 0.22, 0.28, 0.12)
 DRIVE_SIZES = (0.0, 0.003, 0.01, 0.03, 0.1)
 DRIVE_PRIOR = (0.3, 0.25, 0.25, 0.15, 0.05)
-PUBLISHED = "misses of published models: docs/diagnosis.md"
+PUBLISHED = "judgement: docs/diagnosis.md, Discrepancy of form"
 FORMS = "differences of published formulas"
 DAMPED = "damping of a mean over an interval"
 

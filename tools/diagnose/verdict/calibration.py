@@ -23,7 +23,9 @@ TABLE = Path(__file__).with_name("calibration.json")
 
 @dataclass(frozen=True)
 class Calibration:
-    """candidates: listed effects, which share the odds among them."""
+    """Log odds are against the discrepancy of form alone. candidates: listed effects, each of which
+    has an equal share of the odds.
+    """
 
     temperature: float  # by which evidence is divided
     listed: float  # log odds of a listed effect against the discrepancy of form alone
@@ -33,7 +35,7 @@ class Calibration:
     candidates: int = 1
 
     def weights(self, evidence: Array, count: Array, nameless: Array) -> Array:
-        """Log weights (k,) of explanations.
+        """Log weights (k,) of explanations, up to a constant; the lapse is not in them.
 
         evidence: above the discrepancy of form alone [nats] (k,); count: of listed effects (k,);
         nameless: 1 where functions without a name act too (k,).
@@ -45,7 +47,7 @@ class Calibration:
 
 @cache
 def learnt(candidates: int = 1) -> Calibration:
-    """For so many listed effects."""
+    """What calibration.json holds, for so many listed effects."""
     table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))
     names = [n for n in Calibration.__dataclass_fields__ if n != "candidates"]
     return Calibration(**{name: float(table[name]) for name in names}, candidates=candidates)

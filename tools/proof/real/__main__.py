@@ -1,4 +1,4 @@
-"""`python -m gritd.tools.proof.real`: the five proofs on real recordings, and what docs/proof.md
+"""`python -m gritd.tools.proof.real`: the proofs on recordings of others, and what docs/proof.md
 says of them.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 from gritd.tools.cli.command import DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.progress import Progress
-from gritd.tools.proof.real import cmu, ding, emps, figure, mgst
+from gritd.tools.proof.real import chrono, cmu, ding, emps, figure, mgst
 from gritd.tools.proof.real.bench import ROOT, Bench
 from gritd.tools.proof.real.page import page, section
 from gritd.tools.proof.real.proof import Finding, Proof
@@ -25,6 +25,7 @@ PROOFS: tuple[Proof, ...] = (
     cmu.GROUSERS,
     emps.FRICTION,
     ding.STRENGTH,
+    chrono.TERRAIN,
 )
 DATA = ROOT.parent / "shared" / "real"
 DOCS, PAGE = ROOT / "docs", "proof.md"

@@ -13,7 +13,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.tools.commands.import_rig import main
 from gritd.tools.diagnose.rig.drive import DriveRig
 from gritd.tools.diagnose.rig.signals import drive_series
-from gritd.tools.proof.real import cmu, ding, emps, mgst
+from gritd.tools.proof.real import chrono, cmu, ding, emps, mgst
 from gritd.tools.proof.real.bench import Bench
 from gritd.tools.proof.real.proof import Check, Finding, Proof
 from tests.real_recordings import REAL, needs
@@ -89,3 +89,17 @@ def test_mgst_places_the_misfit_of_a_concealed_drivetrain_in_the_torque(tmp_path
 def test_mgst_places_the_misfit_of_a_concealed_wall_in_the_drawbar_pull(tmp_path: Path) -> None:
     _, checks = proved(mgst.SIDE_WALL, tmp_path)
     assert checks["Is drawbar_pull among the channels that differ"].met
+
+
+@needs("chrono")
+@pytest.mark.slow
+def test_chrono_counts_the_lugs_and_names_the_patch(tmp_path: Path) -> None:
+    _, checks = proved(chrono.TERRAIN, tmp_path)
+    for question in (
+        "Lugs: what does it name first",
+        "How many lugs",
+        "Is the cohesion within two sigma",
+        "Is the tan φ within two sigma",
+        "A patch: what does it name",
+    ):
+        assert checks[question].met, f"{question}: {checks[question].answer}"

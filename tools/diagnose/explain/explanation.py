@@ -265,8 +265,8 @@ def _summary(
     if decision.verdict == "insufficient":
         but = f" but for {far} from what is known" if far else ""
         return (
-            f"No mismatch shows (p = {p:.2g}){but}, and these recordings could not show most effects"
-            " at their usual size."
+            f"No mismatch shows (p = {p:.2g}){but}, and these recordings could not show most"
+            " effects at their usual size."
         )
 
     where = f" {location[0].where}." if location else ""

@@ -32,7 +32,10 @@ from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
-WHEN = ("_delay", "_blur")  # constants that move a channel in time: no function of the conditions
+WHEN = (
+    "delay",
+    "blur",
+)  # kinds of constants that move a channel in time: no function of the conditions
 
 
 @dataclass(frozen=True)
@@ -162,15 +165,15 @@ def _calibration(rig: Rig) -> list[int]:
     """Constants that stay as the configuration states them, so that δ holds what they were moved
     by. Where the motor tells the torque too, that of the axle's sensor is not the filter's.
     """
-    other = ("axle_torque_",) if {"torque", "axle_torque"} <= set(rig.channels) else ()
+    other = "axle_torque" if {"torque", "axle_torque"} <= set(rig.channels) else None
 
     return [
         number
         for number, constant in enumerate(rig.constants)
         if not constant.soil
         and not constant.changes
-        and not constant.name.endswith(WHEN)
-        and not constant.name.startswith(other)
+        and constant.kind not in WHEN
+        and constant.channel != other
     ]
 
 

@@ -37,6 +37,11 @@ def wheel_constants(
     )
 
 
+def of_channel(channel: str, kind: str, sigma: float, unit: str = "") -> Constant:
+    """The error of a channel's calibration, 0 ± sigma."""
+    return Constant(f"{channel}_{kind}", 0.0, sigma, unit, channel=channel, kind=kind)
+
+
 def _calibrations(
     settings: Settings, channels: Sequence[str], sets: WeightSets, weights_stated: bool
 ) -> list[Constant]:
@@ -44,10 +49,10 @@ def _calibrations(
     for channel in channels:
         scale, offset = calibration_sigmas(settings, channel)
         constants += [
-            Constant(f"{channel}_scale", 0.0, max(scale, TUNING.rig.scale_floor)),
-            Constant(f"{channel}_offset", 0.0, max(offset, SPAN), UNITS[channel]),
-            Constant(f"{channel}_delay", 0.0, TUNING.rig.timing, "s"),
-            Constant(f"{channel}_blur", 0.0, TUNING.rig.blur),
+            of_channel(channel, "scale", max(scale, TUNING.rig.scale_floor)),
+            of_channel(channel, "offset", max(offset, SPAN), UNITS[channel]),
+            of_channel(channel, "delay", TUNING.rig.timing, "s"),
+            of_channel(channel, "blur", TUNING.rig.blur),
         ]
 
     nominal = settings.load.nominal

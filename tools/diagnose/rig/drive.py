@@ -32,6 +32,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
 from gritd.tools.diagnose.orders.latency import Latency
+from gritd.tools.diagnose.rig.constants import of_channel
 from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run, Stack
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
@@ -90,13 +91,13 @@ class DriveRig:
         self.constants = (
             Constant("inertia", 0.0, self._most(m.acceleration for m in self._motions), "kg·m²"),
             Constant("damping", 0.0, self._most(m.velocity for m in self._motions), "N·m·s/rad"),
-            Constant(
-                "torque_delay",
-                0.0,
+            of_channel(
+                "torque",
+                "delay",
                 apart := TUNING.rig.stamps * max(m.sampled for m in self._motions),
                 "s",
             ),
-            Constant("torque_blur", 0.0, apart**2, "s²"),
+            of_channel("torque", "blur", apart**2, "s²"),
         )
 
         self.effects = {n: EFFECTS[n] for n in EFFECTS_OF_A_DRIVE}

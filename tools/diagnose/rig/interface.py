@@ -34,6 +34,7 @@ class Constant:
     log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept
         inside low … high.
     changes: the constant whose value in the new campaign is e^this times that in the reference.
+    channel, kind: of a calibration, what it is of: its scale, offset, delay or blur.
     """
 
     name: str
@@ -45,6 +46,8 @@ class Constant:
     low: float = -np.inf
     high: float = np.inf
     changes: str = ""
+    channel: str = ""
+    kind: str = ""
 
     def of(self, u: float) -> float:
         if self.log:

@@ -32,10 +32,7 @@ from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
-WHEN = (
-    "delay",
-    "blur",
-)  # kinds of constants that move a channel in time: no function of the conditions
+WHEN = ("delay", "blur")  # kinds of constants that move a channel in time
 
 
 @dataclass(frozen=True)

@@ -188,9 +188,10 @@ def _block_lines(time: Array, values: Array, edges: Array, reach: int) -> tuple[
         rate = (y1 - s1 * y0 / s0) / spread
         at = first + y0 / s0 + rate * (middle - s1 / s0)
         left = np.sqrt(np.maximum(y2 - y0 * y0 / s0 - rate * (y1 - s1 * y0 / s0), 0.0) / s0)
+        scatter = left / np.sqrt(spread)
 
     enough = s0 >= LEAST * np.median(s0)
-    columns = (np.where(enough, x, np.nan) for x in (at, rate, left / np.sqrt(spread)))
+    columns = (np.where(enough, x, np.nan) for x in (at, rate, scatter))
     return Slopes(*columns), np.where(enough, left, 0.0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from gritd.estimator.offline.bed_runs import bed_runs
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.metadata import versions
+from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, add_configuration
 from gritd.tools.cli.progress import Progress
@@ -29,7 +31,11 @@ def main(argv: Sequence[str]) -> int:
     except OSError as error:
         raise CommandError(f"{arguments.output}: {(error.strerror or '').lower()}", USAGE) from None
     print(arguments.output)
-    return DAMAGED if any(run.run.recording.damage for run in told.runs) else DONE
+
+    read = [run.run.recording for run in told.runs]
+    damage = [f"{r.path}: {line}" for r in read for line in r.damage]
+    print("".join(f"{visible(line)}\n" for line in damage), end="", file=sys.stderr)
+    return DAMAGED if damage else DONE
 
 
 def _campaign(arguments: Namespace, command: Sequence[str]) -> campaign.Campaign:

@@ -106,7 +106,7 @@ def test_a_recording_without_readings_or_cut_short_says_so(run: Path, tmp_path: 
     settings = config.load(packaged()).settings
 
     with pytest.raises(
-        CommandError, match="found no readings of wheel_encoder; expected both encoders"
+        CommandError, match="found too few readings of wheel_encoder; expected both encoders"
     ):
         signals(read_all([empty])[0], settings, 10.0)
 

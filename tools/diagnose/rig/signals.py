@@ -136,7 +136,7 @@ def signals(recording: Recording, settings: Settings, rate: float) -> Signals:
         if series.get(name, _NONE)[0].size < TUNING.rig.encoder_readings
     ]
     if missing:
-        raise _too_little(recording, f"no readings of {missing[0]}", "both encoders")
+        raise _too_little(recording, f"too few readings of {missing[0]}", "both encoders")
 
     encoders = [series["wheel_encoder"], series["carriage_encoder"]]
     edges, left_out = _grid(recording, encoders, rate)

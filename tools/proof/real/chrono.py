@@ -129,8 +129,8 @@ def _soil(diagnosis: DiagnosisRun, name: str, true: float) -> Check:
 
 
 WHY = """
-The lugs dig in over more travel than any form of ours allows, and the wheel has a second ripple of
-4.02 a turn. What is named beside them follows the wheel's start and that ripple.
+The lugs dig in over 0.1 m of travel, and deeper with slip. That is a part of what they do, but the
+form of `grousers` allows less of it: what is named beside them says the rest.
 """
 
 TERRAIN = Proof(

@@ -74,7 +74,9 @@ def _from_file(device: Device) -> Database:
         )
 
     try:
-        return cantools.database.load_string(text, database_format="dbc")  # type: ignore[return-value]
+        return cantools.database.load_string(  # type: ignore[return-value]
+            text, database_format="dbc"
+        )
     except Exception as error:  # the parser's own errors share no class but this one
         reason = f"{device.dbc} is not a DBC file: {error}"
         raise DeviceSettingsError(f"device {device.name}", reason) from None

@@ -52,7 +52,7 @@ class Sensor(ABC):
     def reset(self) -> None:  # noqa: B027 - most sensors remember nothing
         """The device was reopened or started anew: forget what depended on its last frames."""
 
-    def check_signals(self, signals: Sequence[SignalShape]) -> None:  # noqa: B027 - most take any signal
+    def check_signals(self, signals: Sequence[SignalShape]) -> None:  # noqa: B027 - most take any
         """Raise DeviceSettingsError if these CAN signals cannot be this sensor's."""
 
     def refuse(self) -> None:

@@ -47,7 +47,7 @@ def _speak_as_the_terminal_does() -> None:
     """A terminal that knows no Greek gets a question mark, and a closed one nothing: no command
     fails for it, least of all the daemon.
     """
-    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 - or a recording takes its place
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 - or a recording takes it
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -95,4 +95,5 @@ def loads(
     Raises ConfigError.
     """
     (settings, run), complete = table(folder, effect_schema).read(compose(text, name))
+
     return Configuration(settings, serialise(complete), name, run, is_ended(text))

@@ -20,15 +20,21 @@ from gritd.estimator.terramechanics.soil import Scalar
 
 
 def _torque(term: str) -> float:
-    return strength(f"torque per {term}", "N·m", typical=0.2, low=-20.0, high=20.0)  # type: ignore[no-any-return]
+    return strength(  # type: ignore[no-any-return]
+        f"torque per {term}", "N·m", typical=0.2, low=-20.0, high=20.0
+    )
 
 
 def _pull(term: str) -> float:
-    return strength(f"drawbar pull per {term}", "N", typical=1.0, low=-200.0, high=200.0)  # type: ignore[no-any-return]
+    return strength(  # type: ignore[no-any-return]
+        f"drawbar pull per {term}", "N", typical=1.0, low=-200.0, high=200.0
+    )
 
 
 def _depth(term: str) -> float:
-    return strength(f"sinkage per {term}", "m", typical=2e-4, low=-0.05, high=0.05)  # type: ignore[no-any-return]
+    return strength(  # type: ignore[no-any-return]
+        f"sinkage per {term}", "m", typical=2e-4, low=-0.05, high=0.05
+    )
 
 
 @dataclass(frozen=True)

@@ -129,6 +129,7 @@ def weight_of(
     """
     share = load / usual.load
     touching = (speed > 0.0) & (share > carrying)
+
     return np.asarray(np.where(touching, share * (direction if signed else np.abs(direction)), 0.0))
 
 

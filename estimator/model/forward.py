@@ -78,6 +78,7 @@ def simulate_arrays(
     correction:      the discrepancy of form as it was learnt; its mean is added.
     """
     solved = carried(wheel, soil, motion, effects, order=order)
+
     return responded(solved, effects, torque_constant=torque_constant, correction=correction)
 
 

@@ -95,7 +95,9 @@ class Replayed(NamedTuple):
 
 
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
-    """What the filter makes of a recording, window by window; see `replayed`."""
+    """What the filter makes of a recording: one row a window (n,), fields ESTIMATES; see
+    `replayed`. Raises RecordingError.
+    """
     return replayed(settings, recording, engine).rows
 
 
@@ -110,6 +112,7 @@ def replayed(
     `followed`. Raises RecordingError.
     """
     streams = recorded_streams(recording, settings.rates.tick)
+
     return followed(settings, streams, engine, start, advance)
 
 

@@ -101,7 +101,9 @@ class Accepted(NamedTuple):
     members: Members
 
     def still(self, ends: Ints) -> Ints:
-        """How long the value had not changed at the end of each window [ns], 0 in an empty one."""
+        """How long the value had not changed (m,) [ns] at the ends of the windows (m,) [ns], 0 in
+        an empty one.
+        """
         changed = np.append(True, self.values[1:] != self.values[:-1])
         return self._since(changed, self.members.size > 0, ends)
 

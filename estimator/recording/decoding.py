@@ -51,12 +51,15 @@ class Source:
         self.codec.fill(table, gather(chunk.content, chunk.starts[own], self.dtype))
 
     def values(self, chunk: Chunk, own: Starts) -> list[tuple[Any, ...]]:
-        """The values of the messages numbered `own`, in the order of the topic's fields."""
+        """The values of the messages numbered `own`, shape (n,): n tuples in the order of the
+        topic's fields.
+        """
         assert self.codec is not None
         if self.codec.flat:
             table = np.empty(own.shape, self.topic.codec.table_dtype)
             self.fill(table, chunk, own)
             return list(table.tolist())
+
         order = [self.codec.names.index(name) for name in self.topic.names]
         decoded = [self.codec.decode(chunk.body(i)) for i in own.tolist()]
         return [tuple(values[i] for i in order) for values in decoded]
@@ -82,14 +85,16 @@ class Chunk:
         ]
 
     def records(self) -> tuple[bytes, Starts]:
-        """The message records, heads included, end to end, and where each begins."""
+        """The message records, heads included, end to end, and the byte offset where each begins,
+        shape (n,).
+        """
         sizes = self.heads["length"].astype(np.int64) + RECORD_HEAD.size
         pieces = zip(self.starts.tolist(), (self.starts + sizes).tolist(), strict=True)
         return b"".join(self.content[start:end] for start, end in pieces), np.cumsum(sizes) - sizes
 
     @cached_property
     def groups(self) -> dict[int, Starts]:
-        """Channel number -> the numbers of its messages, in file order."""
+        """Channel number -> the numbers of its messages, shape (n,), in file order."""
         if self.known is not None:
             return self.known
         channels = self.heads["channel"]
@@ -102,7 +107,7 @@ def select(
     content: bytes, starts: Starts, sources: Mapping[int, Source]
 ) -> tuple[Chunk, list[str]]:
     """The messages that are of a known channel and as long as its fields, and one line for each
-    kind of others.
+    kind of others. starts: byte offsets of the records in `content`, shape (n,).
     """
     whole = Chunk(content, starts, gather(content, starts, MESSAGE_DTYPE))
 

@@ -223,8 +223,9 @@ class McapFile:
         self._metadata_index.append(index)
 
     def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
-        """Write message records, concatenated in `messages`, that begin at `starts`, in this order,
-        as one chunk.
+        """Write message records, concatenated in `messages`, that begin at byte offsets `starts`,
+        shape (n,), in this order, as one chunk. Raises RecordingError where the file cannot be
+        written, and MemoryError.
         """
         if len(starts) == 0:
             return
@@ -353,6 +354,7 @@ class McapFile:
 
     def _statistics(self, schemas: int) -> Statistics:
         first, last = self._span or (0, 0)
+
         return Statistics(
             attachment_count=0,
             channel_count=len(self._counts),
@@ -385,6 +387,7 @@ def _message_index(
     """
     own = heads["channel"] == channel
     entries = np.column_stack([heads["log_time"][own], offsets[own]]).astype("<u8").tobytes()
+
     head = RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries)) + struct.pack(
         "<HI", channel, len(entries)
     )

@@ -97,9 +97,9 @@ class Recording:
         return self.tables({topic: None})[topic]
 
     def tables(self, wanted: Mapping[str, Fields]) -> dict[str, Rows]:
-        """Several topics at once, each as `arrays` gives it, in one pass over the file; of its
-        fields the named ones, or all for None. The arrays are read-only where `read` was told of
-        the same topic and fields: they were made then. Raises RecordingError.
+        """Several topics at once, each as `arrays` gives it, shape (n,) by topic, in one pass over
+        the file; of its fields the named ones, or all for None. The arrays are read-only where
+        `read` was told of the same topic and fields: they were made then. Raises RecordingError.
         """
         known = {topic: self._known(topic) for topic in wanted}
         made = {

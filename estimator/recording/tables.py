@@ -177,7 +177,7 @@ class Tables:
         return self._tables[name]
 
     def done(self) -> dict[tuple[str, Fields], Rows]:
-        """The rows by topic and fields."""
+        """The rows by topic and fields, shape (n,) each, which nobody may change."""
         return {(name, self.wanted[name]): table.done() for name, table in self._tables.items()}
 
 

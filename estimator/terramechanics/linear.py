@@ -168,6 +168,7 @@ def forces_under_load(
 ) -> Forces:
     """`predict` without gradients: a third of its cost, for a search over slip."""
     x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
+
     return _forces(
         wheel, x, c * theta_1, tan_phi, _scaled_peak(wheel, x, c, tan_phi, theta_1, load)
     )
@@ -186,6 +187,7 @@ def forces(
 ) -> Forces:
     """DP, W, T and resistance for a given peak stress σₘ [Pa]. Eqs. (20)-(22)."""
     x = _wheel_integrals(wheel, k, theta_1, slip, maths, shift)
+
     return _forces(wheel, x, c * theta_1, tan_phi, sigma_m * theta_1)
 
 
@@ -229,6 +231,7 @@ def triangular_shear_stress(
     """
     front = tau_m * np.subtract(theta_1, theta) / np.subtract(theta_1, theta_m)
     rear = tau_0 + (tau_m - tau_0) * np.divide(theta, theta_m)
+
     return np.where(np.greater(theta, theta_m), front, rear)
 
 

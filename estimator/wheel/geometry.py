@@ -89,4 +89,5 @@ def slope_sigma(scatter: float, spread: float, readings: int, counts_moved: floa
     window.
     """
     independent = min(readings, (int(counts_moved) + 1) ** 2)
+
     return scatter / spread * sqrt(readings / independent)

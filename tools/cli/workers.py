@@ -30,6 +30,7 @@ def add_cluster(parser: ArgumentParser, condition: str = "") -> None:
         metavar="tls://…",
         help=f"{condition}a dask scheduler whose workers see DIR; it can run anything here",
     )
+
     parser.add_argument(
         "--trust-network",
         action="store_true",

@@ -82,6 +82,7 @@ def _redo(
 ) -> dict[str, Any]:
     """What doing it again needs. Raises CommandError where a file is given twice."""
     hashes = distinct([*files, *reference.files])
+
     return {
         **({"command": command} if command else {}),
         "files": {str(path): hashes[str(path)] for path in files},

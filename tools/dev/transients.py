@@ -73,12 +73,14 @@ def _campaigns(batches: Sequence[Path]) -> Iterator[Path]:
 
 def main(argv: Sequence[str] | None = None) -> None:
     given = _parser().parse_args(argv)
+
     for folder in list(_campaigns(given.batches))[: given.most]:
         (configuration,) = folder.glob("*.yaml")
         settings = config.load(configuration).settings
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             seen = standing(rig_of(read_all(sorted(folder.glob("*.mcap"))), settings)[0])
+
         told = (
             f"{name} {blurred:.1f}, without blur {sharp:.1f} ({sharp / blurred - 1.0:+.0%})"
             for name, (blurred, sharp) in seen.items()

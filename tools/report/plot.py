@@ -72,7 +72,7 @@ def limits(
     *values: Array | Sequence[float], margin: float = 0.06, keep: float | None = None
 ) -> tuple[float, float]:
     """Least and greatest finite value with a margin; `keep` is inside too. Never empty. values: of
-    any shape.
+    any shape, (n,) or other, all in the unit of the result.
     """
     every = np.concatenate([np.ravel(np.asarray(v, dtype=float)) for v in values] or [np.zeros(0)])
     every = every[np.isfinite(every)]
@@ -211,6 +211,7 @@ def dots(at: Axes, x: Array, y: Array, class_: str) -> Markup:
 def band(at: Axes, low: float, high: float, class_: str = "band") -> Markup:
     """The height between two values, over the whole width."""
     top, bottom = float(at.y(high)), float(at.y(low))
+
     return at.clipped(
         tag(
             "rect",

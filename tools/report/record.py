@@ -132,6 +132,7 @@ def check(record: Record) -> None:
                 " (--data says where they are)",
                 USAGE,
             )
+
         if sha256(path) != expected:
             raise CommandError(
                 f"{path}: found another file; expected the recording that was diagnosed, by its"

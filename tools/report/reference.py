@@ -106,7 +106,9 @@ def _recorded(path: Path, name: str, digest: str) -> Path:
         places = " nor ".join(dict.fromkeys((name, str(beside))))
         reason = f"found no {places}; expected a recording that it diagnosed"
         raise CommandError(f"{path}: {reason}", USAGE)
+
     if sha256(recording) != str(digest):
         reason = f"found another {recording}; expected the one that it diagnosed, by its SHA-256"
         raise CommandError(f"{path}: {reason}", DAMAGED)
+
     return recording

@@ -110,7 +110,9 @@ def covariates(motions: list[Motion], plain: list[Response]) -> dict[str, Array]
 
 
 def since_reversal(angle: Array) -> Array:
-    """Angle turned since the wheel last turned round [rad], positive forward, (n,)."""
+    """Angle turned since the wheel last turned round (n,) [rad], of its angle (n,) [rad]; positive
+    forward.
+    """
     way = np.sign(np.diff(angle, prepend=angle[:1]))
     reverses = np.diff(way, prepend=way[:1]) != 0.0
     last = np.maximum.accumulate(np.where(reverses, np.arange(angle.size) - 1, 0))

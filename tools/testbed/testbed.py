@@ -183,6 +183,7 @@ def add_play(parser: argparse.ArgumentParser) -> None:
         help="length of the run, default 60",
     )
     parser.add_argument("--seed", type=whole(0), default=1, help="of soil and noise; default 1")
+
     parser.add_argument(
         "--plant",
         choices=get_args(PlantKind),

@@ -100,8 +100,14 @@ class MulticastBus:
         options: dict[str, str | int | float | bool] = {"port": _free_port(), "hop_limit": 0}
         self.device = replace(device, interface="udp_multicast", channel=group, options=options)
         self.lost = 0
+
         self._wire = CanWire(device)
-        self._bus = can.Bus(group, "udp_multicast", ignore_config=True, **options)  # type: ignore[arg-type]
+        self._bus = can.Bus(
+            group,
+            "udp_multicast",
+            ignore_config=True,
+            **options,  # type: ignore[arg-type]
+        )
 
     def send(self, key: str, values: Sequence[FieldValue], device_us: int) -> None:
         for message in messages(self._wire, key, values, device_us):

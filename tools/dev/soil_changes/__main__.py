@@ -70,11 +70,13 @@ def _parser() -> Parser:
         prog="python -m gritd.tools.dev.soil_changes",
         description="Random changes of the soil, and hours without: is σ honest?",
     )
+
     parser.add_argument("--cases", type=int, default=200, help="with a change; default 200")
     parser.add_argument("--hours", type=float, default=20.0, help="without one; default 20")
     parser.add_argument("--seed", type=int, default=1, help="of the first case; default 1")
     parser.add_argument("--plant", choices=("original", "linear"), default="original")
     parser.add_argument("--rate", type=float, default=RATE, help="readings a second; default 250")
+
     parser.add_argument(
         "--number",
         action="append",
@@ -82,6 +84,7 @@ def _parser() -> Parser:
         metavar="NAME=VALUE",
         help="another value of a tuned number (estimator/filter/tuning.py)",
     )
+
     return parser
 
 

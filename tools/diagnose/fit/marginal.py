@@ -102,14 +102,14 @@ class Marginal:
         return chosen, average
 
     def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
-        """Mean (count,) and covariance of the first unknowns, averaged over the sizes about the
-        likeliest ones.
+        """Mean (count,) and covariance (count, count) of the first unknowns, averaged over the
+        sizes about the likeliest ones.
         """
         return self.moments(chosen, np.arange(count))
 
     def moments(self, chosen: Chosen, wanted: Index) -> tuple[Array, Array]:
-        """Mean (w,) and covariance of some unknowns, averaged likewise. The weights of a freedom
-        are told times its size: 0 where it does not act.
+        """Mean (w,) and covariance (w, w) of the unknowns numbered `wanted` (w,), averaged
+        likewise. The weights of a freedom are told times its size: 0 where it does not act.
         """
         ordered, weight = self._weighed(chosen)
         told = [

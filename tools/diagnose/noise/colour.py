@@ -267,7 +267,7 @@ def surrogates(noise: Noise, count: int, rng: np.random.Generator) -> Array:
 
 
 def coloured(gaps: Array, count: int, colour: Colour, rng: np.random.Generator) -> Array:
-    """Noise of a colour (n, count)."""
+    """Noise of a colour (n, count), in the unit of its σ; gaps (n,) between the values [s]."""
     white = 1.0 - colour.slow - colour.fast
     out = np.sqrt(white) * rng.standard_normal((len(gaps), count))
     for share, time in (

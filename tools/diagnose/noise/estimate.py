@@ -38,8 +38,8 @@ def spikes(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Array:
 
 
 def uncertain(stack: Stack, predicted: Array, residual: Array, colours: Sequence[Colour]) -> Array:
-    """(N,) what adds to the noise of single values: blur of the prediction, spikes of the residual,
-    and what is left open of the motion.
+    """(N,) what adds to the noise of single values, in their units: blur of the prediction (N,),
+    spikes of the residual (N,), and what is left open of the motion.
     """
     return np.hypot(
         np.hypot(stack.rig.blur(stack, predicted), spikes(stack, residual, colours)),

@@ -107,7 +107,9 @@ class Detector:
         return self._whitened(self._changes(effects))
 
     def beside(self, change: Array, rivals: Array) -> float:
-        """D that is left of a change when rivals (m, k) may imitate it at any strength."""
+        """D that is left of a change (m,) when rivals (m, k) may imitate it at any strength; both
+        whitened.
+        """
         projected = rivals - self._columns @ cho_solve(
             (self._factor, True), self._columns.T @ rivals
         )

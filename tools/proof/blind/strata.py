@@ -76,6 +76,7 @@ def assignments(
     """
     counts = _counts(cases, strata)
     drawn = [item for stratum, count in counts.items() for item in _of(stratum, count, worlds, rng)]
+
     return [drawn[place] for place in rng.permutation(len(drawn))]
 
 

@@ -16,8 +16,8 @@ CLOSE = 1e-8  # relative error of the load at which the search ends
 
 
 def balance(load_at: Callable[[Array], Array], weight: Array, guess: Array) -> Array:
-    """θ₁ (n,) where `load_at(θ₁)` is the weight [N], by secants in ln W over ln θ₁, where it is
-    nearly a line.
+    """θ₁ (n,) [rad] where `load_at(θ₁)` (n,) is the weight (n,) [N], by secants in ln W over ln θ₁,
+    where it is nearly a line; guess (n,) [rad].
     """
     wanted = np.log(np.maximum(weight, 1e-6))
     old = np.log(np.clip(guess, SHALLOWEST, DEEPEST))
@@ -51,7 +51,9 @@ def _miss(load_at: Callable[[Array], Array], log_theta: Array, wanted: Array) ->
 
 
 def settled(target: Array, moving: Array, step: float, lag: float) -> Array:
-    """The sinkage (n,) of a damped axle that follows its balance with time constant `lag` [s].
+    """The sinkage (n,) [m] of a damped axle that follows its balance with time constant `lag` [s].
+
+    target: sinkage in balance (n,) [m]; moving (n,): 0 at rest, 1 in motion; step of time [s].
 
     Soil does not spring back: a wheel at rest may sink further but does not rise.
     """

@@ -32,6 +32,7 @@ class EquationBed:
     """Eqs. (1)-(10) at every sample; the axle follows its balance with a lag."""
 
     def carry(self, scenes: Sequence[Scene], weights: Sequence[Array], damped: bool) -> list[Scene]:
+        """See `Bed.carry`; weights (n,) [N] of each scene."""
         return [
             _carried(scene, weight, damped) for scene, weight in zip(scenes, weights, strict=True)
         ]

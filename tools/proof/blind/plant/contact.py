@@ -108,8 +108,8 @@ def reaction(
 
 
 def exit_angle(rim: Rim, theta_1: Array) -> Array:
-    """−θ₂ (n,): where soil that springs back by a share of the sinkage leaves the rim (Ishigami et
-    al. 2007).
+    """−θ₂ (n,) [rad], at entry angles (n,) [rad]: where soil that springs back by a share of the
+    sinkage leaves the rim (Ishigami et al. 2007).
     """
     share = np.clip(rim.rebound, 0.0, 1.0)
     return np.asarray(2.0 * np.arcsin(np.sqrt(share) * np.sin(0.5 * theta_1)))

@@ -58,7 +58,7 @@ class Effect:
         return float(rng.choice((-1.0, 1.0))) if cls.signed else 1.0
 
     def radius(self, radius: Array, motion: Motion) -> Array:
-        """Radius below the axle (n,) [m]."""
+        """Radius below the axle (n,) [m], of that of the effects before (n,) [m]."""
         return radius
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:

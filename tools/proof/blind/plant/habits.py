@@ -50,6 +50,7 @@ class WornGear(Effect):
     phase: float = 0.0
 
     def loss(self, scene: Scene) -> Array:
+        """Friction and ripple of the teeth together (n,), at the axle [N·m]."""
         motion, angle = scene.motion, self.order * scene.motion.turn + self.phase
         teeth = self.ripple * (np.cos(angle) + 0.4 * np.cos(3.0 * angle + 1.0)) * scene.moving
         level = self.level + self.strength * np.abs(scene.torque)

@@ -46,5 +46,5 @@ def follow(servo: Servo, wanted: Array, against: Array, step: float, substeps: i
 
 
 def summed(rate: Array, step: float) -> Array:
-    """Integral from 0 by trapezoids (n,)."""
+    """Integral of a rate (n,) from 0 by trapezoids (n,), in its unit times that of the step."""
     return np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)))

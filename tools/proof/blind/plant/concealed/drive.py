@@ -35,6 +35,7 @@ class GearTeeth(Effect, ABC):
         """Ripple of unit size at a phase (n,) [rad] of the teeth."""
 
     def loss(self, scene: Scene) -> Array:
+        """Ripple (n,) at the axle [N·m]; none at rest."""
         angle = self.order * scene.motion.turn + self.phase
         return np.asarray(self.strength * self.wave(angle) * scene.moving)
 
@@ -44,6 +45,7 @@ class RoundTeeth(GearTeeth):
     """Sine and second harmonic. Source: transmission error of a spur gear is no pure sine."""
 
     def wave(self, angle: Array) -> Array:
+        """cos φ + a cos(2φ + 1) (n,), dimensionless, at phases φ (n,) [rad]; a is `second`."""
         return np.asarray(np.cos(angle) + self.second * np.cos(2.0 * angle + 1.0))
 
 
@@ -56,6 +58,7 @@ class CatchingTeeth(GearTeeth):
     """
 
     def wave(self, angle: Array) -> Array:
+        """0.8 Σ sin(kφ)/k, k = 1 … 4 (n,), dimensionless, at phases φ (n,) [rad]."""
         parts = (np.sin(k * angle) / k for k in range(1, 5))
         return np.asarray(0.8 * sum(parts, start=np.zeros(angle.size)))
 
@@ -73,6 +76,7 @@ class Play(Effect, ABC):
         """Share of the load that the motor feels (n,), b times `turned` (n,) after a reversal."""
 
     def loss(self, scene: Scene) -> Array:
+        """−T (1 − share) (n,) [N·m]: what the motor does not feel of the torque T at the axle."""
         if not self.strength:
             return np.zeros(scene.torque.size)
         turned = _since_reversal(scene.motion.omega, scene.motion.turn) / self.strength
@@ -100,6 +104,7 @@ class StrikingPlay(Play):
     """
 
     def taken_up(self, turned: Array) -> Array:
+        """Share of the load (n,), 0 … 1.4, at angles turned since a reversal (n,) in units of b."""
         since = np.minimum(np.maximum(turned - 1.0, 0.0), 50.0)
         return np.asarray((turned >= 1.0) * (1.0 + 0.4 * np.exp(-3.0 * since)))
 
@@ -109,6 +114,7 @@ class SoftPlay(Play):
     """Teeth meet one after the other: the load comes in with the square of the angle over 1.5 b."""
 
     def taken_up(self, turned: Array) -> Array:
+        """Share of the load (n,), 0 … 1, at angles turned since a reversal (n,) in units of b."""
         return np.asarray(np.clip(turned / 1.5, 0.0, 1.0) ** 2)
 
 
@@ -134,7 +140,11 @@ class HousedWinding(Effect):
         return cls(fall, float(rng.uniform(8.0, 25.0)), float(rng.uniform(60.0, 200.0)))
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
+        """True current (n,) [A] from that of an ideal motor (n,) [A]. Both bodies are cold at
+        first; of the flux a fifth is always left.
+        """
         step, winding, housing, drawn = scene.motion.step, 0.0, 0.0, []
+
         for wanted in current.tolist():
             flux = 1.0 - self.strength * (0.3 * winding + 0.7 * housing)
             amperes = wanted / max(flux, 0.2)
@@ -163,9 +173,13 @@ class LadderedHeat(Effect):
         return cls(0.25 / max(facts.current, 0.1) ** 2, float(rng.uniform(20.0, 80.0)))
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
+        """True current (n,) [A] from that of an ideal motor (n,) [A]. The body is cold at first; of
+        K_t a fifth is always left.
+        """
         times = self.duration * np.array((0.25, 1.0, 4.0))
         gains = -np.expm1(-scene.motion.step / times)
         warm, drawn = np.zeros(3), []
+
         for wanted in current.tolist():
             amperes = wanted / max(1.0 - self.strength * float(warm.mean()), 0.2)
             warm = warm + gains * (amperes**2 - warm)
@@ -190,6 +204,7 @@ class LossyGear(Effect):
         return cls(cls.most * cls.sign(rng), 0.2 * facts.torque)
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
+        """I/(1 + e T²/(T² + T₁²)) (n,) [A] from that of an ideal motor, I (n,) [A]; T = K_t I."""
         torque = current * scene.rig.torque_constant
         loaded = torque**2 / (torque**2 + self.idle**2)
         return np.asarray(current / (1.0 + self.strength * loaded))
@@ -212,6 +227,9 @@ class WarmMagnets(Effect):
         return cls(cls.most * cls.sign(rng), facts.current)
 
     def drawn_current(self, current: Array, scene: Scene) -> Array:
+        """I/(1 + e (1 − m/20)) (n,) [A] from that of an ideal motor, I (n,) [A]; m = |I|/I_u − 1,
+        kept within −1 … 5, I_u the usual current.
+        """
         more = np.clip(np.abs(current) / self.usual - 1.0, -1.0, 5.0)
         return np.asarray(current / (1.0 + self.strength * (1.0 - 0.05 * more)))
 

@@ -28,6 +28,7 @@ class SaggingSlope(Effect):
         return cls(cls.most * cls.sign(rng), facts.length)
 
     def carried(self, weight: Array, scene: Scene) -> Array:
+        """W cos α (n,) [N] of weights W (n,) [N]."""
         return weight * float(np.cos(self.strength))
 
     def forces(self, scene: Scene) -> Scene:
@@ -49,6 +50,7 @@ class LeaningAxis(Effect):
     name, signed, most = "bed_slope", True, 0.08
 
     def carried(self, weight: Array, scene: Scene) -> Array:
+        """W/cos α (n,) [N] of weights W (n,) [N]."""
         return weight / float(np.cos(self.strength))
 
     def sensed(self, felt: Felt) -> Felt:
@@ -95,9 +97,11 @@ class HollowBed(InclinedBed):
     """Raked hollow: α x (1 − x/5L)."""
 
     def grade(self, place: Array) -> Array:
+        """α (1 − 2x/5L) (n,), rise per way, at places x on the bed (n,) [m]."""
         return np.asarray(self.strength * (1.0 - 0.4 * place / self.length))
 
     def rise(self, place: Array) -> Array:
+        """α x (1 − x/5L) (n,) [m] at places x on the bed (n,) [m]."""
         return np.asarray(self.strength * place * (1.0 - 0.2 * place / self.length))
 
 
@@ -106,10 +110,12 @@ class RollingBed(InclinedBed):
     """Raked in a wave: α (x + L/20 sin 2πx/L)."""
 
     def grade(self, place: Array) -> Array:
+        """α (1 + π/10 cos 2πx/L) (n,), rise per way, at places x on the bed (n,) [m]."""
         wave = 0.1 * np.pi * np.cos(2.0 * np.pi * place / self.length)
         return np.asarray(self.strength * (1.0 + wave))
 
     def rise(self, place: Array) -> Array:
+        """α (x + L/20 sin 2πx/L) (n,) [m] at places x on the bed (n,) [m]."""
         wave = 0.05 * self.length * np.sin(2.0 * np.pi * place / self.length)
         return np.asarray(self.strength * (place + wave))
 
@@ -175,13 +181,18 @@ class StickingAxis(Effect, ABC):
         return 1.0
 
     def carried(self, weight: Array, scene: Scene) -> Array:
+        """Load on the soil (n,) [N] of weights (n,) [N]: less by F h times `pressed`, a lifted
+        wheel's by nothing. Without a sinkage known, h and `pressed` are 1.
+        """
         if not scene.sinkage.size:
             return weight - self.strength * (weight > 0.0)
+
         held, state = [], 1.0
         steps = np.diff(scene.sinkage, prepend=scene.sinkage[0]) / self.breakaway
         for moved in steps.tolist():
             state = self.follow(state, moved)
             held.append(state)
+
         back = self.strength * np.array(held) * self.pressed(scene)
         return np.asarray(np.maximum(weight - back * (weight > 0.0), 0.0))
 
@@ -210,6 +221,7 @@ class HystereticAxis(StickingAxis):
     """
 
     def pressed(self, scene: Scene) -> Array | float:
+        """0.8 + |DP|/W (n,), dimensionless; the ratio counts up to 1, with W at least 1 N."""
         return 0.8 + np.clip(np.abs(scene.pull) / np.maximum(scene.motion.weight, 1.0), 0.0, 1.0)
 
     def follow(self, state: float, moved: float) -> float:

@@ -57,6 +57,7 @@ class BristleFriction(Effect):
         return cls(0.6 * facts.torque)
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `lugre` at T_C."""
         omega = scene.motion.omega
         return lugre(omega, np.full(omega.size, self.strength), scene.motion.step)
 
@@ -77,6 +78,7 @@ class BlockFriction(Effect):
         return cls(0.6 * facts.torque, float(rng.uniform(0.0, 2.0 * np.pi)))
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `maxwell` at T_C (1 + cos(ψ + phase)/20)."""
         level = self.strength * (1.0 + 0.05 * np.cos(scene.motion.turn + self.phase))
         return maxwell(scene.motion.omega, level, scene.motion.step)
 
@@ -97,6 +99,7 @@ class ThinningGrease(Effect):
         return cls(0.6 * facts.torque / facts.omega, float(rng.uniform(1.0, 3.0)) * facts.omega)
 
     def loss(self, scene: Scene) -> Array:
+        """B ω (1 + |ω|/ω₁)^(−0.2) (n,) at the axle [N·m]."""
         omega = scene.motion.omega
         return np.asarray(self.strength * omega * (1.0 + np.abs(omega) / self.thinning) ** -0.2)
 
@@ -117,6 +120,7 @@ class FloodedBearings(Effect):
         return cls(0.6 * facts.torque / facts.omega, facts.omega)
 
     def loss(self, scene: Scene) -> Array:
+        """B ω₀ sign(ω) |ω/ω₀|^(2/3) (n,) at the axle [N·m]."""
         rate = np.abs(scene.motion.omega) / self.usual
         return np.asarray(
             self.strength * self.usual * np.sign(scene.motion.omega) * rate ** (2.0 / 3.0)
@@ -139,6 +143,7 @@ class LorentzStribeck(Effect):
         return cls(0.8 * facts.torque, float(rng.uniform(0.4, 1.0)) * facts.omega)
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `lugre` at T_S/(1 + (ω/ω_S)²)."""
         omega = scene.motion.omega
         return lugre(omega, self.strength / (1.0 + (omega / self.speed) ** 2), scene.motion.step)
 
@@ -159,6 +164,7 @@ class ExponentialStribeck(Effect):
         return cls(0.9 * facts.torque, float(rng.uniform(0.4, 1.0)) * facts.omega)
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `maxwell` at T_S e^(−|ω|/ω_S)."""
         omega = scene.motion.omega
         return maxwell(
             omega, self.strength * np.exp(-np.abs(omega) / self.speed), scene.motion.step
@@ -176,6 +182,7 @@ class OneSidedGear(Effect):
         return cls(0.4 * facts.torque * cls.sign(rng))
 
     def loss(self, scene: Scene) -> Array:
+        """Torque (n,) at the axle [N·m] by `lugre`, of the sign of A: A forward, 0.9 A backward."""
         omega = scene.motion.omega
         return (
             np.abs(lugre(omega, np.where(omega > 0.0, 1.0, 0.9), scene.motion.step)) * self.strength
@@ -202,6 +209,7 @@ class ThrustedGear(Effect):
         return cls(0.4 * facts.torque * cls.sign(rng), facts.torque)
 
     def loss(self, scene: Scene) -> Array:
+        """Torque (n,) at the axle [N·m] by `maxwell`, of the sign of A both ways."""
         pushed = 0.75 + 0.25 * np.abs(scene.torque) / self.torque
         turning = np.abs(maxwell(scene.motion.omega, np.ones(pushed.size), scene.motion.step))
         return np.asarray(self.strength * pushed * turning)
@@ -225,6 +233,7 @@ class LoadedBearing(Effect):
         return cls(cls.most, facts.radius, facts.weight)
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `lugre` at a r W₀ (W/W₀)^1.4."""
         pressed = np.maximum(scene.carried, 0.0) / self.weight
         level = self.strength * self.lever * self.weight * pressed**1.4
         return lugre(scene.motion.omega, level, scene.motion.step)
@@ -247,6 +256,9 @@ class PlainBearing(Effect):
         return cls(cls.most, facts.radius)
 
     def loss(self, scene: Scene) -> Array:
+        """Friction torque (n,) at the axle [N·m]: `maxwell` at a r √(W² + DP²) (|ω|/ω₀)^(−0.04),
+        with ω₀ = 0.3 rad/s.
+        """
         pressed = np.hypot(np.maximum(scene.carried, 0.0), scene.pull)
         speed = np.abs(scene.motion.omega) + CREEP
         level = self.strength * self.lever * pressed * (speed / 0.3) ** -0.04

@@ -206,6 +206,7 @@ class FlankedPatch(Stretch):
     """w is a trapezoid: a stretch with straight flanks, as filled in by hand."""
 
     def inside(self, place: Array) -> Array:
+        """w (n,), 0 … 1, at places on the bed (n,) [m]; ½ at `half` from the middle."""
         away = np.abs(place - self.middle) - self.half
         return np.asarray(np.clip(0.5 - away / self.flank, 0.0, 1.0))
 
@@ -215,6 +216,7 @@ class RoundPatch(Stretch):
     """w is a bell e^(−((x − x₀)/l)²): water that spread from one spot."""
 
     def inside(self, place: Array) -> Array:
+        """w (n,), 0 … 1, at places x on the bed (n,) [m]; l is `half`."""
         return np.asarray(np.exp(-(((place - self.middle) / self.half) ** 2)))
 
 

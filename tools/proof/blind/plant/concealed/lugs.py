@@ -74,6 +74,9 @@ class Blades(Lugs):
     """
 
     def push(self, scene: Scene, theta: Array) -> Array:
+        """Force F (n,) along the rim [N] of a blade at θ (n,) [rad]. It comes in over 0.1 rad past
+        the entry and fades out over 0.3 rad behind the axle.
+        """
         radius, height = scene.rig.radius, self.strength
         root = np.maximum(radius * (np.cos(theta) - np.cos(scene.theta_1)), 0.0)
         entered = np.clip((scene.theta_1 - theta) / 0.1, 0.0, 1.0) * np.clip(
@@ -102,6 +105,9 @@ class Teeth(Lugs):
     """
 
     def push(self, scene: Scene, theta: Array) -> Array:
+        """Force F (n,) along the rim [N] of a tooth at θ (n,) [rad]. Below a slip of a quarter it
+        falls to 0 with the slip.
+        """
         ground, middle = scene.ground, 0.5 * scene.theta_1
         spread = np.maximum(0.35 * scene.theta_1, 0.03)
         strength = 4.0 * ground.cohesion + scene.pressure * ground.tan_phi
@@ -110,6 +116,7 @@ class Teeth(Lugs):
         return np.asarray(scene.rig.width * self.strength * strength * bell * slipping)
 
     def depth(self, scene: Scene) -> Array | float:
+        """h i/(1 − i)/4 (n,) [m], i from 0 to 0.8; none at rest."""
         slip = np.clip(scene.slip, 0.0, 0.8)
         return 0.25 * self.strength * slip / (1.0 - slip) * scene.moving
 

@@ -142,6 +142,9 @@ class FilteredLatency(Latency):
     """Half by transport and half by a low-pass filter."""
 
     def late(self, values: Array, time: Array) -> Array:
+        """Readings (n,), in their own unit, moved by τ/2 and low-passed with τ/2; times (n,) [s]
+        are of a fixed step.
+        """
         moved = np.interp(time - 0.5 * self.strength, time, values)
         return lagged(moved, np.full(time.size, time[1] - time[0]), 0.5 * self.strength)
 
@@ -151,6 +154,7 @@ class AveragedLatency(Latency):
     """The mean of the last 2 τ. Source: an integrating converter."""
 
     def late(self, values: Array, time: Array) -> Array:
+        """Means of readings (n,) over the last 2 τ, in their own unit, at times (n,) [s]."""
         return mean_before(values, time, 2.0 * self.strength)
 
 

@@ -116,6 +116,7 @@ class FilledRut(BowWave):
     """The same, falling as the straight line 1 − s/(3 λ) until it is gone."""
 
     def fading(self, path: Array) -> Array:
+        """1 − s/(3 λ) (n,), at least 0, dimensionless, after ways s (n,) [m]."""
         return np.asarray(np.clip(1.0 - path / (3.0 * self.length), 0.0, 1.0))
 
 

@@ -119,6 +119,7 @@ class OffsetAxle(Effect):
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)))
 
     def radius(self, radius: Array, motion: Motion) -> Array:
+        """Radius below the axle (n,) [m], of a round wheel's (n,) [m]."""
         return self.below(radius, motion.turn)
 
     def forces(self, scene: Scene) -> Scene:
@@ -155,6 +156,7 @@ class DentedRim(OffsetAxle):
         return cls(cls.most, float(rng.uniform(0.0, 2.0 * np.pi)), float(rng.uniform(0.6, 1.0)))
 
     def below(self, radius: Array, turn: Array) -> Array:
+        """r − e g (n,) [m] of a round wheel's r (n,) [m], at angles `turn` (n,) [rad]."""
         narrow = 1.0 / self.flank**2
         return np.asarray(
             radius - self.strength * np.exp(narrow * (np.cos(turn + self.phase) - 1.0))
@@ -189,6 +191,7 @@ class OvalHub(Hub):
     """cos ψ' and 0.4 of it twice a turn."""
 
     def wave(self, angle: Array) -> Array:
+        """cos ψ' + 0.4 cos 2ψ' (n,), dimensionless, at angles ψ' (n,) [rad]."""
         return np.asarray(np.cos(angle) + 0.4 * np.cos(2.0 * angle))
 
 
@@ -197,6 +200,7 @@ class KeyedHub(Hub):
     """A bell of 0.6 rad once a turn: a key that stands proud of its groove."""
 
     def wave(self, angle: Array) -> Array:
+        """e^((cos ψ' − 1)/0.6²) (n,), dimensionless, at angles ψ' (n,) [rad]."""
         return np.asarray(np.exp((np.cos(angle) - 1.0) / 0.6**2))
 
 
@@ -217,6 +221,7 @@ class ElasticInertia(Effect):
         return cls(cls.most, float(rng.uniform(0.03, 0.12)))
 
     def loss(self, scene: Scene) -> Array:
+        """J times the acceleration that the rotor has (n,), at the axle [N·m]."""
         gain = -float(np.expm1(-scene.motion.step / self.lag))
         state, torques = 0.0, []
         for alpha in scene.motion.alpha.tolist():
@@ -244,6 +249,9 @@ class GearedInertia(Effect):
         return cls(cls.most, float(rng.uniform(0.75, 0.92)))
 
     def loss(self, scene: Scene) -> Array:
+        """J α/η (n,) speeding up, J α η slowing down, at the axle [N·m]; α = dω/dt, η the
+        efficiency.
+        """
         alpha, omega = scene.motion.alpha, scene.motion.omega
         factor = np.where(alpha * omega > 0.0, 1.0 / self.efficiency, self.efficiency)
         return np.asarray(self.strength * alpha * factor)
@@ -267,6 +275,7 @@ class WornRim(Effect):
         return cls(cls.most * cls.sign(rng), float(rng.uniform(0.0, 2.0 * np.pi)))
 
     def radius(self, radius: Array, motion: Motion) -> Array:
+        """r (1 + e + e/10 cos 2ψ') (n,) [m] of radii r (n,) [m]."""
         shape = 1.0 + 0.1 * np.cos(2.0 * (motion.turn + self.phase))
         return radius * (1.0 + self.strength * shape)
 
@@ -291,6 +300,7 @@ class YieldingRim(Effect):
         return cls(cls.most * cls.sign(rng), facts.weight)
 
     def radius(self, radius: Array, motion: Motion) -> Array:
+        """r (1 + e (3/4 + W/4W₀)) (n,) [m] of radii r (n,) [m]; W is the weight on the axle."""
         pressed = 0.75 + 0.25 * motion.weight / self.weight
         return radius * (1.0 + self.strength * pressed)
 

@@ -160,6 +160,7 @@ class RoomDrift(Drift):
     """With the temperature of the room, which swings: sin(t/τ) τ over a run."""
 
     def crept(self, time: Array) -> Array:
+        """sin(t/τ) τ/T (n,), dimensionless, at times t (n,) [s]; T is the length of a run."""
         return np.asarray(np.sin(time / self.pace) * self.pace / self.span)
 
 
@@ -168,6 +169,7 @@ class GluedDrift(Drift):
     """With the logarithm of time, as glue under a strain gauge creeps: ln(1 + t/τ) τ over a run."""
 
     def crept(self, time: Array) -> Array:
+        """ln(1 + t/τ) τ/T (n,), dimensionless, at times t (n,) [s]; T is the length of a run."""
         return np.asarray(np.log1p(time / self.pace) * self.pace / self.span)
 
 

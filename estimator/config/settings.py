@@ -154,11 +154,12 @@ class Logging:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """How far the soil of one preparation of a bed lies from that of all, standard deviations."""
+    """How far one preparation of a bed lies from all of them, standard deviations."""
 
     cohesion: float = 0.0  # [Pa]
     tan_phi: float = 0.0
     shear_modulus: float = 0.0  # share of k
+    surface: float = 0.0  # [m]
 
 
 @dataclass(frozen=True)

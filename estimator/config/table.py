@@ -214,6 +214,7 @@ REPEATABILITY = {
     "cohesion": Key(Quantity("Pa", low=0), "of c", "0 Pa"),
     "tan_phi": Key(Quantity("", low=0), "of tan φ", "0.0"),
     "shear_modulus": Key(Quantity("", low=0, high=1), "of k, relative", "0 %"),
+    "surface": Key(Quantity("m", low=0, high=0.1), "of its height along the bed", "0 mm"),
 }
 
 BED = {

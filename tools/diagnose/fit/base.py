@@ -99,9 +99,9 @@ def in_noise(rough: BaseFit, noise: Noise) -> Problem:
 
 
 def allowed(stack: Stack) -> Array:
-    """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, and what a learnt
-    discrepancy of the configuration leaves open, last.
+    """Columns (N, t) that every fit has: smooth ones, the unrest of the motion, the relief of the
+    bed, and what a learnt discrepancy of the configuration leaves open, last.
     """
     smooth, held = tolerance(stack, TUNING.fit.tolerance), stack.rig.held
-    own = np.column_stack((smooth, stack.unrest))
+    own = np.column_stack((smooth, stack.unrest, stack.reliefs))
     return own if held is None else np.column_stack((own, held.doubts(stack)))

@@ -16,6 +16,22 @@ from gritd.tools.diagnose.tuning import TUNING
 
 
 @dataclass(frozen=True, eq=False)
+class Bends:
+    """Other forms of a model's effects: the freedoms, and which size each has."""
+
+    freedoms: tuple[Freedom, ...] = ()
+    sizes: Chosen = ()
+
+    def of(self, names: Sequence[str]) -> Bends:
+        """Those of some effects."""
+        kept = [i for i, f in enumerate(self.freedoms) if f.name in names]
+        return Bends(tuple(self.freedoms[i] for i in kept), tuple(self.sizes[i] for i in kept))
+
+
+NO_BENDS = Bends()
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """The base model with some effects, fitted together with the constants.
 
@@ -32,6 +48,13 @@ class Model:
     bends: tuple[float, ...] = ()
     marginal: Marginal | None = None
     chosen: Chosen = ()  # sizes of all freedoms in `marginal`
+
+    @property
+    def other_forms(self) -> Bends:
+        """Of the model's effects, as they were fitted."""
+        first = len(self.sizes)
+        freedoms = self.marginal.freedoms if self.marginal else ()
+        return Bends(tuple(freedoms[first:]), self.chosen[first:])
 
     def discrepancy(self) -> tuple[Array, Array]:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
@@ -68,19 +91,23 @@ def fit_model(
     free: Sequence[Free],
     start: tuple[Array, Array],
     sizes: Chosen,
+    bends: Bends = NO_BENDS,
 ) -> Model:
     """Fit and sizes in turns, until the sizes stay, a few rounds at most.
 
-    Every fit but the first has the freedoms of its effects too. Without the other forms that these
-    need, it would strain the constants, to where linear algebra tells nothing.
+    Every fit has the freedoms of its effects too, as far as they are known when it begins. Without
+    the other forms that these need, it would strain the constants, to where linear algebra tells
+    nothing.
 
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
-    parameters (p,); sizes: of the forms, where the search begins.
+    parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
+    a model that holds them.
     """
-    fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend(effects, free, *start)
+    every, sizes = (*forms, *bends.freedoms), (*sizes, *bends.sizes)
+    fitted = problem.with_freedoms(every, _values(every, sizes)).descend(effects, free, *start)
     for left in reversed(range(TUNING.fit.size_rounds)):
-        every = (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
-        of_fit = _padded(sizes, len(forms), len(every))
+        known, every = every, (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
+        of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.tolerance, every)
 
         sizes, evidence = marginal.likeliest(of_fit)
@@ -90,13 +117,20 @@ def fit_model(
 
     names = tuple(effect.name for effect in fitted.acting)
     of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
-    bends = tuple(_values(every[len(forms) :], of_bends))
-    return Model(fitted, names, evidence, of_forms, bends, marginal, of_fit)
+    bent = tuple(_values(every[len(forms) :], of_bends))
+    return Model(fitted, names, evidence, of_forms, bent, marginal, of_fit)
 
 
-def _padded(sizes: Chosen, forms: int, count: int) -> Chosen:
-    """Sizes of so many freedoms, the forms first; those of the bends 0 where there were others."""
-    return sizes if len(sizes) == count else sizes[:forms] + (0,) * (count - forms)
+def _handed_on(known: Sequence[Freedom], sizes: Chosen, every: Sequence[Freedom]) -> Chosen:
+    """Of every freedom the size that it has among the known ones; the smallest where it is new."""
+    of_known = dict(zip(_places(known), sizes, strict=True))
+    return tuple(of_known.get(place, 0) for place in _places(every))
+
+
+def _places(freedoms: Sequence[Freedom]) -> list[tuple[str, int]]:
+    """The name of each freedom, and how many of that name stand before it."""
+    names = [f.name for f in freedoms]
+    return [(name, names[:number].count(name)) for number, name in enumerate(names)]
 
 
 def sized_model(

@@ -28,23 +28,52 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SQUARE
 
 
-def spikes(stack: Stack, residual: Array, colours: Sequence[Colour]) -> Array:
+def spikes(
+    stack: Stack, residual: Array, colours: Sequence[Colour], explainable: Array | None = None
+) -> Array:
     """(N,) how far a single value of a residual (N,) stands off its neighbours, where that is
     beyond SPIKE; else 0.
+
+    explainable: columns (N, m). Play in the drive makes a few values stand off after a reversal. So
+    what columns that stand off their neighbours too can explain of such values is no spike.
     """
-    off = np.abs(residual - median_filter(residual, TUNING.noise.spike_neighbours, mode="nearest"))
-    sigma = np.array([c.sigma for c in colours])[stack.channel]
-    return np.where(off > TUNING.noise.spike * sigma, off, 0.0)
+    off = _off_neighbours(residual)
+    least = TUNING.noise.spike * np.array([c.sigma for c in colours])[stack.channel]
+    spiked = np.abs(off) > least
+
+    if explainable is not None and spiked.any():
+        sudden = _sudden(explainable)[spiked]
+        off[spiked] -= sudden @ np.linalg.lstsq(sudden, off[spiked], rcond=None)[0]
+    return np.where(spiked & (np.abs(off) > least), np.abs(off), 0.0)
 
 
-def uncertain(stack: Stack, predicted: Array, residual: Array, colours: Sequence[Colour]) -> Array:
+def _off_neighbours(values: Array) -> Array:
+    """(N,) by what each of values (N,) differs from the median about it."""
+    near = median_filter(values, TUNING.noise.spike_neighbours, mode="nearest")
+    return np.asarray(values - near)
+
+
+def _sudden(columns: Array) -> Array:
+    """Of columns (N, m) those (N, k) that are largest where they stand off their neighbours; by
+    what they do.
+    """
+    off = np.column_stack([np.zeros((len(columns), 0)), *map(_off_neighbours, columns.T)])
+    largest = np.abs(columns).max(axis=0, initial=0.0)
+    return off[:, np.abs(off).max(axis=0, initial=0.0) > TUNING.noise.sudden * largest]
+
+
+def uncertain(
+    stack: Stack,
+    predicted: Array,
+    residual: Array,
+    colours: Sequence[Colour],
+    explainable: Array | None = None,
+) -> Array:
     """(N,) what adds to the noise of single values, in their units: blur of the prediction (N,),
-    spikes of the residual (N,), and what is left open of the motion.
+    spikes of the residual (N,) that no columns (N, m) explain, and what is left open of the motion.
     """
-    return np.hypot(
-        np.hypot(stack.rig.blur(stack, predicted), spikes(stack, residual, colours)),
-        stack.motion_sigma,
-    )
+    off = spikes(stack, residual, colours, explainable)
+    return np.hypot(np.hypot(stack.rig.blur(stack, predicted), off), stack.motion_sigma)
 
 
 def first_guess(stack: Stack, predicted: Array) -> Noise:
@@ -91,7 +120,7 @@ def estimate(
     posteriors = [_chosen(stack, posterior, rng) for posterior in told]
     colours = tuple(f[0] for f in posteriors)
     own = replicates.own_columns(stack, residual, colours, waves)
-    return _noise(stack, predicted, residual, posteriors, own)
+    return _noise(stack, predicted, residual, posteriors, own, explainable.leading)
 
 
 def estimate_of_reference(
@@ -114,7 +143,8 @@ def estimate_of_reference(
     ]
     posteriors = [_chosen(stack, posterior, rng) for posterior in told]
 
-    return _noise(stack, predicted, residual, posteriors, np.zeros((stack.size, 0)))
+    none = np.zeros((stack.size, 0))
+    return _noise(stack, predicted, residual, posteriors, none, explainable.leading)
 
 
 def _noise(
@@ -123,15 +153,18 @@ def _noise(
     residual: Array,
     posteriors: Sequence[tuple[Colour, ...]],
     own: Array,
+    explainable: Array,
 ) -> Noise:
-    """Of each channel's posterior the first colour; own: columns (N, m) of each run by itself."""
+    """Of each channel's posterior the first colour; own: columns (N, m) of each run by itself;
+    explainable: columns (N, p).
+    """
     colours = tuple(each[0] for each in posteriors)
 
     return Noise(
         stack,
         colours,
         tuple(each[1:] for each in posteriors),
-        uncertain(stack, predicted, residual, colours),
+        uncertain(stack, predicted, residual, colours, explainable),
         own,
     )
 

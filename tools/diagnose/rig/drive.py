@@ -120,6 +120,11 @@ class DriveRig:
         """No channel (n,) of any part, for the same reason."""
         return ()
 
+    @property
+    def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """No channel (n,) of any surface: a drive has no bed."""
+        return ()
+
     def aside(self) -> AbstractContextManager[None]:
         """Nothing is kept of a prediction."""
         return nullcontext()

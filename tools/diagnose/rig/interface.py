@@ -236,6 +236,12 @@ class Rig(Protocol):
         unrest of its speed is noise of the sensor, in the channel's unit.
         """
 
+    @property
+    def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """Of each wave of a surface that was prepared anew, per run what every channel (n,) reads
+        of it, one standard deviation, in the channel's unit.
+        """
+
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False
     ) -> list[dict[str, Array]]:
@@ -319,7 +325,15 @@ class Stack:
     @cached_property
     def unrest(self) -> Array:
         """Columns (N, k) in the channels' units: see Rig.unrest; those that act."""
-        columns = [self.joined(part) for part in self.rig.unrest]
+        return self._columns(self.rig.unrest)
+
+    @cached_property
+    def reliefs(self) -> Array:
+        """Columns (N, k) in the channels' units: see Rig.reliefs; those that act."""
+        return self._columns(self.rig.reliefs)
+
+    def _columns(self, parts: Sequence[Sequence[Mapping[str, Array]]]) -> Array:
+        columns = [self.joined(part) for part in parts]
         return np.column_stack([np.zeros((self.size, 0)), *(c for c in columns if np.any(c))])
 
     @cached_property

@@ -23,8 +23,7 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     (n,).
     """
     rim = settings.wheel.radius * np.asarray(motion.wheel_speed)
-    turning = np.abs(rim)[np.abs(rim) > TUNING.rig.turning_speed]
-    usual = float(np.median(turning)) if turning.size else TUNING.rig.turning_speed
+    usual, way = _usual(rim), _way(rim)
 
     load = np.asarray(motion.load)
     carrying, lifted = (
@@ -40,7 +39,6 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
             TUNING.rig.longest_settling,
         )
     )
-    way = np.where(np.abs(rim) > TUNING.rig.creep * usual, np.sign(rim), 0.0)
     apart = round(passing / step), round(TUNING.rig.stopping / step)
 
     rest = at_rest(rim, np.asarray(motion.carriage_speed))
@@ -53,6 +51,14 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     return driving, resting, spinning
 
 
+def turning(motion: Motion, settings: Settings) -> Bools:
+    """Where the wheel turns one way, settled or not (n,): what the drive loses between two torques
+    that are both measured needs no steady state of the soil.
+    """
+    way = _way(settings.wheel.radius * np.asarray(motion.wheel_speed))
+    return _inside(way, TUNING.rig.turned, TUNING.rig.turned)
+
+
 def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     """Where both speeds (n,) [m/s] are 0 but for the encoders' noise: a standing wheel's slip means
     nothing.
@@ -63,6 +69,17 @@ def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:
     )
     rest: Bools = (np.abs(rim_speed) < least) & (np.abs(carriage_speed) < least)
     return rest
+
+
+def _usual(rim: Array) -> float:
+    """Rim speed while the wheel turns [m/s], from that of a run (n,)."""
+    moved = np.abs(rim)[np.abs(rim) > TUNING.rig.turning_speed]
+    return float(np.median(moved)) if moved.size else TUNING.rig.turning_speed
+
+
+def _way(rim: Array) -> Array:
+    """1 forward, −1 backward, 0 where the wheel hardly turns (n,); rim speed (n,) [m/s]."""
+    return np.where(np.abs(rim) > TUNING.rig.creep * _usual(rim), np.sign(rim), 0.0)
 
 
 def _inside(state: Array, after: int, before: int) -> Bools:

@@ -43,6 +43,7 @@ from gritd.tools.diagnose.rig.measured_runs import (
 from gritd.tools.diagnose.rig.prediction import SOIL, Driven, Prediction
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
+from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
@@ -105,7 +106,8 @@ class WheelRig:
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
 
         self._driven = _driven(signals, weights, self.new, settings)
-        prepared = preparation(settings) if reference and bed == "prepared" else {}
+        self._anew = bool(reference) and bed == "prepared"
+        prepared = preparation(settings) if self._anew else {}
         self.constants = (
             *wheel_constants(settings, self.channels, self._driven.sets, stated),
             *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
@@ -189,6 +191,13 @@ class WheelRig:
         if all(one.known for one in self._weights):
             return speeds
         return [*speeds, *load_errors_in(self._weights, self._by("weights"))]
+
+    @cached_property
+    def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
+        """Of each run, channels (n,); none on a bed that was not touched, and none in tables."""
+        if self._tabled or not self._anew or "sinkage" not in self.channels:
+            return ()
+        return list(reliefs_of(self.runs, self.channels, height_of(self.settings)))
 
     @cached_property
     def _by_carriage(self) -> list[dict[str, Array]]:

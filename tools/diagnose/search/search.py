@@ -223,12 +223,32 @@ def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
 
 
 def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
-    fitted = model.fitted
+    """The model with one more effect. Where it ends well below the model that it holds, it has
+    lost its way: it is fitted again from there, with the effect's strengths at nought.
+    """
+    made = _fitted_with(search, model, promise)
+    if made.evidence > model.evidence - TUNING.search.lost:
+        return made
+
+    strengths = [p.role == "strength" for p in promise.effect.parameters()]
+    none = replace(promise, start=np.where(strengths, 0.0, promise.start), sizes=model.sizes)
+    return max(made, _fitted_with(search, model, none), key=lambda m: m.evidence)
+
+
+def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
+    fitted, screening = model.fitted, search.screening
     effects: tuple[Maker, ...] = (*fitted.effects, promise.effect)
     free = (*fitted.free, *free_of((promise.effect,)))
     begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
-    screening = search.screening
-    return fit_model(screening.problem, screening.forms, effects, free, begins, promise.sizes)
+    return fit_model(
+        screening.problem,
+        screening.forms,
+        effects,
+        free,
+        begins,
+        promise.sizes,
+        model.other_forms,
+    )
 
 
 def _retested(search: Search) -> Search:
@@ -254,7 +274,8 @@ def without(search: Search, model: Model, name: str) -> Model:
     free = free_of(types)
     begins = (model.fitted.u, np.array([_at(model, f) for f in free]))
     screening = search.screening
-    return fit_model(screening.problem, screening.forms, types, free, begins, model.sizes)
+    bends = model.other_forms.of(kept)
+    return fit_model(screening.problem, screening.forms, types, free, begins, model.sizes, bends)
 
 
 def _at(model: Model, wanted: Free) -> float:

@@ -54,6 +54,9 @@ class Noise:
     spike: float = tuned(
         6.0, "σ", "from the median of its neighbours: such a value counts as much less certain"
     )
+    sudden: float = tuned(
+        0.3, "-", "of its largest value: what stands off its neighbours by more is sudden"
+    )
     spike_neighbours: int = tuned(5, "values", "whose median tells a spike")
     restless: float = tuned(
         1.5, "-", "times the noise's differences from value to value: the noise is larger there"

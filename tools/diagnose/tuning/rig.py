@@ -40,7 +40,7 @@ class Rig:
     bend: float = tuned(
         0.5, "-", "share of the bend between neighbours: speeds are slopes over three intervals"
     )
-    shallow: float = tuned(1e-3, "m", "a sinkage below which its changes mean little")
+    shallow: float = tuned(0.0005, "m", "a sinkage below which its changes mean little")
     lag: float = tuned(
         0.015, "s", "an axle sinks later than in the balance: its damping carries load meanwhile"
     )
@@ -157,7 +157,7 @@ class Rig:
         0.15, "-", "relative distance of measured and stated load at which both mean the same"
     )
     close_force: float = tuned(1.0, "N", "beside this: weights are not stated to less")
-    carried: float = tuned(0.5, "-", "of the stated load: above it the wheel carries it")
+    carried: float = tuned(0.5, "share", "of the stated load: above it the wheel carries it")
     raised: float = tuned(0.2, "-", "of the stated load: below it the wheel is lifted")
     passing: float = tuned(0.1, "-", "part of a run that may pass between lifted and loaded")
     load_doubt: float = tuned(
@@ -166,6 +166,10 @@ class Rig:
     load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
     load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
     hold: float = tuned(1.0, "s", "weights stay for at least this long")
+
+    turned: int = tuned(
+        1, "intervals", "from a start, a stop or a reversal: the loss between two torques settles"
+    )
 
     # --- wheel.py ---
     holding: float = tuned(
@@ -180,3 +184,13 @@ class Rig:
     prepared: Mapping[str, float] = tuned(
         PREPARED, "-", "relative repeatability of a bed that is raked and levelled anew"
     )
+
+    # --- relief.py ---
+    relief: float = tuned(
+        5e-4,
+        "m",
+        "standard deviation of a surface that was raked and levelled anew",
+        "judgement: a board levels to about half a millimetre",
+    )
+    shortest_relief: float = tuned(0.1, "m", "wave of such a surface: a board bridges shorter ones")
+    most_reliefs: int = tuned(12, "half waves", "of such a surface along a run", "run time")

@@ -25,6 +25,12 @@ class Search:
         0.1, "share", "of an effect's linear evidence by which its fit may do better"
     )
     behind: float = tuned(12.0, "nats", "a model so far behind the best starts nothing")
+    lost: float = tuned(
+        8.0,
+        "nats",
+        "below the model that it holds, a fit begins anew",
+        "what an effect's prior costs",
+    )
     same: float = tuned(
         1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
     )

@@ -58,6 +58,7 @@ def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature], siz
         fitted.free,
         (fitted.u, fitted.x),
         model.sizes,
+        model.other_forms,
     )
 
 

@@ -105,3 +105,11 @@ def test_a_motor_without_axle_torque_beside_it_is_compared_with_the_model() -> N
 def _without_axle(signals: Signals) -> Signals:
     kept = {n: v for n, v in signals.analogue.items() if n != "axle_torque"}
     return replace(signals, name=f"later-{signals.name}", analogue=kept)
+
+
+def test_play_shows_in_the_few_values_after_a_reversal() -> None:
+    """Soil and motion have not settled there, but the loss between two torques needs no soil."""
+    found = diagnose(
+        WheelRig(record(plan(reverse=True), (make("backlash", {"gap": 0.05}),)), settings())
+    )
+    assert [h.effect for h in found.hypotheses if h.accepted] == ["backlash"], found.summary

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import BedSettings, Repeatability
 from gritd.tools.diagnose.rig.constants import preparation
+from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
 from gritd.tools.diagnose.tuning import TUNING
-from tests.tools.diagnose.campaigns import settings
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
 
 
 def test_what_is_not_stated_is_as_usual() -> None:
@@ -22,3 +26,30 @@ def test_what_the_configuration_states_is_taken() -> None:
     assert found["c"] == pytest.approx(0.02)
     assert found["k"] == pytest.approx(0.3)
     assert found["tan_phi"] == TUNING.rig.prepared["tan_phi"]
+
+
+@pytest.mark.parametrize(("stated", "height"), [(0.0, TUNING.rig.relief), (2e-3, 2e-3)])
+def test_every_run_on_a_bed_prepared_anew_has_a_surface_of_its_own(
+    stated: float, height: float
+) -> None:
+    """Its standard deviation is as stated, in sinkage alone, and one run's says nothing of
+    another's.
+    """
+    stack = _beside_a_reference("prepared", stated)
+    assert not stack.reliefs[~stack.of("sinkage")].any()
+
+    for run in range(len(stack.rig.runs)):
+        own = stack.of("sinkage") & (stack.run == run)
+        acting = np.any(stack.reliefs[own] != 0.0, axis=0)
+        assert not stack.reliefs[stack.run != run][:, acting].any()
+        spread = np.sqrt(np.mean(np.sum(stack.reliefs[own] ** 2, axis=1)))
+        assert spread == pytest.approx(height, rel=0.2)
+
+
+def test_a_bed_that_was_not_touched_keeps_its_surface() -> None:
+    assert _beside_a_reference("same").reliefs.shape[1] == 0
+
+
+def _beside_a_reference(bed: Bed, surface: float = 0.0) -> Stack:
+    known = replace(settings(), bed=BedSettings("bin", Repeatability(surface=surface)))
+    return Stack(WheelRig(record(plan(), ()) * 2, known, 1, bed))

@@ -12,6 +12,7 @@ from gritd.tools.proof.blind.plant.effect import Effect, Facts
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Scene
 
+PARTS = (np.arange(32) + 0.5) / 32  # of a step of time
 STANDING = 1e-4  # [rad/s] below which the direction is not taken to have changed
 
 
@@ -76,23 +77,33 @@ class Play(Effect, ABC):
         """Share of the load that the motor feels (n,), b times `turned` (n,) after a reversal."""
 
     def loss(self, scene: Scene) -> Array:
-        """−T (1 − share) (n,) [N·m]: what the motor does not feel of the torque T at the axle."""
+        """−T (1 − share) (n,) [N·m]: what the motor does not feel of the torque T at the axle. At
+        rest the teeth touch: a controller that swings back as it stops is no reversal.
+        """
         if not self.strength:
             return np.zeros(scene.torque.size)
-        turned = _since_reversal(scene.motion.omega, scene.motion.turn) / self.strength
-        return np.asarray(-scene.torque * (1.0 - self.taken_up(turned)))
+        turned, step = _since_reversal(scene.motion.omega, scene.motion.step)
+
+        # of a step that is long beside the play, its mean
+        parts = [(turned - part * step) / self.strength for part in PARTS]
+        share = np.mean([self.taken_up(angles) for angles in parts], axis=0)
+        return np.asarray(-scene.torque * (1.0 - share) * scene.moving)
 
 
-def _since_reversal(omega: Array, turn: Array) -> Array:
-    """Angle turned since the last reversal (n,) [rad]; far where there was none."""
+def _since_reversal(omega: Array, step: float) -> tuple[Array, Array]:
+    """Angle turned since the last reversal (n,), and in the last step of time (n,), both [rad]; far
+    where there was none. A reversal takes place in the middle of its step.
+    """
     turning = np.where(np.abs(omega) > STANDING, np.sign(omega), 0.0)
-    last, before, began, angles = 0.0, float(turn[0]), -np.inf, []
-    for way, angle in zip(turning.tolist(), turn.tolist(), strict=True):
-        if way and last and way != last:
-            began = before
-        last, before = way or last, angle
-        angles.append(abs(angle - began))
-    return np.array(angles)
+    last, turned, angles, steps = 0.0, np.inf, [], []
+    for way, angle in zip(turning.tolist(), (np.abs(omega) * step).tolist(), strict=True):
+        reversed_now = bool(way and last and way != last)
+        passed = 0.5 * angle if reversed_now else angle
+        turned = passed if reversed_now else turned + passed
+        last = way or last
+        angles.append(turned)
+        steps.append(passed)
+    return np.array(angles), np.array(steps)
 
 
 @dataclass(frozen=True)

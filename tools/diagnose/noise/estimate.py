@@ -34,32 +34,21 @@ def spikes(
     """(N,) how far a single value of a residual (N,) stands off its neighbours, where that is
     beyond SPIKE; else 0.
 
-    explainable: columns (N, m). Play in the drive makes a few values stand off after a reversal. So
-    what columns that stand off their neighbours too can explain of such values is no spike.
+    explainable: columns (N, m). Play in the drive changes a few values after a reversal and little
+    else. So what columns that act at such values for the most part can explain is no spike.
     """
-    off = _off_neighbours(residual)
+    near = median_filter(residual, TUNING.noise.spike_neighbours, mode="nearest")
+    off = residual - near
     least = TUNING.noise.spike * np.array([c.sigma for c in colours])[stack.channel]
     spiked = np.abs(off) > least
 
     if explainable is not None and spiked.any():
-        sudden = _sudden(explainable)[spiked]
+        there = explainable[spiked]
+        squares = np.sum(explainable**2, axis=0)
+        only = np.sum(there**2, axis=0) > TUNING.noise.sudden * np.maximum(squares, SQUARE)
+        sudden = there[:, only]
         off[spiked] -= sudden @ np.linalg.lstsq(sudden, off[spiked], rcond=None)[0]
     return np.where(spiked & (np.abs(off) > least), np.abs(off), 0.0)
-
-
-def _off_neighbours(values: Array) -> Array:
-    """(N,) by what each of values (N,) differs from the median about it."""
-    near = median_filter(values, TUNING.noise.spike_neighbours, mode="nearest")
-    return np.asarray(values - near)
-
-
-def _sudden(columns: Array) -> Array:
-    """Of columns (N, m) those (N, k) that are largest where they stand off their neighbours; by
-    what they do.
-    """
-    off = np.column_stack([np.zeros((len(columns), 0)), *map(_off_neighbours, columns.T)])
-    largest = np.abs(columns).max(axis=0, initial=0.0)
-    return off[:, np.abs(off).max(axis=0, initial=0.0) > TUNING.noise.sudden * largest]
 
 
 def uncertain(

@@ -16,7 +16,7 @@ from gritd.tools.diagnose.rig.covariates import covariates
 from gritd.tools.diagnose.rig.interface import Bools, Run
 from gritd.tools.diagnose.rig.recorded import measured_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.states import states, turning
+from gritd.tools.diagnose.rig.states import states, turned_back
 from gritd.tools.diagnose.tuning import TUNING
 
 HOLDING_NOTE = (
@@ -50,7 +50,7 @@ def measured_run(
     driving, resting, lifted = states(motion, settings)
     still = {"torque": driving | resting | lifted}
     if loss_of_drive:
-        still["torque"] |= turning(motion, settings)
+        still["torque"] |= turned_back(motion, settings)
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 

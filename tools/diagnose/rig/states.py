@@ -51,12 +51,20 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
     return driving, resting, spinning
 
 
-def turning(motion: Motion, settings: Settings) -> Bools:
-    """Where the wheel turns one way, settled or not (n,): what the drive loses between two torques
-    that are both measured needs no steady state of the soil.
+def turned_back(motion: Motion, settings: Settings) -> Bools:
+    """Where the wheel turns the other way than before, settled or not (n,): what the drive loses
+    between two torques that are both measured needs no steady state of the soil, and play shows
+    there alone.
     """
     way = _way(settings.wheel.radius * np.asarray(motion.wheel_speed))
-    return _inside(way, TUNING.rig.turned, TUNING.rig.turned)
+    begins = np.flatnonzero((way != 0.0) & (np.diff(way, prepend=0.0) != 0.0))
+    if not begins.size:
+        return np.zeros(way.size, bool)
+
+    back = np.diff(way[begins], prepend=way[begins[0]]) != 0.0
+    last = np.searchsorted(begins, np.arange(way.size), side="right") - 1
+    turned: Bools = _inside(way, TUNING.rig.turned, TUNING.rig.turned) & back[last]
+    return turned
 
 
 def at_rest(rim_speed: Array, carriage_speed: Array) -> Bools:

@@ -45,6 +45,7 @@ from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.states import states, turned_back
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_of
@@ -214,8 +215,24 @@ class WheelRig:
         return [{c: (two[c] - one[c]) / sigma for c in self.channels} for one, two in told]
 
     def blur(self, stack: Stack, predicted: Array) -> Array:
-        """(N,) by slopes over three intervals, and by an axle that lags."""
-        return blur_of(stack, predicted)
+        """(N,) by slopes over three intervals, by an axle that lags, and by a motion that turns
+        back inside an interval.
+        """
+        return np.hypot(blur_of(stack, predicted), stack.joined(self._by_reversal))
+
+    @cached_property
+    def _by_reversal(self) -> list[dict[str, Array]]:
+        """Per run, what is open of the loss of the drive (n,) after a reversal [N·m]: a part of the
+        torque that is taken up in the interval.
+        """
+        open_ = [dict.fromkeys(self.channels, np.zeros(run.time.size)) for run in self.runs]
+        if not self.loss_of_drive:
+            return open_
+        for told, run, motion in zip(open_, self.runs, self._driven.motions, strict=True):
+            after = turned_back(motion, self.settings) & ~states(motion, self.settings)[0]
+            axle = np.nan_to_num(np.abs(run.measured["axle_torque"]))
+            told["torque"] = np.where(after, TUNING.rig.taken_up * axle, 0.0)
+        return open_
 
     # ---- what is said ----------------------------------------------------------------------------
 

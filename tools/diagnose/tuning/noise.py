@@ -55,7 +55,7 @@ class Noise:
         6.0, "σ", "from the median of its neighbours: such a value counts as much less certain"
     )
     sudden: float = tuned(
-        0.3, "-", "of its largest value: what stands off its neighbours by more is sudden"
+        0.5, "share", "of an effect's squares at spikes: then it acts at little else"
     )
     spike_neighbours: int = tuned(5, "values", "whose median tells a spike")
     restless: float = tuned(

@@ -167,8 +167,11 @@ class Rig:
     load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
     hold: float = tuned(1.0, "s", "weights stay for at least this long")
 
+    taken_up: float = tuned(
+        0.3, "-", "of the axle's torque: open after a reversal, which falls inside an interval"
+    )
     turned: int = tuned(
-        1, "intervals", "from a start, a stop or a reversal: the loss between two torques settles"
+        1, "intervals", "from a reversal or a stop: the loss between two torques settles"
     )
 
     # --- wheel.py ---

@@ -9,7 +9,7 @@ import numpy as np
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Bools
-from gritd.tools.diagnose.rig.states import states
+from gritd.tools.diagnose.rig.states import states, turned_back
 from gritd.tools.diagnose.tuning import TUNING
 from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 
@@ -74,3 +74,12 @@ def test_runs_that_end_by_stopping_give_no_alarm() -> None:
     """Wheel and carriage stop at their own paces; no rate-dependent soil is found in that."""
     found = diagnosed(plan(stop=True))
     assert found.verdict == "consistent", found.summary
+
+
+def test_a_wheel_turns_back_where_it_turned_the_other_way_before() -> None:
+    """A rest between the two changes nothing; a start from rest is no reversal."""
+    speed = np.repeat([0.0, SPEED, 0.0, -SPEED, 0.0, -SPEED, SPEED], 20)
+    back = turned_back(_motion(speed), settings())
+    stretches = [bool(part[2:-2].all()) for part in np.split(back, 7)]
+    assert stretches == [False, False, False, True, False, False, True]
+    assert not back[speed == 0.0].any()

@@ -17,6 +17,9 @@ class _SchmidtFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy ca
     P: np.ndarray
 
     def consider(self, y: np.ndarray, H: np.ndarray, R: np.ndarray, considered: slice) -> None:
+        """One update by innovations y (m,) with derivatives H (m, n) and covariance R (m, m), in
+        the units of measurement and state; the `considered` part of the state keeps its mean.
+        """
         cross = self.P @ H.T
         self.S = H @ cross + R
         self.K = cross @ np.linalg.inv(self.S)

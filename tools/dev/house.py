@@ -19,7 +19,13 @@ from pathlib import Path
 WIDE = 100  # columns
 LONG = 12  # lines from which a function has steps to tell apart
 PLAIN = {0, 1, 2, -1, 0.5}  # numbers that need no name
-ARRAY = re.compile(r"\b(Array|Bools|Index|NDArray)\b")
+ARRAYS = (
+    "Array",
+    "Bools",
+    "Index",
+    "NDArray",
+    "ndarray",
+)  # types of arrays, wherever they are from
 SHAPE = re.compile(r"\((?:[A-Za-z\d][^(),]{0,12},)[^()]{0,16}\)")  # (N,), (n, m), (1 + draws,)
 TUNING = "tuning"  # the folder of named numbers
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -34,7 +40,7 @@ def counted(tree: Path, folder: str) -> dict[str, str]:
 
     functions = [f for p in parsed.values() for f in ast.walk(p) if isinstance(f, Function)]
     lengths = sorted((f.end_lineno or f.lineno) - f.lineno + 1 for f in functions)
-    arrays = [f for p in parsed.values() for f in _outermost(p) if _on_arrays(f)]
+    arrays = [f for p in parsed.values() for f in _outermost(p) if _on_arrays(f, _arrays_in(p))]
     stated = sum(bool(SHAPE.search(ast.get_docstring(f) or "")) for f in arrays)
 
     home = tree / folder
@@ -113,11 +119,20 @@ def _outermost(module: ast.Module) -> Iterator[Function]:
         yield from (each for each in inside if isinstance(each, Function))
 
 
-def _on_arrays(function: Function) -> bool:
+def _arrays_in(module: ast.Module) -> re.Pattern[str]:
+    """Names of array types in a module: the usual ones, and those that it defines."""
+    own = [
+        n for n in module.body if isinstance(n, ast.Assign) and "NDArray" in ast.unparse(n.value)
+    ]
+    names = [t.id for n in own for t in n.targets if isinstance(t, ast.Name)]
+    return re.compile(rf"\b({'|'.join([*ARRAYS, *names])})\b")
+
+
+def _on_arrays(function: Function, array: re.Pattern[str]) -> bool:
     every = [*function.args.args, *function.args.kwonlyargs]
     kinds = [a.annotation for a in every if a.annotation] + [function.returns]
     public = not function.name.startswith("_")
-    return public and any(k is not None and bool(ARRAY.search(ast.unparse(k))) for k in kinds)
+    return public and any(k is not None and bool(array.search(ast.unparse(k))) for k in kinds)
 
 
 def _numbers(node: ast.AST) -> list[float]:

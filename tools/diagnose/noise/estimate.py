@@ -62,6 +62,7 @@ def uncertain(
     spikes of the residual (N,) that no columns (N, m) explain, and what is left open of the motion.
     """
     off = spikes(stack, residual, colours, explainable)
+
     return np.hypot(np.hypot(stack.rig.blur(stack, predicted), off), stack.motion_sigma)
 
 

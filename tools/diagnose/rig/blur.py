@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.interface import Bools, Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 
@@ -28,6 +30,19 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
             TUNING.rig.bend * _nearby(np.where(edge, 0.0, bend)), TUNING.rig.lag * _nearby(late)
         )
     )
+
+
+def blur_of_reversal(stack: Stack, after: Sequence[Bools]) -> Array:
+    """Error (N,) of the loss of the drive [N·m] after a reversal, which falls inside an interval: a
+    part of the axle's torque is open. after: per run, values (n,) after a reversal.
+    """
+    told = []
+    for run, marks in zip(stack.rig.runs, after, strict=True):
+        nothing = {channel: np.zeros(marks.size) for channel in stack.rig.channels}
+        axle = np.nan_to_num(np.abs(run.measured["axle_torque"]))
+        told.append(nothing | {"torque": np.where(marks, TUNING.rig.taken_up * axle, 0.0)})
+
+    return stack.joined(told)
 
 
 def _nearby(values: Array) -> Array:

@@ -31,6 +31,7 @@ def reliefs_of(
     nothing: list[Mapping[str, Array]] = [
         {channel: np.zeros(run.time.size) for channel in channels} for run in runs
     ]
+
     for number, run in enumerate(runs):
         waves = _waves(run.covariates["position"])
         size = height / np.sqrt(np.sum(np.mean(waves**2, axis=0)))

@@ -18,7 +18,7 @@ from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.latency import Latency
-from gritd.tools.diagnose.rig.blur import blur_of
+from gritd.tools.diagnose.rig.blur import blur_of, blur_of_reversal
 from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
@@ -45,7 +45,7 @@ from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.states import states, turned_back
+from gritd.tools.diagnose.rig.states import after_reversal
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
 from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_of
@@ -218,21 +218,11 @@ class WheelRig:
         """(N,) by slopes over three intervals, by an axle that lags, and by a motion that turns
         back inside an interval.
         """
-        return np.hypot(blur_of(stack, predicted), stack.joined(self._by_reversal))
-
-    @cached_property
-    def _by_reversal(self) -> list[dict[str, Array]]:
-        """Per run, what is open of the loss of the drive (n,) after a reversal [N·m]: a part of the
-        torque that is taken up in the interval.
-        """
-        open_ = [dict.fromkeys(self.channels, np.zeros(run.time.size)) for run in self.runs]
+        blur = blur_of(stack, predicted)
         if not self.loss_of_drive:
-            return open_
-        for told, run, motion in zip(open_, self.runs, self._driven.motions, strict=True):
-            after = turned_back(motion, self.settings) & ~states(motion, self.settings)[0]
-            axle = np.nan_to_num(np.abs(run.measured["axle_torque"]))
-            told["torque"] = np.where(after, TUNING.rig.taken_up * axle, 0.0)
-        return open_
+            return blur
+        after = [after_reversal(motion, self.settings) for motion in self._driven.motions]
+        return np.hypot(blur, blur_of_reversal(stack, after))
 
     # ---- what is said ----------------------------------------------------------------------------
 

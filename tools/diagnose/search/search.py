@@ -240,6 +240,7 @@ def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
     effects: tuple[Maker, ...] = (*fitted.effects, promise.effect)
     free = (*fitted.free, *free_of((promise.effect,)))
     begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
+
     return fit_model(
         screening.problem,
         screening.forms,

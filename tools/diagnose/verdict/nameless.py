@@ -51,6 +51,7 @@ def nameless_functions(screening: Screening, model: Model) -> list[Signature]:
 def _fitted(screening: Screening, model: Model, chosen: Sequence[Signature], size: float) -> Model:
     columns = size * np.column_stack([s.columns for s in chosen])
     fitted = model.fitted
+
     return fit_model(
         screening.problem.beside(columns),
         screening.forms,

@@ -96,6 +96,7 @@ def _since_reversal(omega: Array, step: float) -> tuple[Array, Array]:
     """
     turning = np.where(np.abs(omega) > STANDING, np.sign(omega), 0.0)
     last, turned, angles, steps = 0.0, np.inf, [], []
+
     for way, angle in zip(turning.tolist(), (np.abs(omega) * step).tolist(), strict=True):
         reversed_now = bool(way and last and way != last)
         passed = 0.5 * angle if reversed_now else angle
@@ -103,6 +104,7 @@ def _since_reversal(omega: Array, step: float) -> tuple[Array, Array]:
         last = way or last
         angles.append(turned)
         steps.append(passed)
+
     return np.array(angles), np.array(steps)
 
 

@@ -1,19 +1,21 @@
 """What a reader should doubt: strained constants, parameters at a bound, fits that did not
-converge.
+converge, noise that no sensor makes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from gritd.tools.cli.wording import fixed, shown, spaced, spelled
 from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
 
 
-def doubts(rig: Rig, model: Model) -> tuple[str, ...]:
-    """One sentence each, of the fit of the accepted model."""
-    return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model))
+def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
+    """One sentence each, of the fit of the accepted model in the noise that was found."""
+    return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model), *_loud(rig, noise))
 
 
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:
@@ -43,3 +45,17 @@ def _bounded(rig: Rig, model: Model) -> Iterator[str]:
 def _unfinished(model: Model) -> Iterator[str]:
     if not model.fitted.converged:
         yield "The fit of what is said here did not converge: take its numbers with care."
+
+
+def _loud(rig: Rig, noise: Noise) -> Iterator[str]:
+    """Channels whose grid values scatter more than single readings should."""
+    for channel, colour in zip(rig.channels, noise.colours, strict=True):
+        stated = rig.stated_noise.get(channel, 0.0)
+        if stated > 0.0 and colour.sigma > TUNING.explain.loud * stated:
+            unit, factor = shown(rig.units[channel])
+            found, of_reading = (spaced(s * factor, unit, 2) for s in (colour.sigma, stated))
+            yield (
+                f"Louder than stated: the noise of {spelled(channel)} is {found},"
+                f" {fixed(colour.sigma / stated, 0)} times the stated noise of a reading,"
+                f" {of_reading}. What the model misses may be in it."
+            )

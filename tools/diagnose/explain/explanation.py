@@ -61,7 +61,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=next_experiment(search, decision),
-        caveats=_caveats(rig, accepted, whole, redo),
+        caveats=_caveats(problem, accepted, whole, redo),
         share=decision.share,
         remaining=left,
         remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),
@@ -197,8 +197,11 @@ def _subject(rig: Rig) -> str:
     return "Model and recordings" if all(rig.new) else "Reference and new campaign"
 
 
-def _caveats(rig: Rig, accepted: Model, whole: Model, redo: Mapping[str, Any]) -> tuple[str, ...]:
+def _caveats(
+    problem: Problem, accepted: Model, whole: Model, redo: Mapping[str, Any]
+) -> tuple[str, ...]:
     """Sentences on what to doubt; whole: the accepted model with functions without a name."""
+    rig = problem.stack.rig
     sentences = list(rig.caveats)
     if redo.get("quick"):
         sentences.append(
@@ -215,7 +218,7 @@ def _caveats(rig: Rig, accepted: Model, whole: Model, redo: Mapping[str, Any]) -
     return (
         *sentences,
         *rig.shortcomings,
-        *doubts(rig, whole),
+        *doubts(rig, whole, problem.noise),
         *left_over(rig, acting),
         *late(rig, acting),
     )

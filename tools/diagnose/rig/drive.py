@@ -70,6 +70,7 @@ class DriveRig:
     baseline: tuple[Effect, ...] = ()
     partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
     law = None
+    stated_noise: Mapping[str, float] = {}
     shortcomings: Sequence[str] = ()
 
     def __init__(

@@ -213,6 +213,12 @@ class Rig(Protocol):
         """
 
     @property
+    def stated_noise(self) -> Mapping[str, float]:
+        """Standard deviation of one reading of a channel as the configuration states it, in the
+        channel's unit; of those that it states one.
+        """
+
+    @property
     def latencies(self) -> Sequence[Latency]:
         """How late each channel is beside the motion, told at the recordings' own rate."""
 

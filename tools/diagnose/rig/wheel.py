@@ -45,6 +45,7 @@ from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.stated_noise import noise_of_readings
 from gritd.tools.diagnose.rig.states import after_reversal
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
@@ -106,6 +107,7 @@ class WheelRig:
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
 
+        self.stated_noise = noise_of_readings(settings, self.loss_of_drive)
         self._driven = _driven(signals, weights, self.new, settings)
         self._anew = bool(reference) and bed == "prepared"
         prepared = preparation(settings) if self._anew else {}

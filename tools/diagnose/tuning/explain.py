@@ -43,6 +43,12 @@ class Explain:
     beyond_share: float = tuned(0.02, "-", "of the values that must be outside to be told")
 
     # --- doubts.py, result.py ---
+    loud: float = tuned(
+        3.0,
+        "times",
+        "the stated noise of a reading: a grid value is a mean of readings",
+        "judgement",
+    )
     doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is told")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is told")
 

@@ -110,8 +110,8 @@ def covariates(motions: list[Motion], plain: list[Response]) -> dict[str, Array]
 
 
 def since_reversal(angle: Array) -> Array:
-    """Angle turned since the wheel last turned round (n,) [rad], of its angle (n,) [rad]; positive
-    forward.
+    """Angle turned since the way of turning last changed (n,) [rad], a stop included; positive
+    forward. angle: of the wheel (n,) [rad].
     """
     way = np.sign(np.diff(angle, prepend=angle[:1]))
     reverses = np.diff(way, prepend=way[:1]) != 0.0

@@ -173,7 +173,9 @@ class ExponentialStribeck(Effect):
 
 @dataclass(frozen=True)
 class OneSidedGear(Effect):
-    """The gear loses A more than its calibrated mean forward, 0.9 A less backward, none at rest."""
+    """The gear loses A more than its calibrated mean forward, 0.9 A less backward, at rest what it
+    lost last.
+    """
 
     name, signed, most = "asymmetric_friction", True, 1.0
 

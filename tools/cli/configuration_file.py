@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli.command import USAGE, CommandError
+from gritd.tools.cli.files import writable
 from gritd.tools.cli.yaml_edit import EditedYaml
 
 
@@ -21,12 +22,12 @@ def edited(path: Path) -> EditedYaml:
 
 def target(source: Path, output: Path | None, in_place: bool, option: str) -> Path:
     """Where the changed file goes: `output`, or `source` itself with `in_place`. `option` names the
-    output in messages. Raises CommandError; ConfigError where the source may be cut short, since
-    what is made of a part would look whole.
+    output in messages. Raises CommandError, also where it cannot be written; ConfigError where the
+    source may be cut short, since what is made of a part would look whole.
     """
     config.whole_text(source)
     if in_place and (output is None or output.resolve() == source.resolve()):
-        return source
+        return writable(source, replaced=True)
 
     if output is None:
         raise CommandError(f"expected {option} NEW.yaml, or --in-place to change {source}", USAGE)
@@ -41,7 +42,7 @@ def target(source: Path, output: Path | None, in_place: bool, option: str) -> Pa
             USAGE,
         )
 
-    return output
+    return writable(output, replaced=True)
 
 
 def save(text: str, source: Path, place: Path) -> Path | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -62,16 +63,47 @@ def vacant(path: Path) -> Path:
     if path.exists() or path.is_symlink():
         raise CommandError(f"{path}: is there already; expected the name of a new file", USAGE)
 
-    if not path.parent.is_dir():
-        raise CommandError(
-            f"{path}: found no folder {path.parent}; expected one to write into", USAGE
-        )
-    if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise CommandError(
-            f"{path}: may not write into {path.parent}; expected a folder of your own", USAGE
-        )
-
+    _check_folder(path)
     return path
+
+
+def writable(path: Path, replaced: bool = False) -> Path:
+    """The name of a file to be written, also over one that is there. Raises CommandError where it
+    cannot be.
+
+    replaced: another file takes the place of one that is there, so that its folder has to be
+    writable too.
+    """
+    there = os.path.exists(path)  # also where its folder may not be looked into
+    if os.path.isdir(path):
+        raise CommandError(f"{path}: found a folder; expected the name of a file to write", USAGE)
+    if there and not os.access(path, os.W_OK):
+        raise CommandError(f"{path}: may not be written; expected a file of your own", USAGE)
+
+    if replaced or not there:
+        _check_folder(path)
+    return path
+
+
+def _check_folder(path: Path) -> None:
+    """Raises CommandError where no file can be made in the folder of `path`: one without a name is
+    made there, since permissions do not tell of every file system.
+    """
+    folder = path.parent
+
+    try:
+        if not folder.is_dir():
+            raise CommandError(
+                f"{path}: found no folder {folder}; expected one to write into", USAGE
+            )
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = (error.strerror or "cannot write").lower()
+        raise CommandError(
+            f"{path}: may not write into {folder} ({reason}); expected a folder of your own",
+            USAGE if error.errno in WRONG_NAME else FAILED,
+        ) from None
 
 
 def unwritten(error: RecordingError) -> CommandError:

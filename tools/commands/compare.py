@@ -24,6 +24,7 @@ from gritd.tools.cli.command import (
     Parser,
     add_configuration,
 )
+from gritd.tools.cli.files import writable
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.explain.provenance import check_rig
@@ -47,6 +48,8 @@ def main(argv: Sequence[str]) -> int:
     arguments = _parser().parse_args(argv)
     if arguments.png:
         require("matplotlib", "--png")
+    for path in filter(None, (arguments.report, arguments.png)):
+        writable(path)
 
     configuration = config.load(arguments.config)
     with Progress("compare") as progress:

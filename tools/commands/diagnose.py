@@ -29,6 +29,7 @@ from gritd.tools.cli.command import (
     add_configuration,
     whole,
 )
+from gritd.tools.cli.files import writable
 from gritd.tools.cli.progress import Progress
 from gritd.tools.cli.workers import add_cluster, cluster_of
 from gritd.tools.commands import diagnose_campaigns as campaigns
@@ -54,16 +55,22 @@ def main(argv: Sequence[str]) -> int:
 
     With --redo, 1 if it comes out otherwise.
     """
+    arguments = _given(argv)
+    if arguments.data is not None and arguments.redo is None:
+        raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
+    if arguments.campaigns is not None and arguments.redo is None:
+        return _many(arguments)
+
+    code = _again(arguments) if arguments.redo is not None else _one(arguments)
+    _tell_written(arguments)
+    return code
+
+
+def _given(argv: Sequence[str]) -> argparse.Namespace:
+    """What is asked for, with outputs that can be written. Raises CommandError."""
     arguments = _parser().parse_args(argv)
     _check_outputs(arguments)
-    if arguments.redo is not None:
-        return _again(arguments)
-
-    if arguments.data is not None:
-        raise CommandError("diagnose --data: expected --redo FILE with it", USAGE)
-    if arguments.campaigns is not None:
-        return _many(arguments)
-    return _one(arguments)
+    return arguments
 
 
 def _one(arguments: argparse.Namespace) -> int:
@@ -183,7 +190,7 @@ def _campaign(campaign: campaigns.Campaign) -> str:
     """Verdict and summary of one campaign, or the one line of what was wrong with it."""
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            main(campaign.arguments())
+            _one(_given(campaign.arguments()))
     except (CommandError, ConfigError, RecordingError) as error:
         return f"not diagnosed: {error}"
     diagnosis = json.loads(campaign.result.read_text(encoding="utf-8"))
@@ -201,24 +208,19 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
         )
 
     inputs = [*arguments.files, *([arguments.redo] if arguments.redo else [])]
-    for path in (arguments.json, arguments.report, arguments.apply):
-        if path is not None:
-            _check_output(path, inputs)
+    for path in filter(None, (arguments.json, arguments.report, arguments.apply)):
+        writable(path, replaced=path == arguments.apply)
+        if any(path.resolve() == given.resolve() for given in inputs):
+            raise CommandError(
+                f"{path}: is read by this command; expected another name to write to", USAGE
+            )
 
 
-def _check_output(path: Path, inputs: Sequence[Path]) -> None:
-    """Before the work is done. Raises CommandError."""
-    if not path.parent.is_dir():
-        raise CommandError(
-            f"{path}: found no folder {path.parent}; expected one to write into", USAGE
-        )
-
-    if path.is_dir():
-        raise CommandError(f"{path}: found a folder; expected the name of a file to write", USAGE)
-    if any(path.resolve() == given.resolve() for given in inputs):
-        raise CommandError(
-            f"{path}: is read by this command; expected another name to write to", USAGE
-        )
+def _tell_written(arguments: argparse.Namespace) -> None:
+    """A line a file; of a configuration that was changed in its place `_apply` has told."""
+    applied = None if arguments.in_place else arguments.apply
+    for path in filter(None, (arguments.json, arguments.report, applied)):
+        print(f"wrote {path}", file=sys.stderr)
 
 
 def _write(

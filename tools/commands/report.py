@@ -22,8 +22,7 @@ from gritd.tools.report import campaign, lab
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
-    if not arguments.output.parent.is_dir() or arguments.output.is_dir():
-        raise CommandError(f"{arguments.output}: expected the name of a file to write", USAGE)
+    files.writable(arguments.output)
 
     told = _campaign(arguments, ["gritd", "report", *argv])
     try:

@@ -34,6 +34,8 @@ def test_where_it_goes(rig: Path) -> None:
         (rig.parent / ".." / "rig" / "testbed.yaml", False, "is the configuration that is read"),
         (None, False, "expected --apply NEW.yaml, or --in-place"),
         (other, True, "expected one of them"),
+        (rig.parent / "none" / "new.yaml", False, "found no folder"),
+        (rig / "new.yaml", False, "found no folder"),
     ):
         with pytest.raises(CommandError, match=line) as error:
             target(rig, output, in_place, "--apply")

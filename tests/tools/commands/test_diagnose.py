@@ -60,7 +60,39 @@ def test_no_output_goes_where_it_does_harm(run: Path, tmp_path: Path) -> None:
         assert "found a folder" in line and code == USAGE
         line, code = said(run, "--config", packaged(), option, tmp_path / "no" / "x")
         assert "found no folder" in line and code == USAGE
+        line, code = said(run, "--config", packaged(), option, "/proc/x")
+        assert "may not write into /proc" in line and code == USAGE
     assert run.read_bytes() == before
+
+
+def test_the_files_that_were_written_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line each on standard error."""
+    (tmp_path / "schedule.yaml").write_text(SCHEDULE.replace("3 s", "12 s"))
+    long = str(tmp_path / "long.mcap")
+    simulate.main(["--schedule", str(tmp_path / "schedule.yaml"), "-o", long])
+    own = tmp_path / "testbed.yaml"
+    own.write_bytes(packaged().read_bytes())
+    (tmp_path / "testbed.dbc").write_bytes(packaged("testbed.dbc").read_bytes())
+    one, told = [long, "--config", str(own), "--quick", "--jobs", "1"], "wrote {}"
+    names = [tmp_path / name for name in ("a.json", "b.html", "c.yaml")]
+
+    capsys.readouterr()
+    options = zip(("--json", "--report", "--apply"), map(str, names), strict=True)
+    assert main([*one, *(word for pair in options for word in pair)]) == 0
+    said = capsys.readouterr()
+    assert [line for line in said.err.splitlines() if "wrote" in line] == [
+        told.format(name) for name in names
+    ]
+    assert all(name.exists() for name in names) and "wrote" not in said.out
+
+    assert main([*one, "--in-place"]) == 0
+    said = capsys.readouterr()
+    assert f"{own}: changed; as it was" in said.err and "wrote" not in said.err
+
+    assert main(one) == 0
+    assert "wrote" not in capsys.readouterr().err
 
 
 def test_a_scheduler_without_campaigns_is_refused(run: Path) -> None:

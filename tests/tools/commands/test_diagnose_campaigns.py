@@ -4,12 +4,14 @@ to the others.
 
 import os
 import subprocess
+from argparse import Namespace
 from pathlib import Path
 from shutil import which
 
 import pytest
 
 from gritd.tools.cli.command import CommandError
+from gritd.tools.commands import diagnose
 from gritd.tools.commands import diagnose_campaigns as campaigns
 from gritd.tools.commands.diagnose_campaigns import Campaign
 
@@ -67,6 +69,21 @@ def test_one_that_fails_is_told_and_the_others_go_on(tmp_path: Path) -> None:
         "c": "consistent",
     }
     assert [campaign.done for campaign in found] == [True, False, True]
+
+
+def test_files_of_one_among_many_are_not_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The last line tells them for all."""
+
+    def diagnosed(arguments: Namespace) -> int:
+        arguments.json.write_text('{"verdict": "consistent", "summary": "They agree."}')
+        return 0
+
+    monkeypatch.setattr(diagnose, "_one", diagnosed)
+    campaign = campaigns.find(folder_of(tmp_path, "a").parent)[0]
+    assert diagnose._campaign(campaign) == "consistent. They agree."
+    assert capsys.readouterr() == ("", "")
 
 
 def test_what_is_done_is_not_done_again_until_a_file_changes(tmp_path: Path) -> None:

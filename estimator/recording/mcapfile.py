@@ -191,7 +191,7 @@ class McapFile:
     def _discarding(self) -> Iterator[None]:
         try:
             yield
-        except RecordingError:
+        except BaseException:  # Ctrl-C too
             self.abandon()
             self._draft.unlink(missing_ok=True)
             raise

@@ -12,7 +12,7 @@ from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.metadata import RECOVERED, sealed
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.visible import visible
-from gritd.tools.cli.command import DAMAGED, DONE, Parser
+from gritd.tools.cli.command import DAMAGED, DONE, CommandError, Parser
 from gritd.tools.cli.files import unread, unwritten, vacant
 from gritd.tools.cli.progress import Progress
 
@@ -38,24 +38,30 @@ def main(argv: Sequence[str]) -> int:
 
     target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
     try:
-        recover(recording, vacant(target))
+        saved = recover(recording, vacant(target))
     except RecordingError as error:
         raise unwritten(error) from None
 
     for line in recording.damage:
         print(visible(f"{source}: {line}"), file=sys.stderr)
+    if not saved:
+        raise CommandError(f"{source}: found nothing to recover; no file is written", DAMAGED)
+
     print(f"{target}: {summary(recording)}")
     return DONE if recording.saved and not recording.attachments else DAMAGED
 
 
-def recover(recording: Recording, target: Path) -> None:
+def recover(recording: Recording, target: Path) -> bool:
     """Write every intact message, in file order, and every intact metadata record to a new file.
+    Returns False, and makes no file, where a recording that is not whole has neither.
 
     Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises
-    RecordingError where the file cannot be written; it is then removed.
+    RecordingError where the file cannot be written. Whatever stops it, no part of a file is left.
     """
-    file = McapFile(target, library=LIBRARY)
+    if not (recording.complete or recording.counts.total() or recording.metadata):
+        return False
 
+    file = McapFile(target, library=LIBRARY)
     with file.beginning():
         for source in recording.sources.values():
             file.define(source.schema, source.channel)
@@ -70,6 +76,7 @@ def recover(recording: Recording, target: Path) -> None:
                 file.add_chunk(*chunk.records())
                 progress.advance(len(chunk.starts))
         file.close()
+    return True
 
 
 def summary(recording: Recording) -> str:

@@ -9,6 +9,7 @@ import pytest
 from mcap.opcode import Opcode
 
 from gritd.estimator.recording.blocks import records
+from gritd.estimator.recording.mcapfile import McapFile
 from gritd.estimator.recording.salvage import read
 from gritd.tools import main as cli
 from gritd.tools.commands.recover import main
@@ -120,6 +121,32 @@ def test_a_wrong_name_is_usage_and_no_recording_is_damage(
         main([])
     assert stop.value.code == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == ["photo.png"]
+
+
+@pytest.mark.parametrize("length", [8, 20, 60])
+def test_where_nothing_can_be_recovered_no_file_is_made(
+    tmp_path: Path, length: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_sample(tmp_path / "a.mcap")
+    os.truncate(tmp_path / "a.mcap", length)
+    assert cli.main(["recover", str(tmp_path / "a.mcap")]) == 3
+    said = capsys.readouterr()
+    last = said.err.splitlines()[-1]
+    assert last == f"gritd: {tmp_path / 'a.mcap'}: found nothing to recover; no file is written"
+    assert said.out == "" and [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_an_interrupted_recovery_leaves_no_part_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    write_sample(tmp_path / "a.mcap")
+    monkeypatch.setattr(McapFile, "add_chunk", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        main([str(tmp_path / "a.mcap")])
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
 
 @pytest.mark.parametrize("name", ["a.mcap", "nowhere/b.mcap"])

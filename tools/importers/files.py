@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import gzip
+import os
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
@@ -48,9 +49,18 @@ def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re
 
 
 def _below(path: Path) -> Iterator[Path]:
-    if not path.exists():
-        raise RigFileError(f"{path}: found nothing there; expected a file or a folder", USAGE)
-    yield from (path.rglob("*") if path.is_dir() else [path])
+    try:
+        if not path.exists():
+            raise RigFileError(f"{path}: found nothing there; expected a file or a folder", USAGE)
+        if folder := path.is_dir():
+            os.scandir(path).close()  # `rglob` takes one that may not be read for an empty one
+    except OSError as error:
+        reason = error.strerror or error
+        raise RigFileError(
+            f"{path}: cannot be read: {reason}; expected a file or a folder of your own", USAGE
+        ) from None
+
+    yield from (path.rglob("*") if folder else [path])
 
 
 def read_text(path: Path) -> str:

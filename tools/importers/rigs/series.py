@@ -35,8 +35,9 @@ READERS: dict[str, Callable[[Path], SeriesTable]] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The map, or a proposal for one; the testbed."""
-    parser.add_argument("--map", type=Path, metavar="MAP.yaml", help="which column is which")
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--map", type=Path, metavar="MAP.yaml", help="which column is which")
+    which.add_argument(
         "--guess", action="store_true", help="print a proposal for the map, and import nothing"
     )
     parser.add_argument(

@@ -227,6 +227,15 @@ def test_what_cannot_be_imported_is_one_line(tmp_path: Path) -> None:
     assert "for the carriage_encoder" in complaint(USAGE, run, *options)
 
 
+def test_a_guess_takes_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One of them would not be used."""
+    with pytest.raises(SystemExit) as stop:
+        main(["csv", str(tmp_path / "a.csv"), "--guess", "--map", str(tmp_path / "map.yaml")])
+    said = capsys.readouterr()
+    assert stop.value.code == 2 and said.out == "" and said.err.count("\n") == 1
+    assert "--map: not allowed with argument --guess" in said.err
+
+
 def test_noise_that_cannot_be_estimated_is_asked_for(tmp_path: Path) -> None:
     from scipy.io import savemat
 

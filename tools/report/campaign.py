@@ -17,7 +17,7 @@ from gritd.tools.cli.wording import honesty, listed, percent
 from gritd.tools.report import figures, lab, masthead, plot, redo
 from gritd.tools.report.html import Child, Markup, page, section, table, tag
 from gritd.tools.report.lab import Beside, LabRun
-from gritd.tools.report.words import counted, held, sentence, uncertain
+from gritd.tools.report.words import counted, held, sentence, stopped, uncertain
 
 FORCES = {"torque": "T [N·m]", "drawbar_pull": "DP [N]"}
 SOIL = {  # field -> label, factor
@@ -40,7 +40,7 @@ class Campaign:
     testbed: str
     runs: Sequence[LabRun]
     redo: Mapping[str, Any]
-    notes: Sequence[str] = field(default_factory=list)
+    notes: Sequence[str] = field(default_factory=list)  # each begins with a file's name
 
     @property
     def estimate(self) -> Estimate:
@@ -361,4 +361,4 @@ def _lateness(run: LabRun) -> str:
 def _notes(campaign: Campaign) -> Child:
     if not campaign.notes:
         return None
-    return section("Notes", tag("ul", (tag("li", sentence(note)) for note in campaign.notes)))
+    return section("Notes", tag("ul", (tag("li", stopped(note)) for note in campaign.notes)))

@@ -19,6 +19,7 @@ from gritd.tools.diagnose.explain.result import SOIL, Quantity
 
 LARGE = 0.3  # [m] lengths from here on are read in metres
 HELD = re.compile(r"(?<=[0-9±<>]) (?=[0-9±%σ°]|(?:N|m|mm|s|Pa|kPa|nats)\b)|(?<=[0-9]) (?=±)")
+NAMED = re.compile(r"\S+\.\w")  # run-1.mcap, wheel.radius
 
 
 def name_of(key: str) -> str:
@@ -32,13 +33,15 @@ def held(words: str) -> str:
 
 
 def sentence(words: str) -> str:
-    """With a capital and a full stop."""
+    """With a capital and a full stop; a file's name or a key that it begins with stays as it is."""
+    words = stopped(words)
+    return words if NAMED.match(words) else words[:1].upper() + words[1:]
+
+
+def stopped(words: str) -> str:
+    """With a full stop."""
     words = held(words.strip())
-    return (
-        words[:1].upper()
-        + words[1:]
-        + ("" if words.endswith((".", "!", "?")) or not words else ".")
-    )
+    return words + ("" if words.endswith((".", "!", "?")) or not words else ".")
 
 
 def quantity(q: Quantity | None) -> str:

@@ -79,6 +79,34 @@ def test_an_output_that_cannot_be_written_is_one_line(
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ["none/x.html", "file/x.html", "/proc/x.html"])
+def test_an_output_is_checked_before_the_recordings_are_read(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    out, no_recording = tmp_path / name, tmp_path / "none.mcap"
+    assert cli.main(["report", str(no_recording), "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"gritd: {out}: ") and said.count("\n") == 1
+    assert f"{out.parent}" in said and "expected" in said
+
+
+def test_damage_is_told_by_the_name_of_its_file(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As it is written, also where a sentence begins with it."""
+    for name in ("run-1.mcap", "my run.mcap"):
+        data = bytearray(runs[0].read_bytes())
+        data[2] ^= 8  # of the magic
+        (tmp_path / name).write_bytes(data)
+
+        out = tmp_path / f"{name}.html"
+        assert cli.main(["report", str(tmp_path / name), "-o", str(out)]) == 3
+        assert "magic is damaged" in capsys.readouterr().err
+        page = out.read_text(encoding="utf-8")
+        assert f"<li>{name}: " in page and name.capitalize() not in page
+
+
 def test_loads_of_one_run_are_told_apart(of: list[lab.LabRun]) -> None:
     """Each load is a curve of its own over slip; a few windows between two loads are none."""
     first, second = (run.beside for run in of)

@@ -197,27 +197,43 @@ def _acting(settings: Settings, given: Sequence[str]) -> tuple[Effect, ...]:
     }
 
     for text in given:
-        key, _, value = text.partition("=")
-        name, _, parameter = key.partition(".")
-
-        known = quantities(name)
-        if known is None or parameter not in known:
-            word, options = (name, effects.EFFECTS) if known is None else (parameter, known)
-            raise CommandError(
-                f"--effect {text}: found '{word}'{did_you_mean(word, options)}; "
-                f"expected one of {', '.join(options)}",
-                USAGE,
-            )
-
-        values.setdefault(name, {})[parameter] = _quantity(
-            f"--effect {text}", value, known[parameter].unit or ""
-        )
+        name, parameter, value = _effect(text)
+        values.setdefault(name, {})[parameter] = value
 
     try:
         made = [effects.make(name, parameters) for name, parameters in values.items()]
     except ValueError as error:
         raise CommandError(error, USAGE) from None
     return tuple(effect for effect in made if not effect.filter_only)
+
+
+def _effect(text: str) -> tuple[str, str, float]:
+    """Effect, parameter and value in SI of NAME.PARAMETER=VALUE. Raises CommandError."""
+    key, _, value = text.partition("=")
+    name, _, parameter = key.partition(".")
+    known = quantities(name)
+
+    if known is None or (parameter and parameter not in known):
+        word, options = (name, effects.EFFECTS) if known is None else (parameter, known)
+        raise CommandError(
+            f"--effect {text}: found '{word}'{did_you_mean(word, options)}; "
+            f"expected one of {', '.join(options)}",
+            USAGE,
+        )
+
+    if not parameter or not value:
+        missing = "value" if parameter else "parameter"
+        raise CommandError(f"--effect {text}: found no {missing}; {_parameters(name)}", USAGE)
+    return name, parameter, _quantity(f"--effect {text}", value, known[parameter].unit or "")
+
+
+def _parameters(name: str) -> str:
+    """What can be stated of an effect, and one of it at the size to be expected."""
+    parameters = effects.EFFECTS[name].parameters()
+    stated = (f"{p.name} [{p.unit}]" if p.unit else p.name for p in parameters)
+    first = parameters[0]
+    example = f"{name}.{first.name}={min(first.centre + first.sigma, first.high):g}"
+    return f"expected {name}.PARAMETER=VALUE, PARAMETER one of {', '.join(stated)}, as in {example}"
 
 
 def _soil_changes(given: Sequence[str]) -> dict[str, float]:

@@ -209,6 +209,16 @@ def test_what_is_no_schedule_file_is_said_in_words(tmp_path: Path) -> None:
             ["--effect", "gremlins.size=3"],
             "--effect gremlins.size=3: found 'gremlins'; expected one of",
         ),
+        (
+            ["--effect", "coulomb_friction"],
+            "found no parameter; expected coulomb_friction.PARAMETER=VALUE, PARAMETER one of "
+            "loss [N·m], as in coulomb_friction.loss=0.8",
+        ),
+        (
+            ["--effect", "bulldozing.=3"],
+            "one of share, unit_weight [N/m^3], as in bulldozing.share=",
+        ),
+        (["--effect", "coulomb_friction.loss"], "found no value; expected coulomb_friction.PARAM"),
         (["--effect", "rear_contact.c3=0.2"], "found 'c3'; expected one of ratio"),
         (["--effect", "rear_contact.ratio=9"], "9 is outside 0 … 1"),
         (["--effect", "coulomb_friction.loss=2 mm"], "found '2 mm'"),

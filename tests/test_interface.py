@@ -119,17 +119,25 @@ def test_a_diagnosis_draws_itself_in_a_notebook(tmp_path):
     assert result.report(tmp_path / "r.html").exists() and "verdict" in str(result)
 
 
+def test_an_estimate_that_is_not_believed_says_so():
+    """A friction that the filter knows nothing of: what is told is the prior."""
+    run = gritd.simulate(schedule=STEPS, effects={"coulomb_friction": {"loss": 1.0}}, seed=3)
+    estimates = gritd.Filter(packaged()).run(run.arrays)
+    assert not estimates.believed and "the prior: the filter's own estimate" in repr(estimates)
+
+
 def test_what_a_notebook_shows_of_a_value_is_one_line(simulated, recorded):
     run = gritd.read(recorded)
     assert "run.mcap" in repr(run) and "topics" in repr(run)
     for shown in (repr(run), repr(simulated), repr(gritd.Filter(packaged()).run(run))):
-        assert "\n" not in shown and len(shown) < 200
+        assert "\n" not in shown and len(shown) < 200 and "prior" not in shown
 
 
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
         (lambda: gritd.simulate(schedule=[{"duration": 5.0}]), "segment 1: found duration"),
+        (lambda: gritd.simulate(packaged(), []), "found no segments; expected .duration, load"),
         (lambda: gritd.simulate(schedule=STEPS, soil={"cohesio": 1.0}), "did you mean cohesion"),
         (lambda: gritd.diagnose([], packaged()), "runs: found none"),
         (lambda: gritd.diagnose("run.mcap", packaged()), "expected a list"),

@@ -19,6 +19,7 @@ from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.offline.streams import streams_of
 from gritd.interface.runs import Place, Run, Table, configured
 
+DOUBTED = " (the prior: the filter's own estimate is not believed at the end)"
 Series = tuple[ArrayLike, ArrayLike]  # times [s] (n,) and raw values (n,), of the wrench (n, 6)
 
 
@@ -71,6 +72,7 @@ class Estimates:
         return (
             f"c {c.value:.0f} ± {c.sigma:.0f} Pa, tan φ {tan_phi.value:.4f} ± {tan_phi.sigma:.4f}, "
             f"k {k.value * 1e3:.1f} ± {k.sigma * 1e3:.1f} mm after {len(self.rows)} windows"
+            f"{'' if self.believed else DOUBTED}"
         )
 
 

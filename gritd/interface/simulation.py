@@ -25,6 +25,7 @@ from gritd.tools.testbed.schedule import Schedule, Segment
 from gritd.tools.testbed.simulation import Run as Made
 from gritd.tools.testbed.simulation import simulate_run, soil_of
 
+SEGMENT = tuple(field.name for field in fields(Segment))
 SOIL = ("cohesion", "tan_phi", "shear_modulus", "exponent", "modulus_factor")
 
 
@@ -116,17 +117,18 @@ def _schedule(given: Place | Schedule | Sequence[Mapping[str, float]] | None) ->
     if given is None:
         return schedules.read(packaged("schedule.yaml"))
     if isinstance(given, Sequence) and not isinstance(given, str):
+        if not given:
+            raise ValueError(f"schedule: found no segments; expected {{{', '.join(SEGMENT)}}} each")
         return Schedule(tuple(_segment(number, each) for number, each in enumerate(given, 1)), 0.5)
     return schedules.read(Path(given))
 
 
 def _segment(number: int, given: Mapping[str, float]) -> Segment:
     """Raises ValueError where a key is missing or unknown."""
-    expected = [field.name for field in fields(Segment)]
-    if set(given) != set(expected):
+    if set(given) != set(SEGMENT):
         raise ValueError(
             f"segment {number}: found {', '.join(given) or 'nothing'}; "
-            f"expected {', '.join(expected)}"
+            f"expected {', '.join(SEGMENT)}"
         )
     return Segment(**given)
 

@@ -128,9 +128,14 @@ class Screen:
         )
 
     @property
+    def on_grid(self) -> bool:
+        """Whether something stands out on the grid."""
+        return self.largest[1] > self.threshold and self.open > TUNING.screen.sure
+
+    @property
     def alarmed(self) -> bool:
-        slow = self.largest[1] > self.threshold and self.open > TUNING.screen.sure
-        return slow or self.ripple < TUNING.screen.line
+        """Whether something stands out on the grid, or a ripple at the recordings' own rate."""
+        return self.on_grid or self.ripple < TUNING.screen.line
 
 
 def tail_quantile(values: Array, level: float) -> float:

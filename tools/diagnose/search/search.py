@@ -24,6 +24,8 @@ from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
 from gritd.tools.diagnose.tuning import TUNING
 
+TURNING = "wheel_angle"  # what an effect that ripples goes with
+
 
 @dataclass(frozen=True)
 class Search:
@@ -167,17 +169,21 @@ def _shared(search: Search) -> list[object]:
 
 
 def promises(search: Search, model: Model) -> list[Promise]:
-    """Of every effect that is not in the model, the most promising first.
+    """Of every effect that may be what raised the alarm and is not in the model, the most promising
+    first.
 
     A discrepancy of form that was learnt without an effect may have taken the effect's part. So
     each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
     so it may do better than linear algebra by a share.
     """
     effects = search.problem.stack.rig.effects
-    settings, habit = settings_of(search.problem, model), search.first.habit
+    first = search.first
+    settings, habit = settings_of(search.problem, model), first.habit
 
     promised = []
-    for name in (n for n in effects if n not in model.names and n in search.first.fixed):
+    for name in (n for n in effects if n not in model.names and n in first.fixed):
+        if not (first.on_grid or effects[name].fingerprint.covariate == TURNING):
+            continue  # a ripple alone raised the alarm
         tried = list(_tried(search, model, effects[name], settings))
         if tried:
             best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))

@@ -4,6 +4,8 @@ have taken its part.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -62,3 +64,17 @@ def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
     best = next(p for p in promises(search, bare) if p.effect is kind)
     assert best.gain > as_it_is + 5.0
     assert max(best.sizes) < max(bare.sizes)
+
+
+def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> None:
+    """A friction may gain by chance what a ripple left over: it is not what stood out."""
+    rig = WheelRig(record(plan(), ()), settings())
+    rng = np.random.default_rng(0)
+    quiet = begin(prepare_screening(fit_base(rig, rng), rng))
+    bare = _bare(quiet, quiet.base)
+    assert not quiet.first.on_grid
+
+    rippling = replace(quiet, first=replace(quiet.first, ripple=1e-9))
+    assert rippling.first.alarmed
+    tried = {promise.effect.name for promise in promises(rippling, bare)}
+    assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}

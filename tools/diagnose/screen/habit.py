@@ -1,10 +1,11 @@
 """What a rig does when nothing is new: the screen's own test, made in each run of the reference.
 
 A reference that its discrepancy of form does not quite follow shows evidence for anything that acts
-in one of its runs alone. The same kind of evidence is no news in the new campaign. So each
-candidate is tested in every run of the reference as it is tested in the new campaign, and the
-alarm counts from the largest surprise found there. A ripple is tested in all of these runs
-together: it may be of one size and phase in all.
+in one of its runs alone. The same kind of evidence is no news in the new campaign, and evidence of
+another kind is less of it, for the new campaign is driven otherwise. So each candidate is tested in
+every run of the reference as it is tested in the new campaign. The alarm counts from the largest
+surprise found there of its kind, and must be twice the largest of any kind. A ripple is tested in
+all of these runs together: it may be of one size and phase in all.
 """
 
 from __future__ import annotations

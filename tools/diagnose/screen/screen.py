@@ -76,14 +76,21 @@ class Screen:
     @property
     def threshold(self) -> float:
         """At the tail of the nulls, fitted and counted: whichever is farther, since a fitted tail
-        may be too light.
+        may be too light. A rig that the reference shows to be off its model in some way may be off
+        in another where it is driven otherwise.
         """
         counted = np.sort(self.nulls)[-max(int(TUNING.screen.level * (1 + len(self.nulls))), 1)]
         return max(
             float(tail_quantile(self.nulls, TUNING.screen.level)),
             float(counted),
             TUNING.screen.least_surprise,
+            self.of_reference,
         )
+
+    @property
+    def of_reference(self) -> float:
+        """What the largest surprise in a run of the reference asks of one that is news."""
+        return TUNING.screen.habit * max(self.habit.values(), default=0.0)
 
     def surprise(self, of: Candidate, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows for
@@ -111,13 +118,13 @@ class Screen:
     def p(self) -> float:
         """Of the largest surprise, among the nulls; where it was weighed with the noise's colour
         open, no less than the level times what the likelihood ratio lacks there: no chance falls
-        faster than the ratio grows (Markov's inequality). A ripple at full rate has a chance of its
-        own.
+        faster than the ratio grows (Markov's inequality). The same of what it lacks beside the
+        reference: tails are exponential. A ripple at full rate has a chance of its own.
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
-        lacking = float(np.exp(TUNING.screen.sure - max(self.open, 0.0)))
-        open_ = min(TUNING.screen.level * lacking, 1.0)
-        return min(max(counted, open_), self.ripple)
+        lacking = max(TUNING.screen.sure - max(self.open, 0.0), self.of_reference - self.largest[1])
+        beyond = min(TUNING.screen.level * float(np.exp(lacking)), 1.0)
+        return min(max(counted, beyond), self.ripple)
 
     @property
     def stands_out(self) -> list[Candidate]:

@@ -70,7 +70,13 @@ class Screen:
     )
 
     # --- habit.py ---
-    habit: float = tuned(2.0, "-", "times the surprise that the reference shows of the same kind")
+    habit: float = tuned(
+        2.0,
+        "-",
+        "times the surprise that a run of the reference shows of the same kind, or of any: news "
+        "needs more",
+        "47 pairs with nothing new, 16 with something",
+    )
 
     # --- scans.py ---
     step_places: int = tuned(48, "places", "of a step along an axis", "run time")

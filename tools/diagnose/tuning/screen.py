@@ -75,7 +75,7 @@ class Screen:
         "-",
         "times the surprise that a run of the reference shows of the same kind, or of any: news "
         "needs more",
-        "47 pairs with nothing new, 16 with something",
+        "47 pairs with nothing new, and 11 alarms of pairs with something",
     )
 
     # --- scans.py ---

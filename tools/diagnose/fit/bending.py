@@ -9,7 +9,8 @@ with one h for all channels: the strength itself varies smoothly with the condit
 along the bed, as another formula for it would have it. Beside h each channel has a factor of its
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
-begins: soil has to move first. A ripple may also have other harmonics. No law says how a zero
+begins: soil has to move first. Another law of shear does as much at another shear displacement, so
+it may act as a change of slip too. A ripple may also have other harmonics. No law says how a zero
 creeps, or how it is set before each run: it may follow any smooth function, of up to twice the size
 of our formula. What the parameters of the model's effects can do is taken out of all this, so that
 a strength is what its effect does on the whole. ρ is how far published forms differ; its prior is
@@ -34,8 +35,10 @@ from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.tuning.guards import SQUARE
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
+OF_SHEAR = "contact"  # the stage of shear stress, which follows the shear displacement
 OF_SOIL = ("soil", "contact", "wheel")  # stages whose effects follow: soil has to move first
 
 
@@ -62,6 +65,11 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             columns = added[:, None] * every / np.sqrt(every.shape[1])
             if effect.stage in OF_SOIL:
                 columns = np.column_stack((columns, _following(stack, added)))
+            if effect.stage == OF_SHEAR:
+                displaced = _displaced(stack, noise, fitted, added)
+                columns = np.column_stack(
+                    (columns, displaced[:, None] * functions / np.sqrt(functions.shape[1]))
+                )
 
             columns = _beside(noise, columns, fitted)
             least = 0 if effect.stage in EXACT else 1
@@ -98,6 +106,21 @@ def _following(stack: Stack, added: Array) -> Array:
         share = -np.expm1(-turned / arc)
         columns += [followed(added, share, group) - added, -added * np.exp(-rolled / arc)]
     return np.column_stack(columns)
+
+
+def _displaced(stack: Stack, noise: Noise, fitted: Fitted, added: Array) -> Array:
+    """What slip does to all channels (N,), as large as an effect that adds so much (N,): another
+    law of shear does as much at another shear displacement.
+    """
+    names = [constant.name for constant in stack.rig.constants]
+    if stack.rig.slipping not in names:
+        return np.zeros_like(added)
+    number = names.index(stack.rig.slipping)
+
+    size = np.linalg.norm(whiten(noise, added[:, None]))
+    return np.asarray(
+        fitted.raw[:, number] * size / max(np.linalg.norm(fitted.own[:, number]), SQUARE)
+    )
 
 
 def _free_zeros(stack: Stack, noise: Noise, effect: Effect, added: Array) -> Iterator[Array]:

@@ -70,6 +70,7 @@ class DriveRig:
     baseline: tuple[Effect, ...] = ()
     partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
     law = None
+    slipping = ""
     stated_noise: Mapping[str, float] = {}
     shortcomings: Sequence[str] = ()
 

@@ -213,6 +213,10 @@ class Rig(Protocol):
         """
 
     @property
+    def slipping(self) -> str:
+        """The constant that changes the slip; "" where nothing slips."""
+
+    @property
     def stated_noise(self) -> Mapping[str, float]:
         """Standard deviation of one reading of a channel as the configuration states it, in the
         channel's unit; of those that it states one.

@@ -77,6 +77,7 @@ class WheelRig:
     units: Mapping[str, str] = UNITS
     menu = MENU
     heated = ("torque",)
+    slipping = "carriage_scale"
     smooth = (
         ("slip",), ("speed",), ("load",), ("sinkage",), ("slip", "load"), ("slip", "speed"),
         ("slip", "sinkage"), ("speed", "load"), ("speed", "sinkage"), ("load", "sinkage"),

@@ -129,3 +129,22 @@ def test_an_effect_beside_others_that_run_away_has_no_other_forms(
 
     monkeypatch.setattr(Stack, "predict", lambda *_: np.full(stack.size, np.nan))
     assert not bending_freedoms(stack, problem.noise, fitted)
+
+
+@pytest.mark.parametrize(("name", "slips"), [("shear_peak", True), ("bulldozing", False)])
+def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool) -> None:
+    """What a pulley that slips does to all channels is a combination of the columns of a shear
+    effect, but not of those of bulldozing.
+    """
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, effect = problem.stack, EFFECTS[name]
+    free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
+    fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
+    (freedom,) = bending_freedoms(stack, problem.noise, fitted)
+
+    names = [constant.name for constant in stack.rig.constants]
+    slipping = fitted.raw[:, names.index(stack.rig.slipping)]
+    every = np.column_stack((freedom.columns, fitted.raw[:, len(fitted.u) :]))
+    left = slipping - every @ np.linalg.lstsq(every, slipping, rcond=None)[0]
+    taken = np.linalg.norm(left) < 1e-6 * np.linalg.norm(slipping)
+    assert taken == slips

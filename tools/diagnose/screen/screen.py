@@ -50,6 +50,7 @@ class Screen:
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
+    counts: the share of evidence that counts beside a reference, which was driven elsewhere too.
     habit:  the largest surprise of each candidate in a run of the reference (habit.py).
     """
 
@@ -62,6 +63,7 @@ class Screen:
     open: float = np.inf
     habit: Mapping[Candidate, float] = field(default_factory=dict)
     ripple: float = 1.0
+    counts: float = 1.0
 
     @property
     def listed(self) -> dict[str, float]:

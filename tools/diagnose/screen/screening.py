@@ -89,7 +89,9 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
     problem, model, drawn = screening.problem, screening.base, screening.surrogates
     if problem.stack.referred:
         screen = _screen_beside_reference(screening, model)
-        return replace(screen, open=_open_form(screening, model, screen), ripple=_ripple(problem))
+        counts = max(_covered(screening), TUNING.screen.least_covered)
+        open_ = counts * _open_form(screening, model, screen)
+        return replace(screen, open=open_, ripple=_ripple(problem), counts=counts)
     effects = _signatures(problem, model)
     signatures = chain(effects, screening.functions, _strains(problem, model))
     searched = _averages(screening, model, jobs)
@@ -206,14 +208,11 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
 
 
 def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
-    """The evidence of what is new with the sizes of what the rig does anyway open [nats]; the less
-    of it counts the less of the new campaign lies where the reference was driven.
-    """
+    """The evidence of what is new with the sizes of what the rig does anyway open [nats]."""
     if not screen.stands_out:
         return np.inf
     every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
-    gain = gain_with_form_open(screening.problem, model, every)
-    return gain * max(_covered(screening), TUNING.screen.least_covered)
+    return gain_with_form_open(screening.problem, model, every)
 
 
 def _covered(screening: Screening) -> float:

@@ -62,11 +62,11 @@ class Screen:
         0.3, "share", "of the discrepancy's variance that the reference may leave open"
     )
     least_covered: float = tuned(
-        0.2,
+        0.02,
         "share",
-        "of the new campaign that counts as covered at least: an alarm outside needs five times "
-        "the evidence",
-        "judgement",
+        "of the new campaign that counts as covered at least: an alarm where the reference was not "
+        "driven needs fifty times the evidence",
+        "at a fifth, three of five pairs with nothing new alarmed of which none was covered",
     )
 
     # --- habit.py ---

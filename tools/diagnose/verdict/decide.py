@@ -173,7 +173,7 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
 
 def power(search: Search, screen: Screen) -> float:
     """Share of the listed effects that would be seen at their expected size; those that change
-    nothing measured would not.
+    nothing measured would not. Beside a reference that was driven elsewhere little would.
     """
     projection = search.base.fitted.projection()
     seen = []
@@ -181,6 +181,6 @@ def power(search: Search, screen: Screen) -> float:
         if isinstance(name, str):
             a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(screen.surprise(name, float(gain)) > screen.threshold)
+            seen.append(screen.surprise(name, screen.counts * float(gain)) > screen.threshold)
 
     return sum(seen) / max(len(search.problem.stack.rig.effects), 1)

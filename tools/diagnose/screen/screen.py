@@ -119,9 +119,9 @@ class Screen:
     @property
     def p(self) -> float:
         """Of the largest surprise, among the nulls; where it was weighed with the noise's colour
-        open, no less than the level times what the likelihood ratio lacks there: no chance falls
-        faster than the ratio grows (Markov's inequality). The same of what it lacks beside the
-        reference: tails are exponential. A ripple at full rate has a chance of its own.
+        open, no less than the chance of such a likelihood ratio in any kind of misfit (Markov's
+        inequality). The same of what it lacks beside the reference: tails are exponential. A ripple
+        at full rate has a chance of its own.
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
         lacking = max(TUNING.screen.sure - max(self.open, 0.0), self.of_reference - self.largest[1])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from gritd.tools.diagnose.tuning.field import tuned
 
 TAIL = "Davison and Smith 1990"
@@ -22,12 +24,7 @@ class Screen:
         "probability",
         "of a ripple at full rate by chance, from which it is an alarm by itself",
     )
-    sure: float = tuned(
-        3.0,
-        "nats",
-        "likelihood ratio that is left beside noise of another colour, at an alarm",
-        "220 campaigns with nothing new, 74 of them in noise correlated 0.95: 2 of these alarm",
-    )
+    kinds: int = tuned(10, "kinds", "of misfit that count as independent, of all that are tried")
     tail: float = tuned(
         0.1,
         "probability",
@@ -91,3 +88,8 @@ class Screen:
     ripple_harmonics: int = tuned(4, "harmonics", "of a ripple that is known")
     large_ripple: float = tuned(3.0, "-", "their standard deviation in expected sizes")
     frequencies_near_best: int = tuned(9, "frequencies", "about the best, in steps of the scan")
+
+    @property
+    def sure(self) -> float:
+        """A likelihood ratio [nats] that is chance as rarely as an alarm is false."""
+        return float(np.log(self.kinds / self.level))

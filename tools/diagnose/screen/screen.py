@@ -124,7 +124,7 @@ class Screen:
         at full rate has a chance of its own.
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
-        lacking = max(TUNING.screen.sure - max(self.open, 0.0), self.of_reference - self.largest[1])
+        lacking = max(self._sure - max(self.open, 0.0), self.of_reference - self.largest[1])
         beyond = min(TUNING.screen.level * float(np.exp(lacking)), 1.0)
         return min(max(counted, beyond), self.ripple)
 
@@ -139,7 +139,12 @@ class Screen:
     @property
     def on_grid(self) -> bool:
         """Whether something stands out on the grid."""
-        return self.largest[1] > self.threshold and self.open > TUNING.screen.sure
+        return self.largest[1] > self.threshold and self.open > self._sure
+
+    @property
+    def _sure(self) -> float:
+        """Evidence that must be left [nats]: of the noise's colour, or beside a reference."""
+        return TUNING.screen.beside_reference if self.habit else TUNING.screen.sure
 
     @property
     def alarmed(self) -> bool:

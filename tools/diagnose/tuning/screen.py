@@ -25,6 +25,12 @@ class Screen:
         "of a ripple at full rate by chance, from which it is an alarm by itself",
     )
     kinds: int = tuned(10, "kinds", "of misfit that count as independent, of all that are tried")
+    beside_reference: float = tuned(
+        3.0,
+        "nats",
+        "likelihood ratio that is left with the sizes of what the rig does anyway open",
+        "judgement: these sizes are learnt from both campaigns, and favour nothing new",
+    )
     tail: float = tuned(
         0.1,
         "probability",

@@ -1,0 +1,44 @@
+"""Beside a reference, an alarm asks for more than the rig shows when nothing is new."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.tuning import TUNING
+
+NULLS = np.random.default_rng(1).exponential(1.0, 300)  # the largest surprise of each
+
+
+def _screen(surprise: float, habit: float, left: float) -> Screen:
+    """New is a loss; what the reference shows is a slope."""
+    nothing = {"loss": (0.0, 1.0), "slope": (0.0, 1.0)}
+    screen = Screen({"loss": surprise, "slope": 0.0}, nothing, {}, {}, NULLS, open=left)
+    return replace(screen, habit={"loss": 0.0, "slope": habit})
+
+
+@pytest.mark.parametrize(("surprise", "alarms"), [(19.0, False), (21.0, True)])
+def test_news_surprise_twice_as_much_as_anything_in_a_run_of_the_reference(
+    surprise: float, alarms: bool
+) -> None:
+    """A rig that is off its model in one way may be off in another where it is driven otherwise."""
+    screen = _screen(surprise, habit=10.0, left=50.0)
+    assert screen.alarmed == alarms
+    assert (screen.p < TUNING.screen.level) == alarms
+
+
+@pytest.mark.parametrize("left", [0.9, 1.1])
+def test_what_is_new_must_stand_beside_sizes_that_suit_both_campaigns(left: float) -> None:
+    screen = _screen(30.0, habit=1.0, left=left * TUNING.screen.beside_reference)
+    assert screen.alarmed == (left > 1.0)
+    assert (screen.p < TUNING.screen.level) == (left > 1.0)
+
+
+def test_without_a_reference_slow_noise_must_be_far_less_likely() -> None:
+    between = 0.5 * (TUNING.screen.beside_reference + TUNING.screen.sure)
+    screen = _screen(30.0, habit=0.0, left=between)
+    assert screen.alarmed
+    assert not replace(screen, habit={}).alarmed

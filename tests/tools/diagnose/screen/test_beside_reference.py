@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gritd.tools.diagnose.fit.shape import Candidate
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -15,7 +16,7 @@ NULLS = np.random.default_rng(1).exponential(1.0, 300)  # the largest surprise o
 
 def _screen(surprise: float, habit: float, left: float) -> Screen:
     """New is a loss; what the reference shows is a slope."""
-    nothing = {"loss": (0.0, 1.0), "slope": (0.0, 1.0)}
+    nothing: dict[Candidate, tuple[float, float]] = {"loss": (0.0, 1.0), "slope": (0.0, 1.0)}
     screen = Screen({"loss": surprise, "slope": 0.0}, nothing, {}, {}, NULLS, open=left)
     return replace(screen, habit={"loss": 0.0, "slope": habit})
 

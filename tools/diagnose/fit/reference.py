@@ -19,7 +19,12 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
-from gritd.tools.diagnose.fit.shared import rippling_columns, shared_columns, shared_freedoms
+from gritd.tools.diagnose.fit.shared import (
+    rippling_columns,
+    shared_columns,
+    shared_freedoms,
+    without_ripples,
+)
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import estimate_of_reference, louder, restless
 from gritd.tools.diagnose.noise.saturated import Explainable
@@ -43,8 +48,9 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
-    alone = estimate_of_reference(stack, predicted, left(again), nothing, noise, rng)
-    noise = restless(louder(noise, alone), stack.measured - predicted)
+    calm = without_ripples(stack, left(again), ripples)
+    alone = estimate_of_reference(stack, predicted, left(again), calm, nothing, noise, rng)
+    noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(again, noise, shared, ripples)
     return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)
@@ -72,6 +78,7 @@ def _least_noise(rough: BaseFit, shared: Array, ripples: Array, rng: np.random.G
     leading = np.column_stack((rough.fitted.raw, shared))
     predicted = rough.fitted.predicted
     residual = stack.measured - predicted
+    calm = without_ripples(stack, residual, ripples)
     return estimate_of_reference(
-        stack, predicted, residual, Explainable(leading, whole), before, rng
+        stack, predicted, residual, calm, Explainable(leading, whole), before, rng
     )

@@ -49,6 +49,33 @@ def rippling_columns(stack: Stack, residual: Array) -> Array:
     return np.column_stack([np.zeros((stack.size, 0)), *_ripples(stack, residual)])
 
 
+def without_ripples(stack: Stack, residual: Array, ripples: Array) -> Array:
+    """A residual (N,) less what ripples (N, r) can be of it, as its differences from one value to
+    the next tell: a slow misfit hardly changes them. In each run and channel for itself. Good for
+    such differences alone: a long wave is hardly told by them.
+    """
+    left = residual.copy()
+    for channel, number in stack.parts:
+        index = np.flatnonzero(stack.of(channel) & (stack.run == number))
+        own = ripples[index][:, np.any(ripples[index], axis=0)]
+        if own.shape[1]:
+            left[index] -= own @ _least_absolute(np.diff(own, axis=0), np.diff(residual[index]))
+    return left
+
+
+def _least_absolute(columns: Array, values: Array) -> Array:
+    """Weights (m,) of columns (n, m) by which they leave the least sum of absolute values of (n,):
+    a change of slip is a few large differences. Iteratively weighted squares.
+    """
+    weights, share = np.ones(values.size), np.zeros(columns.shape[1])
+    for _ in range(TUNING.fit.calming_rounds):
+        root = np.sqrt(weights)
+        share = np.linalg.lstsq(root[:, None] * columns, root * values, rcond=None)[0]
+        off = np.abs(values - columns @ share)
+        weights = 1.0 / np.maximum(off, max(float(np.median(off)), SQUARE))
+    return share
+
+
 def shared_freedoms(noise: Noise, columns: Array, ripples: Array) -> tuple[Freedom, ...]:
     """Freedoms of the columns (N, m) and the ripples (N, r)."""
     reduced = _reduced(columns, whiten(noise, columns))

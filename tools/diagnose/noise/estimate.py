@@ -117,6 +117,7 @@ def estimate_of_reference(
     stack: Stack,
     predicted: Array,
     residual: Array,
+    calm: Array,
     explainable: Explainable,
     before: Noise,
     rng: np.random.Generator,
@@ -124,7 +125,8 @@ def estimate_of_reference(
     """The same from a reference campaign: all that its residual (N,) shows beside what is
     explainable is what this rig does when nothing is new, waves included.
 
-    predicted: (N,) by the equations.
+    predicted: (N,) by the equations; calm: (N,) the residual without ripples, whose single values
+    may stand off their neighbours.
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
     told = [
@@ -134,7 +136,7 @@ def estimate_of_reference(
     posteriors = [_chosen(stack, posterior, rng) for posterior in told]
 
     none = np.zeros((stack.size, 0))
-    return _noise(stack, predicted, residual, posteriors, none, explainable.leading)
+    return _noise(stack, predicted, calm, posteriors, none, explainable.leading)
 
 
 def _noise(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gritd.tools.diagnose.orders.lines import Line, find_lines
+from gritd.tools.diagnose.orders.lines import Line, find_lines, size_in
 from gritd.tools.diagnose.orders.stretches import Samples
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -45,13 +45,14 @@ class Lines:
 
     def fresh(self, axis: str = "angle") -> list[Line]:
         """Lines of the new campaign that are no harmonics, and that the reference does not have at
-        half their size at least.
+        half their size at least. A line of few turns may stand there without being found.
         """
         return [
             line
             for line in self.new
             if line.axis == axis
             and not line.harmonic
+            and line.before <= TUNING.orders.known * line.size
             and not any(
                 same(line, other) and other.size > TUNING.orders.known * line.size
                 for other in self.reference
@@ -76,7 +77,11 @@ NO_LINES = Lines()
 
 def lines_of(new: Runs, reference: Runs = ()) -> Lines:
     """Of the readings of each run at their own rate."""
-    return Lines(find_lines(new), find_lines(reference) if reference else ())
+    found = find_lines(new)
+    if not reference:
+        return Lines(found)
+    of_both = tuple(replace(line, before=size_in(reference, line)) for line in found)
+    return Lines(of_both, find_lines(reference))
 
 
 def same(one: Line, other: Line) -> bool:

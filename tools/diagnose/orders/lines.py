@@ -37,6 +37,7 @@ class Line:
     support:    evidence [nats] of this place and its harmonics in all channels: lugs and teeth
         strike, so a count of them has harmonics; what is merely not round has none.
     harmonic:   of which louder line of the channel it is a harmonic, by its `at`; else 0.
+    before:     its size in a reference campaign, found there or not, in the channel's unit.
     """
 
     channel: str
@@ -49,24 +50,43 @@ class Line:
     cell: float
     support: float
     harmonic: float = 0.0
+    before: float = 0.0
 
     def scaled(self, channel: str, scale: float) -> Line:
         """As a line of another channel."""
         amplitudes = tuple(a and a.scaled(scale) for a in self.amplitudes)
-        return replace(self, channel=channel, amplitudes=amplitudes)
+        return replace(self, channel=channel, amplitudes=amplitudes, before=abs(scale) * self.before)
 
     @property
     def size(self) -> float:
         """Root mean square over the runs of the amplitude, in the channel's unit."""
-        known = [a for a in self.amplitudes if a is not None]
-        square = np.mean([a.size**2 - 2.0 * a.sigma**2 for a in known]) if known else 0.0
-        return float(np.sqrt(max(square, 0.0)))
+        return _size([a for a in self.amplitudes if a is not None])
 
     @property
     def size_sigma(self) -> float:
         """Standard deviation of the size."""
         known = [a.sigma for a in self.amplitudes if a is not None]
         return float(np.sqrt(np.mean(np.square(known)) / len(known))) if known else np.nan
+
+
+def size_in(runs: Sequence[Mapping[str, Samples]], line: Line) -> float:
+    """Size of a line in other runs, found there or not, in the channel's unit; 0 where they hold
+    too little of it to tell.
+    """
+    sizes = []
+    for part in _parts(runs, line.channel):
+        samples = part.samples
+        if line.at * samples.span(line.axis) >= TUNING.orders.cycles:
+            left = samples.values - wave_of(samples, line.axis, line.at, whole=True)
+            level = float(np.mean(left**2))
+            sizes.append(amplitude_of(samples, line.axis, line.at, level))
+    return _size(sizes)
+
+
+def _size(amplitudes: Sequence[Amplitude]) -> float:
+    """Root mean square of amplitudes without what noise adds; 0 of none."""
+    squares = [a.size**2 - 2.0 * a.sigma**2 for a in amplitudes]
+    return float(np.sqrt(max(np.mean(squares), 0.0))) if squares else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,6 +157,7 @@ class Fit:
         15.0, "nats", "a ripple of the reference gains: some hundred orders are tried"
     )
     standing_orders: int = tuned(6, "orders", "of a channel of the reference that may stand out")
+    calming_rounds: int = tuned(8, "fits", "of the ripples that leave the least absolute values")
     ripple_shown: float = tuned(0.1, "-", "of a ripple that the grid must show", DAMPED)
 
     # --- signatures.py ---

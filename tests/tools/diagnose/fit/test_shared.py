@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gritd.estimator.effects import make
-from gritd.tools.diagnose.fit.shared import _reduced, rippling_columns
+from gritd.tools.diagnose.fit.shared import _reduced, rippling_columns, without_ripples
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
@@ -72,3 +72,21 @@ def test_less_than_a_turn_shows_a_fast_ripple() -> None:
 
 def test_noise_does_not_ripple() -> None:
     assert _columns((), 7)[1].shape[1] == 0
+
+
+def test_differences_without_ripples_are_those_of_the_noise() -> None:
+    """A change of slip, which no ripple is, is a few large differences."""
+    stack, _ = _columns((), 7, seconds=20.0)
+    rng = np.random.default_rng(1)
+    angle = stack.covariate("wheel_angle")
+    here = stack.of("torque") & (stack.run == 1)
+    waves = [np.where(here, f(9.0 * angle), 0.0) for f in (np.cos, np.sin)]
+    noise = 0.1 * rng.standard_normal(stack.size)
+    late = stack.time > np.median(stack.time[here])
+
+    residual = noise + 5.0 * waves[0] - 3.0 * waves[1] + np.where(late, 4.0, 0.0)
+    calm = without_ripples(stack, residual, np.column_stack(waves))
+    usual = np.median(np.abs(np.diff(noise[here])))
+    assert np.median(np.abs(np.diff(residual[here]))) > 3.0 * usual
+    assert abs(np.median(np.abs(np.diff(calm[here]))) / usual - 1.0) < 0.1
+    np.testing.assert_array_equal(calm[~here], residual[~here])

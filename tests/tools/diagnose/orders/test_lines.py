@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gritd.tools.diagnose.orders.campaigns import lines_of
+from gritd.tools.diagnose.orders.campaigns import Lines, lines_of
 from gritd.tools.diagnose.orders.lines import find_lines
 from gritd.tools.diagnose.orders.on_grid import on_grid
 from gritd.tools.diagnose.orders.stretches import TURN, Motion, Samples, steady_samples
@@ -59,6 +59,18 @@ def test_what_a_reference_ripples_alike_is_not_new() -> None:
     louder = lines_of(campaign(_runs(6, ripple=(0.6, 0.0, 41.0))), before)
     assert louder.orders(2.0, 200.0) == [pytest.approx(41.0, abs=0.1)]
     assert louder.orders(2.0, 30.0) == []
+
+
+def test_what_a_short_reference_ripples_unnoticed_is_not_new() -> None:
+    """A fifth of a turn holds eight of 41 ripples: too few to be found among all that are tried."""
+
+    def after(ripple: float) -> Lines:
+        rng = np.random.default_rng(7)
+        short = campaign([readings(rng, ripple=(ripple, 0.0, 41.0), seconds=4.0)])
+        return lines_of(campaign(_runs(6, ripple=(0.2, 0.0, 41.0))), short)
+
+    assert after(0.2).reference == () and after(0.2).fresh() == []
+    assert [round(line.at) for line in after(0.0).fresh()] == [41]
 
 
 def test_on_the_grid_a_ripple_stands_as_it_is_at_its_times() -> None:

@@ -12,6 +12,7 @@ amiss in it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -56,7 +57,9 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)
 
 
-def _of_reference(start: BaseFit, noise: Noise, shared: Array, ripples: Array) -> BaseFit:
+def _of_reference(
+    start: BaseFit, noise: Noise, shared: Mapping[str, Array], ripples: Array
+) -> BaseFit:
     """The reference alone, fitted with all its freedoms: the new campaign says nothing."""
     blind = replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
     return refit_beside(start, blind, shared_freedoms(blind, shared, ripples))
@@ -70,12 +73,14 @@ def left(base: BaseFit) -> Array:
     return np.asarray(base.problem.stack.measured - fitted.predicted - freedoms)
 
 
-def _least_noise(rough: BaseFit, shared: Array, ripples: Array, rng: np.random.Generator) -> Noise:
+def _least_noise(
+    rough: BaseFit, shared: Mapping[str, Array], ripples: Array, rng: np.random.Generator
+) -> Noise:
     """What no function of the form, no effect and no constant could explain of the reference."""
     stack, before = rough.problem.stack, rough.problem.noise
     forms = [f.columns for f in form_freedoms(stack, before)]
     whole = np.column_stack([ripples, *forms])
-    leading = np.column_stack((rough.fitted.raw, shared))
+    leading = np.column_stack((rough.fitted.raw, *shared.values()))
     predicted = rough.fitted.predicted
     residual = stack.measured - predicted
     calm = without_ripples(stack, residual, ripples)

@@ -5,9 +5,11 @@ gear's ripple, a sidewall that rubs or soil that relaxes has these in the new ca
 explanation of the reference is asked for. So every effect of the library may act in both campaigns
 with one strength,
 
-    Σₑ aₑ Sₑ(x),   aₑ ~ N(0, 1) in expected sizes, times one size for all that is learnt,
+    Σₑ aₑ Sₑ(x),   aₑ ~ N(0, 1) in expected sizes, times a size that is learnt,
 
-linear about the rough fit, reduced to the directions that the recordings can show. A ripple keeps
+linear about the rough fit, reduced to the directions that the recordings can show. The drive, the
+soil and the instruments have a size each: a gear that rubs much says nothing of the soil. A
+ripple keeps
 its order and its size, but not its phase: each run has its own. It may be faster than the grid: the
 grid's values are means over an interval, which damp it, and what is left is an alias of known size.
 A run of larger forces or torques may ripple more in proportion, as a gear does.
@@ -15,12 +17,13 @@ A run of larger forces or torques may ripple more in proportion, as a gear does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.ripples import restored
@@ -31,15 +34,29 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
 
-def shared_columns(stack: Stack, u: Array, predicted: Array) -> Array:
+# what effects are of, and their stages
+PARTS = {
+    "drive": ("drivetrain",),
+    "soil": ("soil", "contact", "wheel"),
+    "instruments": ("sensor", "testbed", "any"),
+}
+
+
+def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]:
     """Signatures (N, m) of all effects but ripples in both campaigns, about a prediction (N,) at
-    constants u (q,); each effect of one expected size together.
+    constants u (q,), by what they are effects of; each effect of one expected size together.
     """
     names = [name for name, effect in stack.rig.effects.items() if order_of(effect) is None]
-    every = list(raw_signatures(stack, u, predicted, names, everywhere=True))
-    shapes = {name: sum(s.of == name for s in every) for name in names}
-    columns = [s.columns / np.sqrt(shapes[str(s.of)]) for s in every]
-    return np.column_stack([np.zeros((stack.size, 0)), *columns])
+    columns: dict[str, list[Array]] = {part: [np.zeros((stack.size, 0))] for part in PARTS}
+    for name in names:
+        every = list(raw_signatures(stack, u, predicted, [name], everywhere=True))
+        own = columns[_part_of(stack.rig.effects[name])]
+        own += [s.columns / np.sqrt(len(every)) for s in every]
+    return {part: np.column_stack(each) for part, each in columns.items()}
+
+
+def _part_of(effect: type[Effect]) -> str:
+    return next(part for part, stages in PARTS.items() if effect.stage in stages)
 
 
 def rippling_columns(stack: Stack, residual: Array) -> Array:
@@ -76,11 +93,15 @@ def _least_absolute(columns: Array, values: Array) -> Array:
     return share
 
 
-def shared_freedoms(noise: Noise, columns: Array, ripples: Array) -> tuple[Freedom, ...]:
-    """Freedoms of the columns (N, m) and the ripples (N, r)."""
-    reduced = _reduced(columns, whiten(noise, columns))
+def shared_freedoms(
+    noise: Noise, shared: Mapping[str, Array], ripples: Array
+) -> tuple[Freedom, ...]:
+    """Freedoms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
-    freedoms = [Freedom("effects in both", *reduced, sizes)]
+    freedoms = [
+        Freedom(f"{part} in both", *_reduced(columns, whiten(noise, columns)), sizes)
+        for part, columns in shared.items()
+    ]
     if ripples.shape[1]:
         once = Sizes((1.0,), (1.0,))
         freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), once))

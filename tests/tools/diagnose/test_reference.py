@@ -77,7 +77,7 @@ def test_friction_that_is_new_is_not_taken_for_one_that_the_reference_hides() ->
     loss at others. The reference shows none, and that counts.
     """
     base = fit_base(elsewhere((make("coulomb_friction", {"loss": 0.12}),)), _rng())
-    both = next(n for n, f in enumerate(base.forms) if f.name == "effects in both")
+    both = next(n for n, f in enumerate(base.forms) if f.name == "drive in both")
     assert base.model.sizes[both] == 0
 
     screen = screen_of_base(prepare_screening(base, _rng()))

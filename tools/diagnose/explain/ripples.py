@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.explain.result import Late, Quantity, Ripple
 from gritd.tools.diagnose.fit.signatures import order_of
-from gritd.tools.diagnose.orders.campaigns import same
 from gritd.tools.diagnose.orders.lines import Line
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING
@@ -34,7 +33,7 @@ def _told(rig: Rig, line: Line) -> Ripple:
         line.p,
         line.frequency,
         line.harmonic or None,
-        any(same(line, other) for other in rig.lines.reference),
+        rig.lines.before(line) > TUNING.orders.known * line.size,
     )
 
 

@@ -33,7 +33,6 @@ from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
-
 # what effects are of, and their stages
 PARTS = {
     "drive": ("drivetrain",),
@@ -84,10 +83,11 @@ def _least_absolute(columns: Array, values: Array) -> Array:
     """Weights (m,) of columns (n, m) by which they leave the least sum of absolute values of (n,):
     a change of slip is a few large differences. Iteratively weighted squares.
     """
-    weights, share = np.ones(values.size), np.zeros(columns.shape[1])
+    weights: Array = np.ones(values.size)
+    share: Array = np.zeros(columns.shape[1])
     for _ in range(TUNING.fit.calming_rounds):
         root = np.sqrt(weights)
-        share = np.linalg.lstsq(root[:, None] * columns, root * values, rcond=None)[0]
+        share = np.asarray(np.linalg.lstsq(root[:, None] * columns, root * values, rcond=None)[0])
         off = np.abs(values - columns @ share)
         weights = 1.0 / np.maximum(off, max(float(np.median(off)), SQUARE))
     return share

@@ -45,19 +45,16 @@ class Lines:
 
     def fresh(self, axis: str = "angle") -> list[Line]:
         """Lines of the new campaign that are no harmonics, and that the reference does not have at
-        half their size at least. A line of few turns may stand there without being found.
+        half their size at least.
         """
-        return [
-            line
-            for line in self.new
-            if line.axis == axis
-            and not line.harmonic
-            and line.before <= TUNING.orders.known * line.size
-            and not any(
-                same(line, other) and other.size > TUNING.orders.known * line.size
-                for other in self.reference
-            )
-        ]
+        own = (line for line in self.new if line.axis == axis and not line.harmonic)
+        return [x for x in own if self.before(x) <= TUNING.orders.known * x.size]
+
+    def before(self, line: Line) -> float:
+        """Size of a line in the reference. One of few turns may stand there without being found
+        among all that are tried.
+        """
+        return max((x.size for x in self.reference if same(line, x)), default=line.before)
 
     def orders(self, low: float, high: float) -> list[float]:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported

@@ -55,7 +55,8 @@ class Line:
     def scaled(self, channel: str, scale: float) -> Line:
         """As a line of another channel."""
         amplitudes = tuple(a and a.scaled(scale) for a in self.amplitudes)
-        return replace(self, channel=channel, amplitudes=amplitudes, before=abs(scale) * self.before)
+        before = abs(scale) * self.before
+        return replace(self, channel=channel, amplitudes=amplitudes, before=before)
 
     @property
     def size(self) -> float:
@@ -86,7 +87,7 @@ def size_in(runs: Sequence[Mapping[str, Samples]], line: Line) -> float:
 def _size(amplitudes: Sequence[Amplitude]) -> float:
     """Root mean square of amplitudes without what noise adds; 0 of none."""
     squares = [a.size**2 - 2.0 * a.sigma**2 for a in amplitudes]
-    return float(np.sqrt(max(np.mean(squares), 0.0))) if squares else 0.0
+    return float(np.sqrt(max(float(np.mean(squares)), 0.0))) if squares else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 
 TOLERATED = ("constant", "slip", "speed", "load", "sinkage", "acceleration")  # and products of two
 LONG = ("position", "time", "heat")  # covariates along which waves stand for any smooth function
+BEYOND_FORM = {*LONG, "run"}  # covariates over which no form of the model varies
 
 
 def smooth_signatures(stack: Stack, everywhere: bool = False) -> tuple[Signature, ...]:

@@ -8,11 +8,11 @@ with one strength,
     Σₑ aₑ Sₑ(x),   aₑ ~ N(0, 1) in expected sizes, times a size that is learnt,
 
 linear about the rough fit, reduced to the directions that the recordings can show. The drive, the
-soil and the instruments have a size each: a gear that rubs much says nothing of the soil. A
-ripple keeps
-its order and its size, but not its phase: each run has its own. It may be faster than the grid: the
-grid's values are means over an interval, which damp it, and what is left is an alias of known size.
-A run of larger forces or torques may ripple more in proportion, as a gear does.
+soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
+says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
+keeps its order and its size, but not its phase: each run has its own. It may be faster than the
+grid: the grid's values are means over an interval, which damp it, and what is left is an alias of
+known size. A run of larger forces or torques may ripple more in proportion, as a gear does.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
+from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -33,8 +34,10 @@ from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
-# what effects are of, and their stages
+CHANGES = "changes"  # what varies with time, heat, place or run
+# what all other effects are of, and their stages
 PARTS = {
+    CHANGES: (),
     "drive": ("drivetrain",),
     "soil": ("soil", "contact", "wheel"),
     "instruments": ("sensor", "testbed", "any"),
@@ -55,6 +58,8 @@ def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]
 
 
 def _part_of(effect: type[Effect]) -> str:
+    if effect.fingerprint.covariate in BEYOND_FORM:
+        return CHANGES
     return next(part for part, stages in PARTS.items() if effect.stage in stages)
 
 

@@ -4,8 +4,8 @@ A reference that its discrepancy of form does not quite follow shows evidence fo
 in one of its runs alone. The same kind of evidence is no news in the new campaign, and evidence of
 another kind is less of it, for the new campaign is driven otherwise. So each candidate is tested in
 every run of the reference as it is tested in the new campaign. The alarm counts from the largest
-surprise found there of its kind, and must be twice the largest of any kind. A ripple is tested in
-all of these runs together: it may be of one size and phase in all.
+surprise found there of its kind, and must be twice the largest of any kind but ripples. A ripple is
+tested in all of these runs together: it may be of one size and phase in all.
 """
 
 from __future__ import annotations

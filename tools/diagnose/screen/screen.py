@@ -12,7 +12,7 @@ largest of *all* these surprises in every null, however many were tried and howe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import TypeVar
@@ -52,6 +52,8 @@ class Screen:
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     counts: the share of evidence that counts beside a reference, which was driven elsewhere too.
     habit:  the largest surprise of each candidate in a run of the reference (habit.py).
+    apart:  candidates whose habit says nothing of others: a rig that ripples is off its model in
+        nothing else.
     """
 
     evidence: dict[Candidate, float]
@@ -62,6 +64,7 @@ class Screen:
     chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
     habit: Mapping[Candidate, float] = field(default_factory=dict)
+    apart: Collection[Candidate] = ()
     ripple: float = 1.0
     counts: float = 1.0
 
@@ -92,7 +95,8 @@ class Screen:
     @property
     def of_reference(self) -> float:
         """What the largest surprise in a run of the reference asks of one that is news."""
-        return TUNING.screen.habit * max(self.habit.values(), default=0.0)
+        others = (value for of, value in self.habit.items() if of not in self.apart)
+        return TUNING.screen.habit * max(others, default=0.0)
 
     def surprise(self, of: Candidate, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows for
@@ -102,13 +106,15 @@ class Screen:
         evidence = self.evidence[of] if evidence is None else evidence
         return (evidence - start) / reach - TUNING.screen.habit * self.habit.get(of, 0.0)
 
-    def beside_reference(self, evidence: Mapping[Candidate, float]) -> Screen:
+    def beside_reference(
+        self, evidence: Mapping[Candidate, float], apart: Collection[Candidate] = ()
+    ) -> Screen:
         """The same where single runs of a reference campaign show some evidence of the candidates
-        [nats].
+        [nats]; apart: those whose habit says nothing of others.
         """
         usual = {of: self.usual[of] for of in evidence if of in self.usual}
         habit = {of: max((evidence[of] - s) / r, 0.0) for of, (s, r) in usual.items()}
-        return replace(self, habit=habit)
+        return replace(self, habit=habit, apart=apart)
 
     @property
     def largest(self) -> tuple[Candidate, float]:

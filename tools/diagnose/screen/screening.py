@@ -14,7 +14,7 @@ from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom
-from gritd.tools.diagnose.fit.functions import smooth_signatures
+from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Surrogates
@@ -35,9 +35,6 @@ from gritd.tools.diagnose.screen.screen import (
     whitened,
 )
 from gritd.tools.diagnose.tuning import TUNING
-
-# covariates over which no form of the model varies
-BEYOND_FORM = {"time", "position", "heat", "run"}
 
 
 @dataclass(frozen=True)
@@ -137,7 +134,8 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     of_reference = families(stack, problem.noise, ~stack.new)
     rest = beside.of_rows(~stack.new)
     shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
-    return screen.beside_reference({**shapes, **usual})
+    ripples = {name for name, effect in stack.rig.effects.items() if order_of(effect)}
+    return screen.beside_reference({**shapes, **usual}, ripples)
 
 
 def chance_of(

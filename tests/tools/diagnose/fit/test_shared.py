@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 
 from gritd.estimator.effects import make
-from gritd.tools.diagnose.fit.shared import _reduced, rippling_columns, without_ripples
+from gritd.tools.diagnose.fit.shared import (
+    _reduced,
+    rippling_columns,
+    shared_columns,
+    without_ripples,
+)
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
@@ -90,3 +95,15 @@ def test_differences_without_ripples_are_those_of_the_noise() -> None:
     assert np.median(np.abs(np.diff(residual[here]))) > 3.0 * usual
     assert abs(np.median(np.abs(np.diff(calm[here]))) / usual - 1.0) < 0.1
     np.testing.assert_array_equal(calm[~here], residual[~here])
+
+
+def test_every_listed_effect_but_ripples_may_act_in_both_in_one_part() -> None:
+    stack, _ = _columns((), 7, seconds=20.0)
+    u = np.zeros(len(stack.rig.constants))
+    shared = shared_columns(stack, u, stack.predict(u))
+    assert list(shared) == ["changes", "drive", "soil", "instruments"]
+    assert all(columns.shape[1] for columns in shared.values())
+
+    drive, torque = np.abs(shared["drive"]), stack.of("torque")  # friction is in the motor's alone
+    assert drive[~torque].max() < 1e-6 * drive[torque].max()
+    assert np.any(shared["soil"][stack.of("drawbar_pull")])

@@ -31,6 +31,14 @@ def test_news_surprise_twice_as_much_as_anything_in_a_run_of_the_reference(
     assert (screen.p < TUNING.screen.level) == alarms
 
 
+def test_a_ripple_of_the_reference_asks_for_more_of_ripples_alone() -> None:
+    """A rig that ripples is off its model in nothing else."""
+    screen = replace(_screen(19.0, habit=10.0, left=50.0), apart={"slope"})
+    assert screen.alarmed
+    raised = replace(screen, habit={"loss": 10.0, "slope": 10.0})
+    assert not raised.alarmed
+
+
 @pytest.mark.parametrize("left", [0.9, 1.1])
 def test_what_is_new_must_stand_beside_sizes_that_suit_both_campaigns(left: float) -> None:
     screen = _screen(30.0, habit=1.0, left=left * TUNING.screen.beside_reference)

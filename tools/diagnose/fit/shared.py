@@ -9,7 +9,8 @@ with one strength,
 
 linear about the rough fit, reduced to the directions that the recordings can show. The drive, the
 soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
-says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
+says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. What the
+reference shows of an effect has other forms too (bending.py): NEW is driven otherwise. A ripple
 keeps its order and its size, but not its phase: each run has its own. It may be faster than the
 grid: the grid's values are means over an interval, which damp it, and what is left is an alias of
 known size. A run of larger forces or torques may ripple more in proportion, as a gear does.

@@ -91,7 +91,10 @@ def search_models(
         return search
 
     step("fitting the likely effects")
-    search = _settled(extended(search, search.bare, TUNING.search.effects_first, jobs))
+    search = extended(search, search.bare, TUNING.search.effects_first, jobs)
+    if search.problem.stack.referred:  # beside what the reference tells by itself, too
+        search = extended(search, search.base, TUNING.search.effects_later, jobs)
+    search = _settled(search)
     for size in range(1, TUNING.search.most_effects):
         starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
         for model in starts:

@@ -118,7 +118,7 @@ def test_every_listed_effect_but_ripples_may_act_in_both_in_one_part() -> None:
 def _pair(arm: float) -> tuple[BaseFit, dict[str, np.ndarray]]:
     """A reference whose bearing rubs, and a new campaign; fitted together."""
     rubs = (make("load_dependent_friction", {"arm": arm}),) if arm else ()
-    before, after = (record(plan(seed=s, seconds=24.0, wrench=False), rubs) for s in (5, 6))
+    before, after = (record(plan(seed=s, seconds=14.0, wrench=False), rubs) for s in (5, 6))
     rig = WheelRig([*before, *after], settings(), len(before), "same")
     base = fit_base(rig, np.random.default_rng(0))
     return base, shared_columns(base.problem.stack, base.fitted.u, base.fitted.predicted)

@@ -61,7 +61,10 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
                 freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
 
             harmonics = _harmonics(stack, fitted, number)
-            columns = other_forms(stack, effect, added, np.column_stack((functions, harmonics)))
+            every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
+            columns = added[:, None] * every / np.sqrt(every.shape[1])
+            if effect.stage in OF_SOIL:
+                columns = np.column_stack((columns, _following(stack, added)))
             if effect.stage == OF_SHEAR:
                 displaced = _displaced(stack, noise, fitted, added)
                 columns = np.column_stack(
@@ -73,17 +76,6 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
 
     return tuple(freedoms)
-
-
-def other_forms(stack: Stack, effect: type[Effect] | Effect, added: Array, share: Array) -> Array:
-    """What other forms of an effect add (N, m) beside what it adds (N,): shares of it (N, s), of
-    each channel, and what soil wants that follows.
-    """
-    every = np.column_stack((share, _by_channel(stack, added)))
-    columns = added[:, None] * every / np.sqrt(every.shape[1])
-    if effect.stage in OF_SOIL:
-        return np.column_stack((columns, _following(stack, added)))
-    return np.asarray(columns)
 
 
 def _free_zero_sizes() -> Sizes:

@@ -21,7 +21,6 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.shared import (
-    forms_in_both,
     rippling_columns,
     shared_columns,
     shared_freedoms,
@@ -40,13 +39,13 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     shared = shared_columns(stack, rough.fitted.u, rough.fitted.predicted)
     none = np.zeros((stack.size, 0))
     noise = _least_noise(rough, shared, none, rng)
-    first = _of_reference(rough, noise, shared, none, none)
+    first = _of_reference(rough, noise, shared, none)
 
     ripples = rippling_columns(stack, left(first))
     again = first
     if ripples.shape[1]:
         noise = _least_noise(rough, shared, ripples, rng)
-        again = _of_reference(first, noise, shared, ripples, none)
+        again = _of_reference(first, noise, shared, ripples)
 
     nothing = Explainable(none, none)
     predicted = again.fitted.predicted
@@ -54,20 +53,16 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     alone = estimate_of_reference(stack, predicted, left(again), calm, nothing, noise, rng)
     noise = restless(louder(noise, alone), calm)
 
-    usual = _of_reference(again, noise, shared, ripples, none)
-    forms = forms_in_both(usual, shared)
-    if forms.shape[1]:
-        usual = _of_reference(usual, noise, shared, ripples, forms)
-    freedoms = shared_freedoms(noise, shared, ripples, forms)
-    return sized_beside(usual, noise, freedoms, usual.model.sizes)
+    usual = _of_reference(again, noise, shared, ripples)
+    return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)
 
 
 def _of_reference(
-    start: BaseFit, noise: Noise, shared: Mapping[str, Array], ripples: Array, forms: Array
+    start: BaseFit, noise: Noise, shared: Mapping[str, Array], ripples: Array
 ) -> BaseFit:
     """The reference alone, fitted with all its freedoms: the new campaign says nothing."""
     blind = replace(noise, uncertain=np.where(noise.stack.new, np.inf, noise.uncertain))
-    return refit_beside(start, blind, shared_freedoms(blind, shared, ripples, forms))
+    return refit_beside(start, blind, shared_freedoms(blind, shared, ripples))
 
 
 def left(base: BaseFit) -> Array:

@@ -9,8 +9,7 @@ with one strength,
 
 linear about the rough fit, reduced to the directions that the recordings can show. The drive, the
 soil, the instruments, and what changes with time or place have a size each: a gear that rubs much
-says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. What the
-reference shows of an effect has other forms too (bending.py): NEW is driven otherwise. A ripple
+says nothing of the soil, and soil that shears otherwise says nothing of soil that dries. A ripple
 keeps its order and its size, but not its phase: each run has its own. It may be faster than the
 grid: the grid's values are means over an interval, which damp it, and what is left is an alias of
 known size. A run of larger forces or torques may ripple more in proportion, as a gear does.
@@ -26,10 +25,8 @@ from numpy.typing import NDArray
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.base import BaseFit
-from gritd.tools.diagnose.fit.bending import bending_sizes, other_forms
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
-from gritd.tools.diagnose.fit.functions import BEYOND_FORM, shares
+from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -37,7 +34,6 @@ from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 
-FORMS = "other forms in both"
 CHANGES = "changes"  # what varies with time, heat, place or run
 # what all other effects are of, and their stages
 PARTS = {
@@ -50,14 +46,15 @@ PARTS = {
 
 def shared_columns(stack: Stack, u: Array, predicted: Array) -> dict[str, Array]:
     """Signatures (N, m) of all effects but ripples in both campaigns, about a prediction (N,) at
-    constants u (q,), by effect; each of one expected size together.
+    constants u (q,), by what they are effects of; each effect of one expected size together.
     """
-    columns = {}
-    for name in (n for n, effect in stack.rig.effects.items() if order_of(effect) is None):
-        every = [s.columns for s in raw_signatures(stack, u, predicted, [name], everywhere=True)]
-        if every:
-            columns[name] = np.column_stack(every) / np.sqrt(len(every))
-    return columns
+    names = [name for name, effect in stack.rig.effects.items() if order_of(effect) is None]
+    columns: dict[str, list[Array]] = {part: [np.zeros((stack.size, 0))] for part in PARTS}
+    for name in names:
+        every = list(raw_signatures(stack, u, predicted, [name], everywhere=True))
+        own = columns[_part_of(stack.rig.effects[name])]
+        own += [s.columns / np.sqrt(len(every)) for s in every]
+    return {part: np.column_stack(each) for part, each in columns.items()}
 
 
 def _part_of(effect: type[Effect]) -> str:
@@ -102,92 +99,29 @@ def _least_absolute(columns: Array, values: Array) -> Array:
 
 
 def shared_freedoms(
-    noise: Noise, shared: Mapping[str, Array], ripples: Array, forms: Array
+    noise: Noise, shared: Mapping[str, Array], ripples: Array
 ) -> tuple[Freedom, ...]:
-    """Freedoms of the effects (N, m) by what they are of, their other forms (N, h) and the ripples
-    (N, r).
-    """
-    stack, sizes = noise.stack, Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
-    freedoms = []
-    for part, columns in _by_part(stack, shared).items():
-        freedoms.append(_reduced_freedom(f"{part} in both", columns, noise, sizes))
-    freedoms.append(_reduced_freedom(FORMS, forms, noise, bending_sizes()))
+    """Freedoms of the effects (N, m) by what they are of, and the ripples (N, r)."""
+    sizes = Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
+    freedoms = [
+        Freedom(f"{part} in both", *_reduced(columns, whiten(noise, columns)), sizes)
+        for part, columns in shared.items()
+    ]
     if ripples.shape[1]:
         once = Sizes((1.0,), (1.0,))
         freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), once))
     return tuple(f for f in freedoms if f.columns.shape[1])
 
 
-def forms_in_both(base: BaseFit, shared: Mapping[str, Array]) -> Array:
-    """Other forms (N, h) of the effects (N, m) that a fit shows in both campaigns: where NEW is
-    driven otherwise, what the rig does anyway need not follow our formula.
-    """
-    stack, noise = base.problem.stack, base.problem.noise
-    functions, columns = shares(stack, np.ones(stack.size, bool)), [np.zeros((stack.size, 0))]
-    for name, added in _added(base, shared).items():
-        if np.sum(whiten(noise, added[:, None])[:, 0] ** 2) > TUNING.fit.shared_shows:
-            effect = stack.rig.effects[name]
-            columns.append(other_forms(stack, effect, added, functions))
-    return np.column_stack(columns)
-
-
-def _added(base: BaseFit, shared: Mapping[str, Array]) -> dict[str, Array]:
-    """What each effect adds (N,) in both campaigns, at the weights of a fit."""
-    stack, noise = base.problem.stack, base.problem.noise
-    weights = weights_of(base)
-    added = {}
-    for part, columns in _by_part(stack, shared).items():
-        if f"{part} in both" not in weights:
-            continue
-        own = _large(whiten(noise, columns)) @ weights[f"{part} in both"]
-        names = [n for n in shared if _part_of(stack.rig.effects[n]) == part]
-        ends = np.cumsum([shared[n].shape[1] for n in names])
-        for name, values in zip(names, np.split(own, ends[:-1]), strict=True):
-            added[name] = shared[name] @ values
-    return added
-
-
-def weights_of(base: BaseFit) -> dict[str, Array]:
-    """Of every freedom of a form that acts, its weights times its size (m,)."""
-    fitted, chosen = base.fitted, base.model.sizes
-    sizes = [f.sizes.values[number] for f, number in zip(base.forms, chosen, strict=True)]
-    acting = [(f, size) for f, size in zip(base.forms, sizes, strict=True) if size > 0.0]
-    first = fitted.slack.size - sum(f.columns.shape[1] for f, _ in acting)
-
-    weights = {}
-    for f, size in acting:
-        end = first + f.columns.shape[1]
-        weights[f.name], first = size * fitted.slack[first:end], end
-    return weights
-
-
-def _by_part(stack: Stack, shared: Mapping[str, Array]) -> dict[str, Array]:
-    """Columns (N, m) of all effects of a part."""
-    none, effects = np.zeros((stack.size, 0)), stack.rig.effects
-    return {
-        part: np.column_stack(
-            [none, *(c for name, c in shared.items() if _part_of(effects[name]) == part)]
-        )
-        for part in PARTS
-    }
-
-
-def _reduced_freedom(name: str, columns: Array, noise: Noise, sizes: Sizes) -> Freedom:
+def _reduced(columns: Array, whitened: Array) -> tuple[Array, Array]:
     """Combinations of columns with the same covariance, the largest first; without those that
     are less than the noise altogether.
     """
-    whitened = whiten(noise, columns)
-    large = _large(whitened)
-    return Freedom(name, columns @ large, whitened @ large, sizes)
-
-
-def _large(whitened: Array) -> Array:
-    """Directions (m, k) in which columns (N, m) are more than the noise."""
-    if not whitened.shape[1]:
-        return np.zeros((0, 0))
+    if not columns.shape[1]:
+        return columns, whitened
     values, vectors = np.linalg.eigh(whitened.T @ whitened)
     large = np.flatnonzero(values > TUNING.fit.shared_least)[::-1][: TUNING.fit.shared_most]
-    return np.asarray(vectors[:, large])
+    return columns @ vectors[:, large], whitened @ vectors[:, large]
 
 
 @dataclass(frozen=True, eq=False)

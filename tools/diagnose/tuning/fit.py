@@ -152,9 +152,6 @@ class Fit:
     shared_least: float = tuned(
         0.3, "squares of the noise", "a direction that shows less is left out", "run time"
     )
-    shared_shows: float = tuned(
-        20.0, "squares of the noise", "an effect that shows more in both campaigns has other forms"
-    )
     shared_most: int = tuned(150, "directions", "of all effects, at most", "run time")
     standing_ripple: float = tuned(
         15.0, "nats", "a ripple of the reference gains: some hundred orders are tried"

@@ -9,17 +9,12 @@ from typing import Any
 import numpy as np
 
 from gritd.estimator.effects import make
-from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.shared import (
-    FORMS,
-    _by_part,
-    _large,
-    forms_in_both,
+    _reduced,
     rippling_columns,
     shared_columns,
     without_ripples,
 )
-from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
@@ -29,9 +24,10 @@ from tests.tools.diagnose.campaigns import plan, settings
 def test_the_reduced_columns_have_the_same_covariance() -> None:
     rng = np.random.default_rng(0)
     columns = rng.standard_normal((200, 6)) @ rng.standard_normal((6, 40))
-    whitened = columns @ _large(columns)
-    assert whitened.shape == (200, 6)
+    raw, whitened = _reduced(3.0 * columns, columns)
+    assert raw.shape == whitened.shape == (200, 6)
     np.testing.assert_allclose(whitened @ whitened.T, columns @ columns.T, atol=1e-8)
+    np.testing.assert_allclose(raw, 3.0 * whitened, atol=1e-8)
 
 
 def _columns(acting: tuple[Any, ...], seed: int, seconds: float = 60.0) -> tuple[Stack, Any]:
@@ -105,34 +101,9 @@ def test_every_listed_effect_but_ripples_may_act_in_both_in_one_part() -> None:
     stack, _ = _columns((), 7, seconds=20.0)
     u = np.zeros(len(stack.rig.constants))
     shared = shared_columns(stack, u, stack.predict(u))
-    assert not {"gear_ripple", "grousers"} & set(shared)
-    parts = _by_part(stack, shared)
-    assert list(parts) == ["changes", "drive", "soil", "instruments"]
-    assert sum(c.shape[1] for c in parts.values()) == sum(c.shape[1] for c in shared.values())
+    assert list(shared) == ["changes", "drive", "soil", "instruments"]
+    assert all(columns.shape[1] for columns in shared.values())
 
-    drive, torque = np.abs(parts["drive"]), stack.of("torque")  # friction is in the motor's alone
+    drive, torque = np.abs(shared["drive"]), stack.of("torque")  # friction is in the motor's alone
     assert drive[~torque].max() < 1e-6 * drive[torque].max()
-    assert np.any(parts["soil"][stack.of("drawbar_pull")])
-
-
-def _pair(arm: float) -> tuple[BaseFit, dict[str, np.ndarray]]:
-    """A reference whose bearing rubs, and a new campaign; fitted together."""
-    rubs = (make("load_dependent_friction", {"arm": arm}),) if arm else ()
-    before, after = (record(plan(seed=s, seconds=14.0, wrench=False), rubs) for s in (5, 6))
-    rig = WheelRig([*before, *after], settings(), len(before), "same")
-    base = fit_base(rig, np.random.default_rng(0))
-    return base, shared_columns(base.problem.stack, base.fitted.u, base.fitted.predicted)
-
-
-def test_what_the_reference_shows_has_other_forms_where_new_is_driven() -> None:
-    base, shared = _pair(0.004)
-    forms = forms_in_both(base, shared)
-    stack = base.problem.stack
-    assert np.any(forms[stack.of("torque") & stack.new])
-    assert any(f.name == FORMS for f in base.forms)
-
-
-def test_a_rig_without_habits_has_no_other_forms_of_them() -> None:
-    base, shared = _pair(0.0)
-    assert forms_in_both(base, shared).shape[1] == 0
-    assert not any(f.name == FORMS for f in base.forms)
+    assert np.any(shared["soil"][stack.of("drawbar_pull")])

@@ -33,7 +33,7 @@ def _told(rig: Rig, line: Line) -> Ripple:
         line.p,
         line.frequency,
         line.harmonic or None,
-        rig.lines.before(line) > TUNING.orders.known * line.size,
+        rig.lines.shared(line),
     )
 
 

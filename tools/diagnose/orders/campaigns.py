@@ -56,6 +56,11 @@ class Lines:
         """
         return max((x.size for x in self.reference if same(line, x)), default=line.before)
 
+    def shared(self, line: Line) -> bool:
+        """Whether the reference has a line too: found there, or held at half its size."""
+        found = any(same(line, other) for other in self.reference)
+        return found or line.before > TUNING.orders.known * line.size
+
     def orders(self, low: float, high: float) -> list[float]:
         """Ripples a turn of the fresh lines between two bounds, each once, the best supported
         first; those far behind it are left out.

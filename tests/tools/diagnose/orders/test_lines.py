@@ -59,6 +59,7 @@ def test_what_a_reference_ripples_alike_is_not_new() -> None:
     louder = lines_of(campaign(_runs(6, ripple=(0.6, 0.0, 41.0))), before)
     assert louder.orders(2.0, 200.0) == [pytest.approx(41.0, abs=0.1)]
     assert louder.orders(2.0, 30.0) == []
+    assert louder.shared(louder.new[0]) and not other.shared(other.new[0])
 
 
 def test_what_a_short_reference_ripples_unnoticed_is_not_new() -> None:
@@ -69,7 +70,8 @@ def test_what_a_short_reference_ripples_unnoticed_is_not_new() -> None:
         short = campaign([readings(rng, ripple=(ripple, 0.0, 41.0), seconds=4.0)])
         return lines_of(campaign(_runs(6, ripple=(0.2, 0.0, 41.0))), short)
 
-    assert after(0.2).reference == () and after(0.2).fresh() == []
+    held = after(0.2)
+    assert held.reference == () and held.fresh() == [] and held.shared(held.new[0])
     assert [round(line.at) for line in after(0.0).fresh()] == [41]
 
 

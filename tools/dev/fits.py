@@ -115,15 +115,15 @@ def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
     weights = ground.penalty[: centre.size]
     if not np.isfinite(nats):
         return np.full(tried.residual.size + tried.slack.size + centre.size, FAR)
-    left = tried.residual - problem.tolerance @ tried.slack
+    left = tried.residual - problem.allowance.times(tried.slack)
     return np.concatenate((left, tried.slack, weights * centre))
 
 
 def _slopes(ground: Ground, problem: Problem, centre: Array) -> Array:
     """Their derivatives; what is allowed follows every move, so it is eliminated exactly."""
     own = ground.linearised(ground.tried(centre)[0]).own
-    follows = cho_solve((problem.root, True), problem.tolerance.T @ own, check_finite=False)
-    left = own - problem.tolerance @ follows
+    follows = cho_solve((problem.root, True), problem.allowance.pulled(own), check_finite=False)
+    left = own - problem.allowance.times(follows)
     return np.vstack((-left, -follows, np.diag(ground.penalty[: centre.size])))
 
 

@@ -69,7 +69,7 @@ def _diagnose(
 
     screening = prepare_screening(base, rng)
     search = search_models(screening, step, jobs)
-    decision = decide(search)
+    decision = decide(search, jobs)
 
     step("holding out runs and conditions")
     return explain(search, decision, redo)

@@ -66,7 +66,7 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
     the misfit, and what is left shows where they cannot follow, not where the misfit was made. With
     a reference campaign, what both campaigns do is none of it.
     """
-    fit = accepted.fitted
+    fit, allowance = accepted.fitted, screening.problem.allowance
     alone = screening.problem.descend((), (), fit.u, np.zeros(0), rounds=0)
     own, whitened = accepted.discrepancy()
     if screening.problem.stack.referred:
@@ -76,9 +76,9 @@ def unmoved(screening: Screening, accepted: Model) -> Model:
         alone,
         u=np.zeros_like(fit.u),
         own=np.zeros_like(alone.own),
+        pulled=np.zeros_like(alone.pulled),
         allowance=alone.allowance.without_size(),
-        residual=alone.residual
-        - screening.problem.tolerance @ fit.slack[: screening.problem.tolerance.shape[1]],
+        residual=alone.residual - allowance.times(fit.slack[: allowance.count]),
     )
     return Model(held)
 

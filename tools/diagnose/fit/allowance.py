@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.freedom import Freedom, products
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,35 +16,53 @@ class Allowance:
     """What a fit may be off by beside constants and effects: columns of unit normal weights.
 
     They are many, and most are shared between fits: so they are put together when asked for.
-    parts: columns (N, m) in the channels' units, the same whitened, and their size; fixed: how many
-    parts every fit has. Those after them are freedoms, which are predicted elsewhere too.
+    parts: freedoms and the size of each. The first one every fit has; those after it are predicted
+    elsewhere too.
     """
 
-    parts: tuple[tuple[Array, Array, float], ...]
-    fixed: int
+    parts: tuple[tuple[Freedom, float], ...]
 
-    def with_parts(self, more: Sequence[tuple[Array, Array, float]]) -> Allowance:
-        """With more columns (N, m), the same whitened, and their size."""
+    def with_parts(self, more: Sequence[tuple[Freedom, float]]) -> Allowance:
+        """With more freedoms, each of its size."""
         return replace(self, parts=(*self.parts, *more))
 
     def without_size(self) -> Allowance:
         """The same columns, all nought."""
-        return replace(self, parts=tuple((c, w, 0.0) for c, w, _ in self.parts))
+        return replace(self, parts=tuple((f, 0.0) for f, _ in self.parts))
+
+    @property
+    def count(self) -> int:
+        """Columns."""
+        return sum(f.columns.shape[1] for f, _ in self.parts)
 
     @property
     def columns(self) -> Array:
         """(N, t) in the channels' units."""
-        return np.column_stack([size * columns for columns, _, size in self.parts])
+        return np.column_stack([size * f.columns for f, size in self.parts])
 
     @property
     def whitened(self) -> Array:
         """(N, t)."""
-        return np.column_stack([size * whitened for _, whitened, size in self.parts])
+        return np.column_stack([size * f.whitened for f, size in self.parts])
 
     @property
     def carried(self) -> Array:
         """(N, m) in the channels' units: those that are predicted elsewhere too."""
-        none = self.parts[0][0][:, :0]
-        return np.column_stack(
-            [none, *(size * columns for columns, _, size in self.parts[self.fixed :])]
-        )
+        none = self.parts[0][0].columns[:, :0]
+        return np.column_stack([none, *(size * f.columns for f, size in self.parts[1:])])
+
+    @property
+    def gram(self) -> Array:
+        """Products (t, t) of the whitened columns."""
+        size = np.concatenate([np.full(f.columns.shape[1], size) for f, size in self.parts])
+        return np.asarray(products([f for f, _ in self.parts]) * size[:, None] * size)
+
+    def pulled(self, values: Array) -> Array:
+        """Products (t, …) of the whitened columns with whitened values (N, …)."""
+        return np.concatenate([size * (f.whitened.T @ values) for f, size in self.parts])
+
+    def times(self, weights: Array) -> Array:
+        """What weights (t, …) of the columns amount to (N, …), whitened."""
+        ends = np.cumsum([f.columns.shape[1] for f, _ in self.parts])[:-1]
+        each = zip(self.parts, np.split(weights, ends), strict=True)
+        return np.asarray(sum(size * (f.whitened @ own) for (f, size), own in each))

@@ -7,7 +7,9 @@ has every effect, whose published forms differ (bending.py).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -26,6 +28,9 @@ class Sizes:
     def log_prior(self) -> Array:
         """Of each size (n,)."""
         return np.log(np.array(self.prior) / sum(self.prior))
+
+
+ONCE = Sizes((1.0,), (1.0,))  # of what has no other size
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +59,26 @@ def freedom(
 ) -> Freedom:
     """The freedom of columns (N, m) in the channels' units."""
     return Freedom(name, columns, whiten(noise, columns), sizes, least, of_form)
+
+
+def products(parts: Sequence[Freedom]) -> Array:
+    """WᵀW (m, m) of the whitened columns of freedoms side by side; of any two formed once, since
+    hundreds of fits share them.
+    """
+    if not parts:
+        return np.zeros((0, 0))
+    rows = [
+        [_between(a, b) if i <= j else _between(b, a).T for j, b in enumerate(parts)]
+        for i, a in enumerate(parts)
+    ]
+    return np.block(rows)
+
+
+_formed: WeakKeyDictionary[Freedom, WeakKeyDictionary[Freedom, Array]] = WeakKeyDictionary()
+
+
+def _between(a: Freedom, b: Freedom) -> Array:
+    known = _formed.setdefault(a, WeakKeyDictionary())
+    if b not in known:
+        known[b] = a.whitened.T @ b.whitened
+    return known[b]

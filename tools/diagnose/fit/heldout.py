@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Fitted
@@ -80,31 +81,29 @@ def held_out(fitted: Fitted, folds: Sequence[Bools]) -> HeldOut:
     )  # r is the residual without tolerance
 
     penalty = fitted.penalty**2
-    gram, score = j.T @ j + np.diag(penalty), j.T @ r - penalty * centre
-    spread = float(np.linalg.slogdet(gram)[1])
+    gram, score = fitted.gram + np.diag(penalty), j.T @ r - penalty * centre
+    joint = cholesky(gram, lower=True, check_finite=False)
     density, predicted = [], fitted.predicted.copy()
 
     for fold in folds:
         inside = j[fold]
-        less, pulled = gram - inside.T @ inside, score - inside.T @ r[fold]
-        step = np.linalg.solve(less, pulled)
+        less = cholesky(gram - inside.T @ inside, lower=True, overwrite_a=True, check_finite=False)
+        step = cho_solve((less, True), score - inside.T @ r[fold], check_finite=False)
         predicted[fold] = (
             fitted.predicted[fold] + fitted.raw[fold] @ step[:size] + own[fold] @ step[last:]
         )
-        beyond = spread - float(np.linalg.slogdet(less)[1])
-        density.append(_log_density(r[fold] - inside @ step, inside, gram, beyond))
+        density.append(_log_density(r[fold] - inside @ step, inside, joint, less))
     return HeldOut(np.array(density), predicted)
 
 
-def _log_density(error: Array, jacobian: Array, joint: Array, beyond: float) -> float:
-    """ln N(error; 0, I + J A⁻¹ Jᵀ) without the constant, by the matrix inversion lemma, for
-    products A (q, q) of the other values.
+def _log_density(error: Array, jacobian: Array, joint: Array, others: Array) -> float:
+    """ln N(error; 0, I + J A⁻¹ Jᵀ) without the constant, by the matrix inversion lemma.
 
-    joint: A + JᵀJ; beyond: by what its log determinant exceeds that of A.
+    joint, others: Cholesky roots (q, q) of A + JᵀJ, and of the products A of the other values.
     """
-    pulled = jacobian.T @ error
-    square = error @ error - pulled @ np.linalg.solve(joint, pulled)
-    return float(-0.5 * (square + beyond))
+    pulled = solve_triangular(joint, jacobian.T @ error, lower=True, check_finite=False)
+    spread = np.log(np.diag(joint)).sum() - np.log(np.diag(others)).sum()
+    return float(-0.5 * (error @ error - pulled @ pulled) - spread)
 
 
 def rmse(stack: Stack, predicted: Array) -> dict[str, float]:

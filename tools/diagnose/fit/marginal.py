@@ -22,7 +22,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_bayes, log_sum
-from gritd.tools.diagnose.fit.freedom import Freedom
+from gritd.tools.diagnose.fit.freedom import Freedom, products
 from gritd.tools.diagnose.fit.problem import Fitted, Free
 from gritd.tools.diagnose.rig.interface import Bools, Index
 from gritd.tools.diagnose.tuning import TUNING
@@ -51,13 +51,14 @@ class _Eliminated:
 class Marginal:
     """A fit without its freedoms, and the freedoms that it may have."""
 
-    def __init__(self, fitted: Fitted, tolerance: Array, freedoms: Sequence[Freedom]) -> None:
-        """tolerance: (N, t) whitened columns of unit prior that every fit has."""
+    def __init__(
+        self, fitted: Fitted, fixed: Sequence[Freedom], freedoms: Sequence[Freedom]
+    ) -> None:
+        """fixed: what every fit has."""
         self.freedoms, known = tuple(freedoms), len(fitted.u) + len(fitted.x)
-        columns = [fitted.own, tolerance, *(f.whitened for f in freedoms)]
-        every = np.column_stack([*columns, fitted.residual])
-        self._products = every.T @ every
-        self._ends = np.cumsum([c.shape[1] for c in columns])
+        self._products = _products(fitted, (*fixed, *freedoms))
+        allowed = sum(f.columns.shape[1] for f in fixed)
+        self._ends = known + np.cumsum([0, allowed, *(f.columns.shape[1] for f in freedoms)])
 
         size = int(self._ends[-1])
         self._centre, self._weight = np.zeros(size), np.ones(size)
@@ -74,6 +75,7 @@ class Marginal:
             for i, f in enumerate(fitted.free)
             if self._strong[first + i] and not fitted.held[first + i]
         ]
+        self._usual, self._usual_spread, self._varied = self._without_usual()
         self._known: dict[Chosen, float] = {}
         self._filled: list[set[Chosen]] = [set() for _ in self.freedoms]
 
@@ -200,7 +202,7 @@ class Marginal:
         scale, acting = self._scaled(chosen)
         scale[begin:end] = 1.0
         acting[begin:end] = False
-        rest = self._eliminated(scale, acting & ~self._held, np.arange(begin, end))
+        rest = self._eliminated(scale, acting, np.arange(begin, end))
 
         values, vectors = np.linalg.eigh(rest.gram)
         values = np.maximum(values, 0.0)
@@ -224,7 +226,8 @@ class Marginal:
 
     def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
         """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
-        products = self._products * scale[:, None] * scale
+        products = self._usual * scale[:, None] * scale
+        acting = acting & self._varied
         weak = np.flatnonzero(acting & ~self._strong)
         strong = np.flatnonzero(acting & self._strong)
         prior, centre = self._weight[weak] ** 2, self._centre[weak]
@@ -251,13 +254,33 @@ class Marginal:
             strong_pull=right[count:],
             centre=self._centre[strong],
             misfit=float(products[-1, -1] + strain - last @ last),
-            spread=2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
+            spread=self._usual_spread
+            + 2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
         )
+
+    def _without_usual(self) -> tuple[Array, float, Bools]:
+        """Products with what acts in the same size for all sizes eliminated, its spread, and what
+        is left to vary.
+        """
+        once = [True, *(len(f.sizes.values) == 1 for f in self.freedoms)]
+        begins = zip(self._ends[:-1], self._ends[1:], once, strict=True)
+        usual = np.concatenate([np.arange(a, b) for a, b, same in begins if same])
+        varied = ~self._held
+        varied[usual] = False
+
+        scale, _ = self._scaled(tuple(0 for _ in self.freedoms))
+        own = self._products[np.ix_(usual, usual)] * scale[usual, None] * scale[usual]
+        own[np.diag_indices_from(own)] += 1.0
+        root = cholesky(own, lower=True, overwrite_a=True, check_finite=False)
+        beside = scale[usual, None] * self._products[usual]
+        inside = solve_triangular(root, beside, lower=True, check_finite=False)
+        spread = 2.0 * float(np.log(np.diag(root)).sum())
+        return self._products - inside.T @ inside, spread, varied
 
     def _log_evidence(self, chosen: Chosen) -> float:
         scale, acting = self._scaled(chosen)
         none = np.zeros(0, dtype=np.intp)
-        rest = self._eliminated(scale, acting & ~self._held, none)
+        rest = self._eliminated(scale, acting, none)
         return self._told(
             chosen, rest.misfit, rest.spread, rest.strong, rest.strong_pull, rest.centre
         )
@@ -275,6 +298,20 @@ class Marginal:
     def _strain_of_held(self) -> float:
         held = self._held & ~self._strong
         return float(np.sum((self._weight[held] * self._centre[held]) ** 2))
+
+
+def _products(fitted: Fitted, freedoms: Sequence[Freedom]) -> Array:
+    """Of the derivatives, the columns of all freedoms, and the residual with one another."""
+    own = np.column_stack((fitted.own, fitted.residual))
+    beside = np.concatenate([f.whitened.T @ own for f in freedoms])
+    square = own.T @ own
+    return np.block(
+        [
+            [square[:-1, :-1], beside[:, :-1].T, square[:-1, -1:]],
+            [beside[:, :-1], products(freedoms), beside[:, -1:]],
+            [square[-1:, :-1], beside[:, -1:].T, square[-1:, -1:]],
+        ]
+    )
 
 
 def strength_evidence(strengths: Sequence[Free], a: Array, b: Array, at: Array) -> float:

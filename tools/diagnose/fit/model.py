@@ -61,16 +61,16 @@ class Model:
         allowance, slack = self.fitted.allowance, self.fitted.slack
         freedoms = self.marginal.freedoms if self.marginal else ()
         sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
-        first = sum(columns.shape[1] for columns, _, _ in allowance.parts[: allowance.fixed])
+        first = allowance.parts[0][0].columns.shape[1]
         acting = sum(size > 0.0 for size in sizes)
 
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
-        for columns, white, size in allowance.parts[allowance.fixed :][:acting]:
-            weights = slack[first : first + columns.shape[1]]
-            own = own + size * (columns @ weights)
-            whitened = whitened + size * (white @ weights)
-            first += columns.shape[1]
+        for freedom, size in allowance.parts[1:][:acting]:
+            weights = slack[first : first + freedom.columns.shape[1]]
+            own = own + size * (freedom.columns @ weights)
+            whitened = whitened + size * (freedom.whitened @ weights)
+            first += freedom.columns.shape[1]
 
         return own, whitened
 
@@ -108,7 +108,7 @@ def fit_model(
     for left in reversed(range(TUNING.fit.size_rounds)):
         known, every = every, (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
-        marginal = Marginal(fitted, problem.tolerance, every)
+        marginal = Marginal(fitted, problem.fixed, every)
 
         sizes, evidence = marginal.likeliest(of_fit)
         if sizes == of_fit or not left:
@@ -140,14 +140,14 @@ def sized_model(
     parameters (0,).
     """
     fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend((), (), *start)
-    marginal = Marginal(fitted, problem.tolerance, forms)
+    marginal = Marginal(fitted, problem.fixed, forms)
     return Model(fitted, (), marginal.log_evidence(sizes), sizes, (), marginal, sizes)
 
 
 def plain_model(problem: Problem, fitted: Fitted) -> Model:
     """A fit without freedoms, with its evidence."""
     names = tuple(effect.name for effect in fitted.acting)
-    return Model(fitted, names, Marginal(fitted, problem.tolerance, ()).likeliest(())[1])
+    return Model(fitted, names, Marginal(fitted, problem.fixed, ()).likeliest(())[1])
 
 
 def _values(freedoms: Sequence[Freedom], chosen: Chosen) -> list[float]:

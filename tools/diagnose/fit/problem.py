@@ -16,7 +16,7 @@ from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
 from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.freedom import Freedom
+from gritd.tools.diagnose.fit.freedom import ONCE, Freedom, freedom
 from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
@@ -61,6 +61,7 @@ class Fitted:
     slack: Array  # (t,) fitted weights of what is allowed
     objective: float  # whitened squares and prior strain at the optimum
     allowance: Allowance
+    pulled: Array  # (t, q + p) products of what is allowed with `own`
     gradient: Array  # (q + p,) of `nats`, what is allowed fitted to each
     curvature: Array  # (q + p, q + p) likewise
     held: Bools  # (q + p,) stands at its bound and wants out
@@ -84,10 +85,15 @@ class Fitted:
         """(N, q + p + t) whitened."""
         return np.column_stack((self.own, self.allowance.whitened))
 
+    @property
+    def gram(self) -> Array:
+        """Products (q + p + t, q + p + t) of `jacobian`."""
+        own = self.own.T @ self.own
+        return np.block([[own, self.pulled.T], [self.pulled, self.allowance.gram]])
+
     def covariance(self) -> Array:
         """Of constants, effect parameters and what is allowed (n, n)."""
-        jacobian = self.jacobian
-        return np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(self.penalty**2)))
+        return np.asarray(np.linalg.inv(self.gram + np.diag(self.penalty**2)))
 
     @cached_property
     def sigma(self) -> Array:
@@ -96,9 +102,10 @@ class Fitted:
 
     def allowed(self, allowance: Allowance) -> Fitted:
         """The same point and slopes with another allowance, not fitted to it: for a projection."""
-        slack = np.zeros(sum(columns.shape[1] for columns, _, _ in allowance.parts))
+        slack = np.zeros(allowance.count)
         penalty = np.concatenate((self.penalty[: self.centre.size], np.ones_like(slack)))
-        return replace(self, allowance=allowance, slack=slack, penalty=penalty)
+        pulled = allowance.pulled(self.own)
+        return replace(self, allowance=allowance, slack=slack, penalty=penalty, pulled=pulled)
 
     def projection(self, surrogates: Surrogates | None = None) -> Projection:
         """The neighbourhood of this fit, for signatures of further effects."""
@@ -137,19 +144,15 @@ class Problem:
         off by.
         """
         self.stack, self.noise = stack, noise
-        whitened = whiten(noise, tolerance) if tolerance.size else np.zeros((stack.size, 0))
-        self.allowance = Allowance(((tolerance, whitened, 1.0),), 1)
+        allowed = freedom("tolerance", tolerance, noise, ONCE)
+        self.fixed: tuple[Freedom, ...] = (allowed,)  # what every fit has
+        self.allowance = Allowance(((allowed, 1.0),))
         self.measured = whiten(noise, stack.measured)
 
     @cached_property
-    def tolerance(self) -> Array:
-        """All that is allowed (N, t), whitened."""
-        return self.allowance.whitened
-
-    @cached_property
     def root(self) -> Array:
-        """Cholesky root (t, t) of the tolerance's products and its unit prior."""
-        gram = self.tolerance.T @ self.tolerance
+        """Cholesky root (t, t) of the products of what is allowed and its unit prior."""
+        gram = self.allowance.gram
         gram[np.diag_indices_from(gram)] += 1.0
         return np.asarray(cholesky(gram, lower=True, overwrite_a=True, check_finite=False))
 
@@ -157,22 +160,20 @@ class Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
         """
-        return self._with([(columns, whiten(self.noise, columns), 1.0)])
+        more = freedom("nameless", columns, self.noise, ONCE)
+        other = self._with([(more, 1.0)])
+        other.fixed = (*self.fixed, more)
+        return other
 
     def with_freedoms(self, freedoms: Sequence[Freedom], sizes: Sequence[float]) -> Problem:
         """The same with freedoms of given sizes."""
-        sized = [
-            (f.columns, f.whitened, size)
-            for f, size in zip(freedoms, sizes, strict=True)
-            if size > 0.0
-        ]
+        sized = [(f, size) for f, size in zip(freedoms, sizes, strict=True) if size > 0.0]
         return self._with(sized) if sized else self
 
-    def _with(self, parts: Sequence[tuple[Array, Array, float]]) -> Problem:
+    def _with(self, parts: Sequence[tuple[Freedom, float]]) -> Problem:
         other = copy(self)
         other.allowance = self.allowance.with_parts(parts)
-        for stale in ("tolerance", "root"):
-            other.__dict__.pop(stale, None)
+        other.__dict__.pop("root", None)
         return other
 
     def ground(self, effects: Sequence[Maker], free: Sequence[Free]) -> Ground:
@@ -233,7 +234,7 @@ class Ground:
         constants = problem.stack.rig.constants
         self._count = len(constants)
         weights = (np.ones(self._count), [f.weight for f in free])
-        self.penalty = np.concatenate((*weights, np.ones(problem.tolerance.shape[1])))
+        self.penalty = np.concatenate((*weights, np.ones(problem.allowance.count)))
 
         ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
@@ -246,15 +247,14 @@ class Ground:
         problem = self._problem
         predicted = self._predicted(centre)
         if not np.isfinite(predicted).all():
-            nothing = np.zeros(problem.tolerance.shape[1])
+            nothing = np.zeros(problem.allowance.count)
             return Tried(centre, predicted, predicted, nothing, np.inf), np.inf
         residual = problem.measured - whiten(problem.noise, predicted)
 
-        tolerance = problem.tolerance
-        slack = cho_solve((problem.root, True), tolerance.T @ residual, check_finite=False)
-        left = residual - tolerance @ slack
+        pulled = problem.allowance.pulled(residual)
+        slack = cho_solve((problem.root, True), pulled, check_finite=False)
         strain = np.sum((self.penalty[: centre.size] * centre) ** 2)
-        objective = float(left @ left + slack @ slack + strain)
+        objective = float(residual @ residual - pulled @ slack + strain)
         return Tried(centre, predicted, residual, slack, objective), 0.5 * objective
 
     def begun(self, u: Array, x: Array) -> Tried:
@@ -288,22 +288,31 @@ class Ground:
         return self.bounds.clipped(np.concatenate((u, x)))
 
     def linearised(self, tried: Tried) -> Fitted:
+        problem = self._problem
         raw = self._derivatives(tried.centre, tried.predicted)
-        return self._fitted(tried, raw, whiten(self._problem.noise, raw))
+        own = whiten(problem.noise, raw)
+        pulled = problem.allowance.pulled(own)
+        return self._fitted(tried, raw, own, pulled, self._curvature(own, pulled))
 
     def moved(self, here: Fitted, tried: Tried) -> Fitted:
         """There, with the derivatives of a fit that stands next to it."""
-        return self._fitted(tried, here.raw, here.own)
+        if here.allowance is self._problem.allowance:
+            return self._fitted(tried, here.raw, here.own, here.pulled, here.curvature)
+        pulled = self._problem.allowance.pulled(here.own)
+        return self._fitted(tried, here.raw, here.own, pulled, self._curvature(here.own, pulled))
 
-    def _fitted(self, tried: Tried, raw: Array, own: Array) -> Fitted:
+    def _curvature(self, own: Array, pulled: Array) -> Array:
+        """(n, n) of derivatives (N, n), what is allowed fitted to each: (t, n) are its products."""
+        inside = solve_triangular(self._problem.root, pulled, lower=True, check_finite=False)
+        precision = self.penalty[: own.shape[1]] ** 2
+        return np.asarray(own.T @ own - inside.T @ inside + np.diag(precision))
+
+    def _fitted(
+        self, tried: Tried, raw: Array, own: Array, pulled: Array, curvature: Array
+    ) -> Fitted:
         problem, centre = self._problem, tried.centre
-        left = tried.residual - problem.tolerance @ tried.slack
-        precision = self.penalty[: centre.size] ** 2
-        gradient = np.asarray(precision * centre - own.T @ left)
-
-        shared = problem.tolerance.T @ own
-        inside = solve_triangular(problem.root, shared, lower=True, check_finite=False)
-        curvature = np.asarray(own.T @ own - inside.T @ inside + np.diag(precision))
+        strain = self.penalty[: centre.size] ** 2 * centre
+        gradient = np.asarray(strain - own.T @ tried.residual + pulled.T @ tried.slack)
         return Fitted(
             self._effects,
             self._free,
@@ -317,6 +326,7 @@ class Ground:
             tried.slack,
             tried.objective,
             problem.allowance,
+            pulled,
             gradient,
             curvature,
             self.bounds.held(centre, gradient),

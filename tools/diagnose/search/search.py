@@ -158,17 +158,14 @@ def extended(search: Search, model: Model, most: int, jobs: int) -> Search:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return _with_effect(search, model, promise)
 
-    made = each(jobs, fitted, fresh[:most], _shared(search))
+    made = each(jobs, fitted, fresh[:most], shared(search))
     return replace(search, models=(*search.models, *made))
 
 
-def _shared(search: Search) -> list[object]:
-    """Arrays that all fits of a search hold."""
-    allowed = [array for part in search.problem.allowance.parts for array in part[:2]]
-    return [
-        *allowed,
-        *(a for form in search.screening.forms for a in (form.columns, form.whitened)),
-    ]
+def shared(search: Search) -> list[object]:
+    """What fits of a search hold: its freedoms and its models."""
+    allowed = (freedom for freedom, _ in search.problem.allowance.parts)
+    return [*allowed, *search.screening.forms, *search.models]
 
 
 def promises(search: Search, model: Model) -> list[Promise]:

@@ -18,15 +18,16 @@ it is not: where soil acts, calibrations strain because the form of its model is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.heldout import held_out
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Bools, Stack
-from gritd.tools.diagnose.search.search import Search, without
+from gritd.tools.diagnose.search.search import Search, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
@@ -34,8 +35,9 @@ from gritd.tools.diagnose.tuning.guards import SPAN
 class Breadth:
     """The test, for the models of one search."""
 
-    def __init__(self, search: Search) -> None:
-        self._search = search
+    def __init__(self, search: Search, jobs: int = 1) -> None:
+        """jobs: processes."""
+        self._search, self._jobs = search, jobs
         self._stretches = stretches(search.problem.stack)
         self._density: dict[Model, Array] = {}
         self._less: dict[tuple[Model, str], Model] = {}
@@ -45,6 +47,8 @@ class Breadth:
         for a model with an effect that is not broad.
         """
         counted = {model: self._search.news(model) for model in self._search.models}
+        if self._jobs > 1:
+            self._prepare([m for m in self._search.models[1:] if self._matters(m, counted)])
         for model in sorted(self._search.models[1:], key=lambda m: -self._search.weight(m)):
             tested = self._matters(model, counted)
             if tested and not all(self.broad(model, name) for name in model.names):
@@ -82,8 +86,18 @@ class Breadth:
     def without(self, model: Model, name: str) -> Model:
         """The model less one of its effects."""
         if (model, name) not in self._less:
-            self._less[model, name] = without(self._search, model, name)
+            self._less[model, name] = self._fitted_without((model, name))
         return self._less[model, name]
+
+    def _prepare(self, models: Sequence[Model]) -> None:
+        """All such models of some models, side by side."""
+        wanted = [(model, name) for model in models for name in model.names]
+        made = each(self._jobs, self._fitted_without, wanted, shared(self._search))
+        self._less.update(zip(wanted, made, strict=True))
+
+    def _fitted_without(self, of: tuple[Model, str]) -> Model:
+        with self._search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
+            return without(self._search, *of)
 
     def _matters(self, model: Model, counted: Mapping[Model, float]) -> bool:
         """Whether the model is nearly as likely as the best one so far, as they count."""

@@ -26,8 +26,11 @@ from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 
 
-def decide(search: Search) -> Decision:
-    """The verdict on a search."""
+def decide(search: Search, jobs: int = 1) -> Decision:
+    """The verdict on a search.
+
+    jobs: processes that fit.
+    """
     screen = search.first
     if not screen.alarmed:
         verdict: Verdict = (
@@ -35,7 +38,7 @@ def decide(search: Search) -> Decision:
         )
         return Decision(verdict, search.bare, 0.0, None, _quiet(screen), 0.0, {})
 
-    evidence = Breadth(search).evidence()
+    evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
     alone = nameless_beside(search.screening, search.bare)
     beside = nameless_beside(search.screening, best) if best.names else alone

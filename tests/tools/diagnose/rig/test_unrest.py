@@ -83,7 +83,7 @@ def test_a_fit_knows_the_noise_of_the_wheels_speed() -> None:
     base = fit_base(_noisy_rig([]), np.random.default_rng(0))
     stack = base.problem.stack
     assert stack.unrest.shape == (stack.size, 2)
-    wheel, _ = base.fitted.slack[base.problem.tolerance.shape[1] - 2 :]
+    wheel, _ = base.fitted.slack[base.problem.allowance.count - 2 :]
     assert wheel == pytest.approx(1.0, abs=0.3)
 
 

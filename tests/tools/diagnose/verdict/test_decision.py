@@ -16,6 +16,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.bending import bending_sizes
 from gritd.tools.diagnose.fit.evidence import strength_sizes
+from gritd.tools.diagnose.fit.freedom import ONCE, Freedom
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
@@ -133,6 +134,8 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     )
     residual = values - jacobian @ at
     objective = float(residual @ residual + np.sum((penalty * at) ** 2))
+    none = np.zeros((30, 0))
+    fixed = Freedom("nothing", none, none, ONCE)
     fitted = Fitted(
         (effect,),
         free,
@@ -145,7 +148,8 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
         penalty,
         np.zeros(0),
         objective,
-        Allowance((), 0),
+        Allowance(((fixed, 1.0),)),
+        np.zeros((0, 2)),
         np.zeros(2),
         np.eye(2),
         np.zeros(2, bool),
@@ -162,5 +166,5 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     )
     priors = np.mean([2.0 * norm.pdf(strength, 0.0, s) for s in strength_sizes()], axis=0)
     true = np.trapezoid(np.trapezoid(likelihood * priors, strength, axis=1), constant)
-    evidence = Marginal(fitted, np.zeros((30, 0)), ()).log_evidence(())
+    evidence = Marginal(fitted, (fixed,), ()).log_evidence(())
     assert evidence == pytest.approx(np.log(true) - 0.5 * residual @ residual, abs=0.02)

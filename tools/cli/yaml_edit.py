@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -99,9 +100,15 @@ class EditedYaml:
         return whole.replace("\n", self._newline)
 
 
-def quantity(value: float, sigma: float, unit: str, like: str = "") -> str:
+def quantity(
+    value: float,
+    sigma: float,
+    unit: str,
+    like: str = "",
+    bounds: tuple[float, float] = (-inf, inf),
+) -> str:
     """YAML text of a quantity in SI, whose SI unit is `unit`, written in the unit that `like` has,
-    if it has one. Without a sigma it is a plain value.
+    if it has one. Without a sigma it is a plain value. bounds: no rounding leads out of these.
     """
     shown = _unit_of(like) or unit
     factor = float(units.unit(shown).factor / units.unit(unit).factor)
@@ -110,7 +117,9 @@ def quantity(value: float, sigma: float, unit: str, like: str = "") -> str:
         return _number(float(f"{value:.9g}"), shown)
 
     places = _places(sigma)
-    written = _number(round(value, places), shown)
+    rounded = round(value, places)
+    inside = bounds[0] <= rounded * factor <= bounds[1]
+    written = _number(rounded if inside else float(f"{value:.9g}"), shown)
     return f"{{value: {written}, sigma: {_number(round(sigma, places), shown)}}}"
 
 

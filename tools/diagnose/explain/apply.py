@@ -11,6 +11,7 @@ from math import atan, cos, inf
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Parameter
 from gritd.estimator.visible import visible
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
 from gritd.tools.diagnose.explain.apply_form import set_discrepancy
@@ -71,12 +72,14 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
 
 
 def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str]:
-    units = {p.name: p.unit for p in EFFECTS[effect].parameters()}
-    return {
-        name: quantity(stated.value, stated.sigma, units[name])
-        for name, stated in parameters.items()
-        if name in units
-    }
+    """YAML text of each parameter; no σ is wider than a configuration may state."""
+    known = {p.name: p for p in EFFECTS[effect].parameters()}
+    return {n: _stated(known[n], stated) for n, stated in parameters.items() if n in known}
+
+
+def _stated(parameter: Parameter, found: Quantity) -> str:
+    low, high = parameter.low, parameter.high
+    return quantity(found.value, min(found.sigma, high), parameter.unit, bounds=(low, high))
 
 
 def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:

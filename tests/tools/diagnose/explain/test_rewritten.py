@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from gritd.estimator.config import configuration as config
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import Effect
 from gritd.estimator.filter.learnt_soil import learnt_soil
 from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.commands import diagnose, init
@@ -53,6 +55,38 @@ def test_effects_and_soil_are_the_next_prior_and_comments_stay(rig: Path) -> Non
     assert replace(settings, soil=before.settings.soil, effects=()) == replace(
         before.settings, effects=()
     )
+
+
+@pytest.mark.parametrize("sigmas", [0.003, 1.0, 1e3])
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_what_is_written_of_any_effect_can_be_read_again(
+    rig: Path, sigmas: float, end: str
+) -> None:
+    """Parameters at their bounds, known well or not at all: a fit may leave them so."""
+    found = [
+        Hypothesis(name, 0.9, 30.0, _at_bounds(effect, sigmas, end), accepted=True)
+        for name, effect in EFFECTS.items()
+        if not effect.filter_only
+    ]
+    before, diagnosis = config.load(rig), base(verdict="explained", hypotheses=tuple(found))
+
+    after = rewritten(rig.read_text(), before, diagnosis)
+    read = {
+        e.name: e.parameters for e in config.loads(after, "new.yaml", rig.parent).settings.effects
+    }
+    for hypothesis in found:
+        for name, stated in hypothesis.parameters.items():
+            value = read[hypothesis.effect][name].value
+            assert value == pytest.approx(stated.value, abs=max(stated.sigma, 1e-9))
+
+
+def _at_bounds(effect: type[Effect], sigmas: float, end: str) -> dict[str, Quantity]:
+    """Every parameter at one of its bounds, where it has one; σ in expected sizes."""
+    at = {p: getattr(p, end) for p in effect.parameters()}
+    return {
+        p.name: Quantity(value if abs(value) < 1e3 else p.centre, sigmas * p.sigma, p.unit)
+        for p, value in at.items()
+    }
 
 
 def test_the_modulus_is_right_in_reeces_form_too(rig: Path) -> None:

@@ -19,18 +19,17 @@ from gritd.tools.diagnose.noise.colour import Noise, whiten
 
 @dataclass(frozen=True)
 class Sizes:
-    """The sizes tried, the smallest first, and the prior probability of each."""
+    """The sizes tried, the smallest first, and the prior probability of each; one as it stands, if
+    none are given.
+    """
 
-    values: tuple[float, ...]
-    prior: tuple[float, ...]
+    values: tuple[float, ...] = (1.0,)
+    prior: tuple[float, ...] = (1.0,)
 
     @property
     def log_prior(self) -> Array:
         """Of each size (n,)."""
         return np.log(np.array(self.prior) / sum(self.prior))
-
-
-ONCE = Sizes((1.0,), (1.0,))  # of what has no other size
 
 
 @dataclass(frozen=True, eq=False)

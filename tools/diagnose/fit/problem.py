@@ -16,7 +16,7 @@ from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit import descent
 from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.freedom import ONCE, Freedom, freedom
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
@@ -144,7 +144,7 @@ class Problem:
         off by.
         """
         self.stack, self.noise = stack, noise
-        allowed = freedom("tolerance", tolerance, noise, ONCE)
+        allowed = freedom("tolerance", tolerance, noise, Sizes())
         self.fixed: tuple[Freedom, ...] = (allowed,)  # what every fit has
         self.allowance = Allowance(((allowed, 1.0),))
         self.measured = whiten(noise, stack.measured)
@@ -160,7 +160,7 @@ class Problem:
         """The same with more columns (N, m), each one standard deviation, that no effect stands
         for.
         """
-        more = freedom("nameless", columns, self.noise, ONCE)
+        more = freedom("nameless", columns, self.noise, Sizes())
         other = self._with([(more, 1.0)])
         other.fixed = (*self.fixed, more)
         return other

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.freedom import ONCE, Freedom, Sizes
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
@@ -108,7 +108,7 @@ def shared_freedoms(
         for part, columns in shared.items()
     ]
     if ripples.shape[1]:
-        freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), ONCE))
+        freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), Sizes()))
     return tuple(f for f in freedoms if f.columns.shape[1])
 
 

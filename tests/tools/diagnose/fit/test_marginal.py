@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.fit.allowance import Allowance
-from gritd.tools.diagnose.fit.freedom import ONCE, Freedom, Sizes
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
 
@@ -27,7 +27,7 @@ def _marginal(strengths: int, seed: int = 0) -> tuple[Marginal, Any]:
     jacobian, tolerance = rng.standard_normal((N, 1 + len(free))), rng.standard_normal((N, 2))
     columns = [rng.standard_normal((N, m)) for m in (3, 5)]
     freedoms = [Freedom(str(c.shape), c, c, SIZES) for c in columns]
-    fixed = Freedom("tolerance", tolerance, tolerance, ONCE)
+    fixed = Freedom("tolerance", tolerance, tolerance, Sizes())
     residual, at = rng.standard_normal(N) * 2.0, rng.standard_normal(1 + len(free))
     fitted = Fitted(
         effects,

@@ -16,7 +16,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.bending import bending_sizes
 from gritd.tools.diagnose.fit.evidence import strength_sizes
-from gritd.tools.diagnose.fit.freedom import ONCE, Freedom
+from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.marginal import Marginal
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Fitted, free_of
@@ -135,7 +135,7 @@ def test_the_evidence_of_a_fit_is_the_integral() -> None:
     residual = values - jacobian @ at
     objective = float(residual @ residual + np.sum((penalty * at) ** 2))
     none = np.zeros((30, 0))
-    fixed = Freedom("nothing", none, none, ONCE)
+    fixed = Freedom("nothing", none, none, Sizes())
     fitted = Fitted(
         (effect,),
         free,

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -48,6 +49,17 @@ class _Eliminated:
     spread: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Varied:
+    """products (n + 1, n + 1) of all columns and the residual without what has but one size; spread
+    of that; acting: the unknowns (n,) that are left.
+    """
+
+    products: Array
+    spread: float
+    acting: Bools
+
+
 class Marginal:
     """A fit without its freedoms, and the freedoms that it may have."""
 
@@ -56,7 +68,7 @@ class Marginal:
     ) -> None:
         """fixed: what every fit has."""
         self.freedoms, known = tuple(freedoms), len(fitted.u) + len(fitted.x)
-        self._products = _products(fitted, (*fixed, *freedoms))
+        self._fitted, self._fixed = fitted, tuple(fixed)
         allowed = sum(f.columns.shape[1] for f in fixed)
         self._ends = known + np.cumsum([0, allowed, *(f.columns.shape[1] for f in freedoms)])
 
@@ -75,7 +87,6 @@ class Marginal:
             for i, f in enumerate(fitted.free)
             if self._strong[first + i] and not fitted.held[first + i]
         ]
-        self._usual, self._usual_spread, self._varied = self._without_usual()
         self._known: dict[Chosen, float] = {}
         self._filled: list[set[Chosen]] = [set() for _ in self.freedoms]
 
@@ -101,6 +112,9 @@ class Marginal:
         for number in range(len(self.freedoms)):
             values = [self.log_evidence(c) for c in self._along(chosen, number)]
             average += float(log_sum(values)) - top
+
+        for large in ("_products", "_varied"):  # a search keeps many; formed again if asked for
+            self.__dict__.pop(large, None)
         return chosen, average
 
     def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
@@ -226,8 +240,9 @@ class Marginal:
 
     def _eliminated(self, scale: Array, acting: Bools, kept: Index) -> _Eliminated:
         """Everything that acts but the strengths eliminated, some columns kept; all by factors."""
-        products = self._usual * scale[:, None] * scale
-        acting = acting & self._varied
+        varied = self._varied
+        products = varied.products * scale[:, None] * scale
+        acting = acting & varied.acting
         weak = np.flatnonzero(acting & ~self._strong)
         strong = np.flatnonzero(acting & self._strong)
         prior, centre = self._weight[weak] ** 2, self._centre[weak]
@@ -254,19 +269,23 @@ class Marginal:
             strong_pull=right[count:],
             centre=self._centre[strong],
             misfit=float(products[-1, -1] + strain - last @ last),
-            spread=self._usual_spread
+            spread=varied.spread
             + 2.0 * float(np.log(np.diag(root)).sum() - np.log(self._weight[weak]).sum()),
         )
 
-    def _without_usual(self) -> tuple[Array, float, Bools]:
-        """Products with what acts in the same size for all sizes eliminated, its spread, and what
-        is left to vary.
-        """
+    @cached_property
+    def _products(self) -> Array:
+        """Of all columns and the residual with one another."""
+        return _products(self._fitted, (*self._fixed, *self.freedoms))
+
+    @cached_property
+    def _varied(self) -> _Varied:
+        """What is left where all that has but one size is eliminated."""
         once = [True, *(len(f.sizes.values) == 1 for f in self.freedoms)]
         begins = zip(self._ends[:-1], self._ends[1:], once, strict=True)
         usual = np.concatenate([np.arange(a, b) for a, b, same in begins if same])
-        varied = ~self._held
-        varied[usual] = False
+        acting = ~self._held
+        acting[usual] = False
 
         scale, _ = self._scaled(tuple(0 for _ in self.freedoms))
         own = self._products[np.ix_(usual, usual)] * scale[usual, None] * scale[usual]
@@ -275,7 +294,7 @@ class Marginal:
         beside = scale[usual, None] * self._products[usual]
         inside = solve_triangular(root, beside, lower=True, check_finite=False)
         spread = 2.0 * float(np.log(np.diag(root)).sum())
-        return self._products - inside.T @ inside, spread, varied
+        return _Varied(self._products - inside.T @ inside, spread, acting)
 
     def _log_evidence(self, chosen: Chosen) -> float:
         scale, acting = self._scaled(chosen)
@@ -287,7 +306,7 @@ class Marginal:
 
     def _scaled(self, chosen: Chosen) -> tuple[Array, Bools]:
         """Factors of all columns and the residual; which columns act."""
-        scale, acting = np.ones(self._products.shape[0]), np.ones(len(self._centre), bool)
+        scale, acting = np.ones(len(self._centre) + 1), np.ones(len(self._centre), bool)
         for freedom, number, first, last in zip(
             self.freedoms, chosen, self._ends[1:-1], self._ends[2:], strict=True
         ):

@@ -30,6 +30,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.noise.colour import (
@@ -70,7 +71,10 @@ class SuitableColours:
 class OpenNoise:
     """Evidence of signatures on top of a fit, with the colour of every channel open."""
 
-    def __init__(self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature]) -> None:
+    def __init__(
+        self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature], jobs: int = 1
+    ) -> None:
+        """jobs: processes."""
         stack = problem.stack
         centre = np.concatenate((fitted.u, fitted.x))
         base = np.column_stack(
@@ -91,11 +95,12 @@ class OpenNoise:
 
         self._colours = colours()
         self._prior = log_prior(self._colours, stack.gaps)
-        self._squares = [
-            _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
-            for own in (stack.of(channel) for channel in stack.rig.channels)
-            if own.any()
-        ]
+
+        def squares(own: Bools) -> Squares:
+            return _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
+
+        channels = (stack.of(channel) for channel in stack.rig.channels)
+        self._squares = each(jobs, squares, [own for own in channels if own.any()])
         self._without = self._evidence(np.zeros(0, dtype=np.intp))
 
     def gain(self, number: int) -> float:
@@ -174,21 +179,40 @@ def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array,
     variance = part.variance[:, None] * np.array(TUNING.screen.colour_sizes) ** 2
     gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
     added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
-    return np.asarray(
-        logsumexp([_log_evidence(gram, p) for p in prior], axis=0) - np.log(len(prior)) + added
-    )
+    alike = int(np.argmin(np.append(np.all(prior == prior[0], axis=0), False)))
+    rest, spread = _without_first(gram, prior[0, :alike])
+    every = [_log_evidence(rest, p[alike:]) for p in prior]
+    return np.asarray(logsumexp(every, axis=0) - np.log(len(prior)) - spread + added)
+
+
+def _without_first(gram: Array, prior: Array) -> tuple[Array, Array]:
+    """Products (…, p + 1, p + 1) of columns and y with the first columns eliminated, of prior
+    precision (f,), and half of what these add to the log determinant.
+    """
+    first = prior.size
+    padded = gram + np.zeros_like(gram)
+    diagonal = np.einsum("...ii->...i", padded)
+    diagonal[..., :first] = _sure(diagonal[..., :first], prior)
+    # of the rest the root's last rows are not wanted: anything that keeps it positive
+    diagonal[..., first:] += 1.0 + diagonal[..., first:].sum(axis=-1, keepdims=True)
+
+    root = np.linalg.cholesky(padded)
+    across = root[..., first:, :first]
+    own = np.log(np.diagonal(root, axis1=-2, axis2=-1)[..., :first]).sum(axis=-1)
+    rest = gram[..., first:, first:] - across @ across.swapaxes(-1, -2)
+    return np.asarray(rest), np.asarray(own - 0.5 * np.log(prior).sum())
 
 
 def _log_evidence(gram: Array, prior: Array) -> Array:
     """From products (…, p + 1, p + 1) of columns and y, and the prior precision (p,) of the
     columns.
     """
-    inner = gram[..., :-1, :-1]
-    squares = np.diagonal(inner, axis1=-2, axis2=-1)
-    # a column is known to a millionth: of very quiet recordings the prior is less than rounding
-    own = prior + SLIGHT**2 * squares
+    rest, spread = _without_first(gram, prior)
+    return np.asarray(-0.5 * rest[..., -1, -1] - spread)
 
-    root = np.linalg.cholesky(inner + own[..., None] * np.eye(prior.size))
-    taken = np.linalg.solve(root, gram[..., :-1, -1:])[..., 0]
-    spread = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1) - 0.5 * np.log(prior).sum()
-    return np.asarray(-0.5 * (gram[..., -1, -1] - np.sum(taken**2, axis=-1)) - spread)
+
+def _sure(squares: Array, prior: Array) -> Array:
+    """Diagonal (…, p) of products and prior. A column is known to a millionth: of very quiet
+    recordings the prior is less than rounding.
+    """
+    return np.asarray(squares + prior + SLIGHT**2 * squares)

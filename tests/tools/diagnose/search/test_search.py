@@ -40,7 +40,7 @@ def test_fits_have_the_same_bits_for_any_number_of_processes() -> None:
     found = []
     for jobs in (1, 2):
         with rig.aside():
-            found.append(extended(search, bare, 3, jobs).models[1:])
+            found.append(extended(search, [bare], 3, jobs).models[1:])
 
     assert len(found[0]) == 3
     assert [m.evidence for m in found[0]] == [m.evidence for m in found[1]]

@@ -10,9 +10,11 @@ along the bed, as another formula for it would have it. Beside h each channel ha
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
 begins: soil has to move first. Another law of shear does as much at another shear displacement, so
-it may act as a change of slip too. A ripple may also have other harmonics. No law says how a zero
-creeps, or how it is set before each run: it may follow any smooth function, of up to twice the size
-of our formula. What the parameters of the model's effects can do is taken out of all this, so that
+it may act as a change of slip too. A ripple may also have other harmonics. No wall, rail, pulley or
+bed is the same all along, so what is not of the drive may also vary with the place, in waves of any
+length down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how
+a zero creeps, or how it is set before each run: it may follow any smooth function, of up to twice
+the size of our formula. What the parameters of the model's effects can do is taken out of all this, so that
 a strength is what its effect does on the whole. ρ is how far published forms differ; its prior is
 over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is never told as
 if it were exact: where the soil can absorb most of an effect, another form of it changes the soil
@@ -29,7 +31,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
-from gritd.tools.diagnose.fit.functions import along, shares
+from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -38,6 +40,7 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
 
 EXACT = ("sensor",)  # stages at which there is but one form: offsets, scales, delays
+NOWHERE = ("drivetrain",)  # stages that know of no place on the bed
 OF_SHEAR = "contact"  # the stage of shear stress, which follows the shear displacement
 OF_SOIL = ("soil", "contact", "wheel")  # stages whose effects follow: soil has to move first
 
@@ -51,6 +54,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
     """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
     freedoms = []
     functions = shares(stack, np.ones(stack.size, bool))
+    places = along_place(stack)
 
     for number, effect in enumerate(fitted.acting):
         added = _added(stack, fitted, number)
@@ -59,6 +63,11 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             for zeros in _free_zeros(stack, noise, effect, added):
                 columns = _beside(noise, zeros, fitted)
                 freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
+
+            if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
+                varied = added[:, None] * places / np.sqrt(places.shape[1])
+                columns = _beside(noise, varied, fitted)
+                freedoms.append(freedom(effect.name, columns, noise, _place_sizes()))
 
             harmonics = _harmonics(stack, fitted, number)
             every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
@@ -76,6 +85,10 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
 
     return tuple(freedoms)
+
+
+def _place_sizes() -> Sizes:
+    return Sizes(TUNING.fit.place_sizes, TUNING.fit.place_prior)
 
 
 def _free_zero_sizes() -> Sizes:

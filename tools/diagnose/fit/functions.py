@@ -84,6 +84,19 @@ def shares(stack: Stack, own: Bools) -> Array:
     return _scaled(np.column_stack(columns), own, 1.0)
 
 
+def along_place(stack: Stack) -> Array:
+    """Cosines along the bed (N, m) of unit size while the wheel turns, from long to short waves;
+    (N, 0) where nothing travels.
+    """
+    place, moving = stack.covariate("position"), stack.covariate("speed") > 0.0
+    span = float(np.ptp(place))
+    if span <= SPAN:
+        return np.zeros((stack.size, 0))
+    along = (place - place.min()) / span
+    waves = np.cos(np.pi * np.outer(along, np.arange(1, TUNING.fit.place_waves + 1)))
+    return _scaled(waves * moving[:, None], np.ones(stack.size, bool), 1.0)
+
+
 def along(stack: Stack, covariate: str) -> Array:
     """Functions (N, m) of unit size: of time, place or heat cosines, of runs one each; (N, 0) where
     the covariate does not vary.

@@ -33,6 +33,14 @@ class Fit:
         (0.2, 0.3, 0.35, 0.15), "prior", "probability of each of the sizes", FORMS
     )
 
+    place_waves: int = tuned(24, "cosines", "along the bed by which an effect may vary")
+    place_sizes: tuple[float, ...] = tuned(
+        (0.0, 0.1, 0.3), "-", "shares of an effect that vary along the bed"
+    )
+    place_prior: tuple[float, ...] = tuned(
+        (0.8, 0.1, 0.1), "prior", "probability of each of the sizes", "judgement"
+    )
+
     free_zero_sizes: tuple[float, ...] = tuned(
         (0.0, 0.1, 0.5, 2.0), "-", "of an effect, over what no law says how it goes"
     )

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
 from gritd.estimator.effects import EFFECTS, make
+from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
+from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.bending import _following, bending_freedoms
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
@@ -14,7 +18,7 @@ from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
-from tests.tools.diagnose.campaigns import plan, settings
+from tests.tools.diagnose.campaigns import diagnosed, plan, settings
 
 
 def _stack() -> Stack:
@@ -51,7 +55,7 @@ def test_what_soil_does_builds_up_and_what_a_drive_does_begins_at_once(
     fitted = problem.descend(
         (effect,), free, np.zeros(len(stack.rig.constants)), np.ones(len(free)), rounds=0
     )
-    (freedom,) = bending_freedoms(stack, problem.noise, fitted)
+    *_, freedom = bending_freedoms(stack, problem.noise, fitted)
 
     plain = stack.predict(np.zeros(len(stack.rig.constants)), ())
     added = fitted.predicted - plain
@@ -140,7 +144,7 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
     stack, effect = problem.stack, EFFECTS[name]
     free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
     fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
-    (freedom,) = bending_freedoms(stack, problem.noise, fitted)
+    *_, freedom = bending_freedoms(stack, problem.noise, fitted)
 
     names = [constant.name for constant in stack.rig.constants]
     slipping = fitted.raw[:, names.index(stack.rig.slipping)]
@@ -148,3 +152,43 @@ def test_another_law_of_shear_may_act_as_a_change_of_slip(name: str, slips: bool
     left = slipping - every @ np.linalg.lstsq(every, slipping, rcond=None)[0]
     taken = np.linalg.norm(left) < 1e-6 * np.linalg.norm(slipping)
     assert taken == slips
+
+
+@pytest.mark.parametrize(
+    ("name", "placed"),
+    [("side_wall_rubbing", True), ("bulldozing", True), ("viscous_friction", False)],
+)
+def test_what_a_drive_does_knows_of_no_place_on_the_bed(name: str, placed: bool) -> None:
+    """An effect that is three tenths stronger and weaker along the bed, ten times on it, is within
+    its freedom to vary along the place; a friction of the drive is not.
+    """
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, effect = problem.stack, EFFECTS[name]
+    free, still = free_of((effect,)), np.zeros(len(stack.rig.constants))
+    fitted = problem.descend((effect,), free, still, np.ones(len(free)), rounds=0)
+    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    assert len(freedoms) == (2 if placed else 1)
+
+    place = stack.covariate("position")
+    along = (place - place.min()) / np.ptp(place)
+    added = fitted.predicted - stack.predict(still, ())
+    wavy = 0.3 * added * np.cos(20.0 * np.pi * along)
+    every = np.column_stack([*(f.columns for f in freedoms), fitted.raw[:, len(still) :]])
+    left = wavy - every @ np.linalg.lstsq(every, wavy, rcond=None)[0]
+    assert (np.linalg.norm(left) < 1e-6 * np.linalg.norm(wavy)) == placed
+
+
+@dataclass(frozen=True)
+class _WavyWall(SideWallRubbing):
+    """A wall that is not straight, with a wave each 12 cm."""
+
+    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+        wave = 1.0 + 0.4 * np.cos(2.0 * np.pi * situation.position / 0.12)
+        lost = self.share * wave * situation.carried * situation.direction
+        return replace(reaction, drawbar_pull=reaction.drawbar_pull - lost)
+
+
+def test_a_wall_that_is_not_straight_is_a_wall() -> None:
+    found = diagnosed(plan(seconds=30.0), (_WavyWall(0.12),))
+    assert found.verdict == "explained"
+    assert [h.effect for h in found.hypotheses if h.accepted] == ["side_wall_rubbing"]

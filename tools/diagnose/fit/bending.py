@@ -14,11 +14,11 @@ it may act as a change of slip too. A ripple may also have other harmonics. No w
 bed is the same all along, so what is not of the drive may also vary with the place, in waves of any
 length down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how
 a zero creeps, or how it is set before each run: it may follow any smooth function, of up to twice
-the size of our formula. What the parameters of the model's effects can do is taken out of all this, so that
-a strength is what its effect does on the whole. ρ is how far published forms differ; its prior is
-over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is never told as
-if it were exact: where the soil can absorb most of an effect, another form of it changes the soil
-and hardly the fit.
+the size of our formula. What the parameters of the model's effects can do is taken out of all this,
+so that a strength is what its effect does on the whole. ρ is how far published forms differ; its
+prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
+never told as if it were exact: where the soil can absorb most of an effect, another form of it
+changes the soil and hardly the fit.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ class SoilPatch(Effect):
     flank: float = shape(
         "how far its flanks reach, of half its length, f",
         "",
-        mean=0.3,
-        sigma=0.3,
+        mean=0.4,
+        sigma=0.15,
         low=0.0,
         high=1.2,
     )

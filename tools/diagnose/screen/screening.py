@@ -16,7 +16,7 @@ from gritd.tools.diagnose.fit.base import BaseFit
 from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM, smooth_signatures
-from gritd.tools.diagnose.fit.model import Model, fit_model
+from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
@@ -97,10 +97,7 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
     screen = screen_signatures(projection, _parts(screening, model), searched, jobs, kept)
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
-    open_ = _open(screening, model, screen, jobs)
-    if problem.stack.rig.held is not None and open_ > TUNING.screen.sure:
-        open_ = min(open_, _beyond_learnt(screening, model, screen))
-    return replace(screen, open=open_, ripple=_ripple(problem))
+    return replace(screen, open=_open(screening, model, screen, jobs), ripple=_ripple(problem))
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:
@@ -235,18 +232,6 @@ def _open_form(screening: Screening, model: Model, screen: Screen) -> float:
         return np.inf
     every = [*screen.best.values(), *_peaks(screening, model, screen).values()]
     return gain_with_form_open(screening.problem, model, every)
-
-
-def _beyond_learnt(screening: Screening, model: Model, screen: Screen) -> float:
-    """Where the configuration holds a learnt discrepancy, the equations are known to be off on this
-    rig, and more of it is no news: the evidence that is left where it may be larger [nats], counted
-    so that as much is asked for as beside a reference.
-    """
-    problem, forms = screening.problem, screening.forms
-    begins, none = (model.fitted.u, np.zeros(0)), tuple(0 for _ in forms)
-    formed = fit_model(problem, forms, (), (), begins, none)
-    left = _open_form(screening, formed, screen)
-    return left + TUNING.screen.sure - TUNING.screen.beside_reference
 
 
 def _covered(screening: Screening) -> float:

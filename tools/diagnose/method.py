@@ -90,6 +90,6 @@ def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:
     if stack.referred:
         return fit_beside_reference(rough, rng)
     noise = estimate(
-        stack, rough.fitted.predicted, explainable(rough, jobs), rough.problem.noise, rng, jobs
+        stack, rough.fitted.predicted, explainable(rough), rough.problem.noise, rng, jobs
     )
     return refit(rough, noise)

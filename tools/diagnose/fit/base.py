@@ -6,12 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.functions import smooth_signatures, tolerance
@@ -19,7 +17,7 @@ from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model, plain_model, sized_model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.ripples import line_columns
-from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns, some_of
+from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.noise.saturated import Explainable
@@ -51,11 +49,8 @@ def fit_roughly(stack: Stack) -> BaseFit:
     )
 
 
-def explainable(rough: BaseFit, jobs: int = 1) -> Explainable:
-    """What constants, effects and smooth functions could explain about a rough fit: no noise.
-
-    jobs: processes.
-    """
+def explainable(rough: BaseFit) -> Explainable:
+    """What constants, effects and smooth functions could explain about a rough fit: no noise."""
     stack, fitted = rough.problem.stack, rough.fitted
     rippling = {
         n
@@ -64,12 +59,8 @@ def explainable(rough: BaseFit, jobs: int = 1) -> Explainable:
     }
     others = [name for name in stack.rig.effects if name not in rippling]
 
-    def columns(names: list[str]) -> list[Array]:
-        with stack.rig.aside():  # the same bits, whatever was tried before
-            return [s.columns for s in raw_signatures(stack, fitted.u, fitted.predicted, names)]
-
-    of_effects = each(jobs, columns, list(some_of(others)))
-    leading = [*chain(*of_effects), *(s.columns for s in smooth_signatures(stack))]
+    signatures = raw_signatures(stack, fitted.u, fitted.predicted, others)
+    leading = [s.columns for s in (*signatures, *smooth_signatures(stack))]
     turning = ripple_columns(stack, stack.measured - fitted.predicted)
     ripples = np.column_stack((turning, line_columns(stack)))
     return Explainable(np.column_stack([*leading, fitted.raw]), ripples)

@@ -10,7 +10,7 @@ from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, t
 from gritd.estimator.stages.situation import Situation
 from gritd.estimator.terramechanics.soil import Soil
 
-SHARPEST = 0.005  # [m] width over which one soil passes into the other, at least
+EDGE = 0.01  # [m] width over which one soil passes into the other
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,7 @@ class SoilPatch(Effect):
     """On one stretch of the bed the soil has another cohesion or friction angle.
 
     c · (1 + a w),   tan φ · (1 + b w)
-    w(x) = ½ [tanh((x − x₀ + l/2)/δ) − tanh((x − x₀ − l/2)/δ)],   δ = f l/2, 5 mm at least
-
-    From f = 0, filled in by hand with sharp flanks, to f = 1, water that spread from one spot.
+    w(x) = ½ [tanh((x − x₀ + l/2)/δ) − tanh((x − x₀ − l/2)/δ)],   δ = 10 mm
 
     Source: a smooth window; Eq. (2) holds on either side with its own c and φ.
     """
@@ -37,14 +35,6 @@ class SoilPatch(Effect):
     length: float = shape(
         "length of the patch, l", "m", mean=0.3, sigma=0.2, low=0.02, high=5.0, scan=True
     )
-    flank: float = shape(
-        "how far its flanks reach, of half its length, f",
-        "",
-        mean=0.4,
-        sigma=0.15,
-        low=0.0,
-        high=1.2,
-    )
 
     stage = "soil"
     fingerprint = Fingerprint(
@@ -56,8 +46,7 @@ class SoilPatch(Effect):
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
         along, half = situation.position - self.centre, 0.5 * self.length
-        width = max(self.flank * half, SHARPEST)
-        inside = 0.5 * (np.tanh((along + half) / width) - np.tanh((along - half) / width))
+        inside = 0.5 * (np.tanh((along + half) / EDGE) - np.tanh((along - half) / EDGE))
         return replace(
             soil,
             cohesion=soil.cohesion * (1.0 + self.cohesion_change * inside),

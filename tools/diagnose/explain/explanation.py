@@ -51,7 +51,7 @@ def explain(
     whole = decision.beside.model if decision.beside is not None else accepted
     before, after = held_out(base.fitted, folds), held_out(whole.fitted, folds)
 
-    with meanwhile(jobs, lambda: _located(search, accepted, before)) as located:
+    with meanwhile(1, lambda: _located(search, accepted, before)) as located:
         hypotheses = _hypotheses(search, decision, folds)
         soil = soil_of(rig, base.fitted, decision)
         proposed = next_experiment(search, decision)

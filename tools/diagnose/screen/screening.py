@@ -93,11 +93,10 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
         return replace(screen, open=open_, ripple=_ripple(problem), counts=counts)
     searched = _averages(screening, model, jobs)
     projection = model.fitted.projection(drawn)
-    kept = screening.functions
-    screen = screen_signatures(projection, _parts(screening, model), searched, jobs, kept)
+    screen = screen_signatures(projection, _parts(screening, model), searched)
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
-    return replace(screen, open=_open(screening, model, screen, jobs), ripple=_ripple(problem))
+    return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:

@@ -195,7 +195,7 @@ def promises(search: Search, model: Model, jobs: int = 1) -> list[Promise]:
             every = (_promised(search, model, effects[name], settings) for name in some)
             return [promise for promise in every if promise is not None]
 
-    made = each(jobs, likeliest, list(some_of(names)))
+    made = [likeliest(some) for some in some_of(names)]
     return sorted((one for some in made for one in some), key=lambda promise: -promise.gain)
 
 

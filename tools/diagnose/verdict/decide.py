@@ -14,11 +14,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.search.search import Search, shared
+from gritd.tools.diagnose.search.search import Search
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.breadth import Breadth
@@ -47,7 +46,7 @@ def decide(search: Search, jobs: int = 1) -> Decision:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return nameless_beside(search.screening, model)
 
-    alone, beside = (2 * each(jobs, nameless, models, shared(search)))[:2]
+    alone, beside = (2 * [nameless(model) for model in models])[:2]
 
     weighed = weigh(search, best, evidence, alone, beside)
     return judged(search, weighed, beside, learnt(len(_candidates(search))))

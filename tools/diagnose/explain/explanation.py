@@ -7,7 +7,6 @@ from typing import Any
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
-from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
@@ -39,24 +38,19 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
-def explain(
-    search: Search, decision: Decision, redo: Mapping[str, Any], jobs: int = 1
-) -> Diagnosis:
-    """The result object of a search that was decided. redo: what doing it again needs; jobs:
-    processes.
-    """
+def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diagnosis:
+    """The result object of a search that was decided. redo: what doing it again needs."""
     problem, rig, base = search.problem, search.problem.stack.rig, search.base
     folds = run_folds(problem.stack)
     accepted = decision.best
     whole = decision.beside.model if decision.beside is not None else accepted
     before, after = held_out(base.fitted, folds), held_out(whole.fitted, folds)
 
-    with meanwhile(1, lambda: _located(search, accepted, before)) as located:
-        hypotheses = _hypotheses(search, decision, folds)
-        soil = soil_of(rig, base.fitted, decision)
-        proposed = next_experiment(search, decision)
-        learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
-        location = located()
+    location = _located(search, accepted, before)
+    hypotheses = _hypotheses(search, decision, folds)
+    soil = soil_of(rig, base.fitted, decision)
+    proposed = next_experiment(search, decision)
+    learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
 
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     left = remainders(problem, accepted)
@@ -105,7 +99,7 @@ def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location
     """
     if not search.first.alarmed:
         return ()
-    with search.problem.stack.rig.aside():  # it may be done meanwhile
+    with search.problem.stack.rig.aside():
         if not accepted.names:
             return locate(search.screening, search.base, before.predicted)
         held = unmoved(search.screening, accepted)

@@ -155,7 +155,7 @@ def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> S
     """
     wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
     for model in starts:
-        candidates = [p for p in promises(search, model, jobs) if p.gain > TUNING.search.promising]
+        candidates = [p for p in promises(search, model) if p.gain > TUNING.search.promising]
         fresh = [(frozenset((*model.names, p.effect.name)), p) for p in candidates]
         fresh = [(names, p) for names, p in fresh if names not in wanted and not search.has(names)]
         wanted |= {names: (model, promise) for names, promise in fresh[:most]}
@@ -174,15 +174,13 @@ def shared(search: Search) -> list[object]:
     return [*allowed, *search.screening.forms, *search.models]
 
 
-def promises(search: Search, model: Model, jobs: int = 1) -> list[Promise]:
+def promises(search: Search, model: Model) -> list[Promise]:
     """Of every effect that may be what raised the alarm and is not in the model, the most promising
     first.
 
     A discrepancy of form that was learnt without an effect may have taken the effect's part. So
     each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
     so it may do better than linear algebra by a share.
-
-    jobs: processes.
     """
     effects, first = search.problem.stack.rig.effects, search.first
     settings = settings_of(search.problem, model)

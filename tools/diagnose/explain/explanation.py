@@ -47,12 +47,9 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
     before, after = held_out(base.fitted, folds), held_out(whole.fitted, folds)
 
     location = _located(search, accepted, before)
+    law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     hypotheses = _hypotheses(search, decision, folds)
     soil = soil_of(rig, base.fitted, decision)
-    proposed = next_experiment(search, decision)
-    learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
-
-    law = find_law(search, base, location) if decision.verdict == "unlisted" else None
     left = remainders(problem, accepted)
     return Diagnosis(
         verdict=decision.verdict,
@@ -63,7 +60,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         soil=soil,
         fit=_fit(problem, before, after),
         law=law.law if law else None,
-        next_experiment=proposed,
+        next_experiment=next_experiment(search, decision),
         caveats=_caveats(problem, accepted, whole, redo),
         share=decision.share,
         remaining=left,
@@ -78,7 +75,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         lines=ripples_of(rig),
         latencies=latencies_of(rig),
         candidates=len(rig.effects),
-        learnt=learnt,
+        learnt=learnt_form(problem, accepted, soil.after) if soil is not None else None,
         baseline=tuple(e.name for e in rig.baseline),
         traces=traces(problem, before, after),
         scatters=scatters(problem, location, before, after),
@@ -99,11 +96,10 @@ def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location
     """
     if not search.first.alarmed:
         return ()
-    with search.problem.stack.rig.aside():
-        if not accepted.names:
-            return locate(search.screening, search.base, before.predicted)
-        held = unmoved(search.screening, accepted)
-        return locate(search.screening, held, held.fitted.predicted)
+    if not accepted.names:
+        return locate(search.screening, search.base, before.predicted)
+    held = unmoved(search.screening, accepted)
+    return locate(search.screening, held, held.fitted.predicted)
 
 
 def _hypotheses(

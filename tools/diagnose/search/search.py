@@ -18,7 +18,7 @@ from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.settings import Settings, settings_of
-from gritd.tools.diagnose.fit.signatures import signature, some_of, strengths
+from gritd.tools.diagnose.fit.signatures import signature, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
@@ -182,31 +182,21 @@ def promises(search: Search, model: Model) -> list[Promise]:
     each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
     so it may do better than linear algebra by a share.
     """
-    effects, first = search.problem.stack.rig.effects, search.first
-    settings = settings_of(search.problem, model)
-    names = [n for n in effects if n not in model.names and n in first.fixed]
-    if not first.on_grid:  # a ripple alone raised the alarm
-        names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
+    effects = search.problem.stack.rig.effects
+    first = search.first
+    settings, habit = settings_of(search.problem, model), first.habit
 
-    def likeliest(some: Sequence[str]) -> list[Promise]:
-        with search.problem.stack.rig.aside():  # the same bits, whatever was tried before
-            every = (_promised(search, model, effects[name], settings) for name in some)
-            return [promise for promise in every if promise is not None]
+    promised = []
+    for name in (n for n in effects if n not in model.names and n in first.fixed):
+        if not (first.on_grid or effects[name].fingerprint.covariate == TURNING):
+            continue  # a ripple alone raised the alarm
+        tried = list(_tried(search, model, effects[name], settings))
+        if tried:
+            best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
+            usual = TUNING.screen.habit * habit.get(name, 0.0)
+            promised.append(replace(best, gain=best.gain - usual))
 
-    made = [likeliest(some) for some in some_of(names)]
-    return sorted((one for some in made for one in some), key=lambda promise: -promise.gain)
-
-
-def _promised(
-    search: Search, model: Model, effect: type[Effect], settings: Settings
-) -> Promise | None:
-    """The best promise of an effect, less what a reference shows of it; None without any."""
-    tried = list(_tried(search, model, effect, settings))
-    if not tried:
-        return None
-    best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
-    usual = TUNING.screen.habit * search.first.habit.get(effect.name, 0.0)
-    return replace(best, gain=best.gain - usual)
+    return sorted(promised, key=lambda promise: -promise.gain)
 
 
 def _tried(

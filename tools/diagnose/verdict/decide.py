@@ -40,13 +40,8 @@ def decide(search: Search, jobs: int = 1) -> Decision:
 
     evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
-    models = [search.bare, best] if best.names else [search.bare]
-
-    def nameless(model: Model) -> Nameless | None:
-        with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return nameless_beside(search.screening, model)
-
-    alone, beside = (2 * [nameless(model) for model in models])[:2]
+    alone = nameless_beside(search.screening, search.bare)
+    beside = nameless_beside(search.screening, best) if best.names else alone
 
     weighed = weigh(search, best, evidence, alone, beside)
     return judged(search, weighed, beside, learnt(len(_candidates(search))))

@@ -174,6 +174,7 @@ def _averaged(part: SuitableColours, prior: Array, others: Sequence[tuple[Array,
     variance = part.variance[:, None] * np.array(TUNING.screen.colour_sizes) ** 2
     gram = part.gram[:, None] / variance[..., None, None] + sum(o[0] for o in others)
     added = part.rest[:, None] - 0.5 * part.count * np.log(variance) + sum(o[1] for o in others)
+    # the first columns have one prior, whatever the size of the rest: eliminated once
     alike = int(np.argmin(np.append(np.all(prior == prior[0], axis=0), False)))
     rest, spread = _without_first(gram, prior[0, :alike])
     every = [_log_evidence(rest, p[alike:]) for p in prior]
@@ -185,9 +186,9 @@ def _without_first(gram: Array, prior: Array) -> tuple[Array, Array]:
     precision (f,), and half of what these add to the log determinant.
     """
     first = prior.size
-    padded = gram + np.zeros_like(gram)
-    diagonal = np.einsum("...ii->...i", padded)
-    diagonal[..., :first] = _sure(diagonal[..., :first], prior)
+    padded = gram.copy()
+    diagonal = np.einsum("...ii->...i", padded)  # a view
+    diagonal[..., :first] = _with_prior(diagonal[..., :first], prior)
     # of the rest the root's last rows are not wanted: anything that keeps it positive
     diagonal[..., first:] += 1.0 + diagonal[..., first:].sum(axis=-1, keepdims=True)
 
@@ -206,7 +207,7 @@ def _log_evidence(gram: Array, prior: Array) -> Array:
     return np.asarray(-0.5 * rest[..., -1, -1] - spread)
 
 
-def _sure(squares: Array, prior: Array) -> Array:
+def _with_prior(squares: Array, prior: Array) -> Array:
     """Diagonal (…, p) of products and prior. A column is known to a millionth: of very quiet
     recordings the prior is less than rounding.
     """

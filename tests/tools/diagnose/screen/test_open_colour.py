@@ -18,7 +18,7 @@ from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen import screening as module
-from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence
+from gritd.tools.diagnose.screen.open_colour import OpenNoise, _log_evidence, _without_first
 from gritd.tools.diagnose.screen.screening import prepare_screening
 from gritd.tools.diagnose.search.search import Search, begin
 from gritd.tools.diagnose.tuning import TUNING
@@ -124,3 +124,13 @@ def test_products_of_very_quiet_recordings_keep_their_root() -> None:
     inner, usual = np.eye(50) + scaled[:, :-1] @ scaled[:, :-1].T, scaled[:, -1]
     exact = -0.5 * (usual @ np.linalg.solve(inner, usual) + np.linalg.slogdet(inner)[1])
     assert _log_evidence((scaled.T @ scaled)[None], np.ones(3))[0] == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize("first", [0, 2, 4])
+def test_columns_may_be_eliminated_one_after_the_other(first: int) -> None:
+    rng = np.random.default_rng(7)
+    columns, prior = rng.standard_normal((3, 40, 6)), rng.uniform(0.1, 10.0, 5)
+    gram = columns.swapaxes(1, 2) @ columns
+    rest, spread = _without_first(gram, prior[:first])
+    parts = _log_evidence(rest, prior[first:]) - spread
+    np.testing.assert_allclose(parts, _log_evidence(gram, prior), rtol=1e-9)

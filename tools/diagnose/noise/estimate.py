@@ -104,13 +104,14 @@ def estimate(
 
     told = each(
         jobs,
-        lambda channel: _posterior(stack, channel, residual, saturated, cells, before),
+        lambda channel: _posterior(stack, channel, residual, saturated, cells, before, ~stack.idle),
         stack.rig.channels,
     )
     posteriors = [_chosen(stack, posterior, rng) for posterior in told]
     colours = tuple(f[0] for f in posteriors)
     own = replicates.own_columns(stack, residual, colours, waves)
-    return _noise(stack, predicted, residual, posteriors, own, explainable.leading)
+    noise = _noise(stack, predicted, residual, posteriors, own, explainable.leading)
+    return calmer(noise, residual, saturated, cells, before, stack.idle)
 
 
 def estimate_of_reference(
@@ -130,13 +131,40 @@ def estimate_of_reference(
     """
     cells = np.full(stack.size, -1, dtype=np.intp)
     told = [
-        _posterior(stack, channel, residual, explainable, cells, before, ~stack.new)
+        _posterior(stack, channel, residual, explainable, cells, before, ~stack.new & ~stack.idle)
         for channel in stack.rig.channels
     ]
     posteriors = [_chosen(stack, posterior, rng) for posterior in told]
 
     none = np.zeros((stack.size, 0))
-    return _noise(stack, predicted, calm, posteriors, none, explainable.leading)
+    noise = _noise(stack, predicted, calm, posteriors, none, explainable.leading)
+    return calmer(noise, residual, explainable, cells, before, stack.idle & ~stack.new)
+
+
+def calmer(
+    noise: Noise,
+    residual: Array,
+    explainable: Explainable,
+    cells: Index,
+    before: Noise,
+    idle: Bools,
+) -> Noise:
+    """Where the torque is the motor's alone, the noise is that of its current: found from idle
+    values (N,), and in force at all of them.
+
+    Neither its single values nor their mean count for more than they are found to.
+    """
+    stack = noise.stack
+    if np.count_nonzero(idle) < TUNING.noise.idle_values:
+        return noise
+    step = step_of(stack.gaps)
+    sized, weight = _posterior(stack, "torque", residual, explainable, cells, before, idle)
+    own, usual = _careful(sized, weight, step), noise.colours[stack.rig.channels.index("torque")]
+
+    power, usual_power = (c.sigma**2 * _slow_power(c, step) for c in (own, usual))
+    ratio = max(own.sigma / usual.sigma, float(np.sqrt(power / usual_power)))
+    times = np.where(stack.idle, np.clip(ratio, TUNING.noise.calmest, 1.0), 1.0)
+    return replace(noise, rougher=noise.times * times)
 
 
 def _noise(
@@ -187,7 +215,7 @@ def restless(noise: Noise, residual: Array) -> Noise:
         colour = noise.colours[stack.rig.channels.index(channel)]
         louder_by[index] = _restlessness(residual[index], stack.gaps[index], colour)
 
-    return replace(noise, rougher=louder_by)
+    return replace(noise, rougher=noise.times * louder_by)
 
 
 def _restlessness(residual: Array, gaps: Array, colour: Colour) -> Array:

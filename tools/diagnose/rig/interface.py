@@ -68,7 +68,8 @@ class Constant:
 @dataclass(frozen=True)
 class Run:
     """One run on the analysis grid; arrays (n,). `used` says which values of a channel the
-    comparison counts.
+    comparison counts; `idle`, where there are any, at which values the torque is the motor's alone
+    although it is else what the drive loses.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Run:
     measured: Mapping[str, Array]
     used: Mapping[str, Bools]
     covariates: Mapping[str, Array]
+    idle: Bools | None = None
 
 
 @dataclass(frozen=True)
@@ -326,6 +328,20 @@ class Stack:
         """Values (N,) of runs in which candidates act."""
         acting: Bools = np.array(self.rig.new)[self.run]
         return acting
+
+    @cached_property
+    def idle(self) -> Bools:
+        """Values (N,) at which a torque is the motor's alone: see Run."""
+        if "torque" not in self.rig.channels:
+            return np.zeros(self.size, bool)
+        none = [np.zeros(run.time.size) for run in self.rig.runs]
+        marks = [
+            dict.fromkeys(self.rig.channels, no)
+            | {"torque": no if run.idle is None else run.idle.astype(float)}
+            for run, no in zip(self.rig.runs, none, strict=True)
+        ]
+        idle: Bools = self.joined(marks) > 0.0
+        return idle
 
     @cached_property
     def motion_sigma(self) -> Array:

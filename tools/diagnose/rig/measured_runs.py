@@ -30,32 +30,57 @@ def measured_run(
     settings: Settings,
     channels: Sequence[str],
     sinkage: Array,
-    loss_of_drive: bool,
+    idle: Bools | None,
     tabled: bool,
 ) -> Run:
     """One run.
 
-    sinkage:       the predicted one (n,) [m], as a covariate.
-    loss_of_drive: whether channel torque is motor torque less axle torque.
-    tabled:        whether the recording is a table of steady states.
+    sinkage: the predicted one (n,) [m], as a covariate.
+    idle:    where channel torque is motor torque less axle torque, the values (n,) at which it is
+             the motor's alone; else None.
+    tabled:  whether the recording is a table of steady states.
     """
     constant = settings.drive.torque_constant.value
     measured = {c: measured_of(signals, c, constant) for c in channels}
-    if loss_of_drive:
-        measured["torque"] = measured["torque"] - measured["axle_torque"]
+    if idle is not None:
+        axle = np.where(idle, 0.0, measured["axle_torque"])
+        measured["torque"] = measured["torque"] - axle
 
     along = covariates(signals, motion, settings.wheel, tabled)
     along["sinkage"] = sinkage
 
     driving, resting, lifted = states(motion, settings)
     still = {"torque": driving | resting | lifted}
-    if loss_of_drive:
+    if idle is not None:
         still["torque"] |= turned_back(motion, settings)
+        still["axle_torque"] = driving | idle
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
     used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in channels}
-    return Run(signals.name, np.asarray(motion.time), measured, used, along)
+    return Run(signals.name, np.asarray(motion.time), measured, used, along, idle)
+
+
+def idle_values(
+    signals: Sequence[Signals], motions: Sequence[Motion], settings: Settings
+) -> list[Bools]:
+    """Where the wheel stands or is lifted, and the axle's torque is nil; (n,) of each run. What the
+    motor draws there it loses, and the noise of the axle's sensor need not be added to it.
+    """
+    axles = [np.nan_to_num(measured_of(one, "axle_torque", 1.0)) for one in signals]
+    every = [states(motion, settings) for motion in motions]
+    driven = np.concatenate([a[driving] for a, (driving, _, _) in zip(axles, every, strict=True)])
+    least = TUNING.rig.holding * float(np.sqrt(np.mean(driven**2))) if driven.size else 0.0
+
+    told = []
+    for axle, (_, resting, lifted) in zip(axles, every, strict=True):
+        idle = np.zeros(axle.size, bool)
+        for state in (resting, lifted):
+            edges = np.flatnonzero(np.diff(state.astype(int), prepend=0, append=0))
+            for first, end in edges.reshape(-1, 2):
+                idle[first:end] = abs(float(np.mean(axle[first:end]))) < least
+        told.append(idle)
+    return told
 
 
 def sinkage_from_prior(
@@ -76,8 +101,8 @@ def torque_is_held(runs: Sequence[Run]) -> bool:
 
     driven = np.concatenate(
         [
-            values[run.used["torque"] & ~at]
-            for run, values, at in zip(runs, torque, rest, strict=True)
+            _of_motor(run)[run.used["torque"] & ~at & np.isfinite(_of_motor(run))]
+            for run, at in zip(runs, rest, strict=True)
         ]
     )
     if len(means) < 2 or not driven.size:
@@ -86,12 +111,21 @@ def torque_is_held(runs: Sequence[Run]) -> bool:
     return float(np.ptp(means)) >= TUNING.rig.holding * usual
 
 
+def _of_motor(run: Run) -> Array:
+    """The torque (n,) of the motor [N·m]."""
+    if run.idle is None:
+        return run.measured["torque"]
+    return run.measured["torque"] + np.where(run.idle, 0.0, run.measured["axle_torque"])
+
+
 def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:
-    """The runs, in which the torque does not count while the wheel stands."""
-    return [
-        replace(run, used={**run.used, "torque": run.used["torque"] & ~_resting(run)})
-        for run in runs
-    ]
+    """The runs, in which no torque counts while the wheel stands."""
+    told = []
+    for run in runs:
+        moving = run.covariates["speed"] != 0.0
+        torques = {c: run.used[c] & moving for c in ("torque", "axle_torque") if c in run.used}
+        told.append(replace(run, used={**run.used, **torques}))
+    return told
 
 
 def _resting(run: Run) -> Bools:

@@ -15,7 +15,7 @@ from gritd.estimator.model.forward import simulate_arrays
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.rig.campaign import Campaign, sensed_as
-from gritd.tools.diagnose.rig.interface import Constant, Foreseen, Index
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, Index
 from gritd.tools.diagnose.rig.proposals import driving, proposed
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
@@ -57,7 +57,8 @@ class Prediction:
     """Channels of all runs, for the constants of a wheel.
 
     prepared: soil constants that a bed prepared anew has for itself; there is a constant `new_NAME`
-    of each. loss_of_drive: whether channel torque is compared as motor torque less axle torque.
+    of each. idle: where channel torque is compared as motor torque less axle torque, the values of
+    each run (n,) at which it is compared alone; else None.
     """
 
     def __init__(
@@ -67,10 +68,11 @@ class Prediction:
         constants: Sequence[Constant],
         driven: Driven,
         prepared: Sequence[str],
-        loss_of_drive: bool,
+        idle: Sequence[Bools] | None,
     ) -> None:
         self._settings, self._channels, self._constants = settings, channels, constants
-        self._driven, self._prepared, self._loss_of_drive = driven, prepared, loss_of_drive
+        self._driven, self._prepared = driven, prepared
+        self._less_axle = None if idle is None else ~np.concatenate(idle)
         self._campaigns = _campaigns(driven, settings, channels)
         self._true_readings: dict[tuple[object, ...], Array] = {}  # the last few
 
@@ -122,8 +124,12 @@ class Prediction:
             order=TUNING.rig.quadrature_order,
         ).sensed
 
-        read = [sensed_as(sensed, c, self._settings) + value[f"{c}_offset"] for c in self._channels]
-        compared = dict(zip(self._channels, self._compared(np.array(read)), strict=True))
+        read = np.array(
+            [sensed_as(sensed, c, self._settings) + value[f"{c}_offset"] for c in self._channels]
+        )
+        if self._less_axle is not None:
+            read = self._less(read, np.ones(read.shape[1], bool))
+        compared = dict(zip(self._channels, read, strict=True))
         return Foreseen(
             compared, {c: driving(experiment) | (c == "torque") for c in self._channels}
         )
@@ -174,16 +180,16 @@ class Prediction:
 
         before, after = np.roll(read, 1, axis=1), np.roll(read, -1, axis=1)
         rate, bend = (after - before) / (2.0 * self._step), after + before - 2.0 * read
-        return self._compared(np.where(self._inner, read - delay * rate + blur * bend, read))
+        read = np.where(self._inner, read - delay * rate + blur * bend, read)
+        return read if self._less_axle is None else self._less(read, self._less_axle)
 
-    def _compared(self, read: Array) -> Array:
-        """Of what the channels read (channels, N): the loss of the drive where both its sides are
-        measured.
+    def _less(self, read: Array, where: Bools) -> Array:
+        """Of what the channels read (channels, N): at marked values (N,) what the drive loses
+        between its two torques.
         """
+        motor, axle = (self._channels.index(name) for name in ("torque", "axle_torque"))
         out = np.array(read)
-        if self._loss_of_drive:
-            motor, axle = (self._channels.index(name) for name in ("torque", "axle_torque"))
-            out[motor] -= read[axle]
+        out[motor] -= np.where(where, read[axle], 0.0)
         return out
 
 

@@ -35,6 +35,7 @@ from gritd.tools.diagnose.rig.interface import (
 from gritd.tools.diagnose.rig.load_error import load_errors_in
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
+    idle_values,
     measured_run,
     sinkage_from_prior,
     torque_is_held,
@@ -110,6 +111,9 @@ class WheelRig:
 
         self.stated_noise = noise_of_readings(settings, self.loss_of_drive)
         self._driven = _driven(signals, weights, self.new, settings)
+        self._idle = (
+            idle_values(signals, self._driven.motions, settings) if self.loss_of_drive else None
+        )
         self._anew = bool(reference) and bed == "prepared"
         prepared = preparation(settings) if self._anew else {}
         self.constants = (
@@ -123,7 +127,7 @@ class WheelRig:
             self.constants,
             self._driven,
             tuple(prepared),
-            self.loss_of_drive,
+            self._idle,
         )
 
         runs = self._measured(signals)
@@ -255,6 +259,7 @@ class WheelRig:
     def _measured(self, signals: Sequence[Signals]) -> list[Run]:
         prior = {constant.name: constant.value for constant in self.constants}
         soil = Soil(*(prior[name] for name in SOIL))
+        idles: Sequence[Bools | None] = self._idle or [None for _ in signals]
 
         return [
             measured_run(
@@ -263,10 +268,10 @@ class WheelRig:
                 self.settings,
                 self.channels,
                 sinkage_from_prior(motion, self.settings, soil, self.baseline),
-                self.loss_of_drive,
+                idle,
                 self._tabled,
             )
-            for one, motion in zip(signals, self._driven.motions, strict=True)
+            for one, motion, idle in zip(signals, self._driven.motions, idles, strict=True)
         ]
 
     def _sentences(self, signals: Sequence[Signals], holding: bool) -> Iterator[str]:

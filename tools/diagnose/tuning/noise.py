@@ -63,6 +63,10 @@ class Noise:
     )
     restless_values: int = tuned(41, "values", "whose median tells how the differences are there")
     restless_least: float = tuned(0.05, "share", "of the noise that differs from value to value")
+    idle_values: int = tuned(20, "values", "of an idle motor that tell its noise, at least")
+    calmest: float = tuned(
+        0.02, "-", "times the noise of what the drive loses: that of an idle motor, at least"
+    )
     floor: float = tuned(
         1e-5, "-", "of a channel's size: no noise is below it, simulations need a scale"
     )

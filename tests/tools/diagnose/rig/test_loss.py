@@ -11,8 +11,9 @@ import pytest
 
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.fit.discrepancy import _columns
-from gritd.tools.diagnose.method import diagnose
+from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.recorded import measured_of
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.rig.wheel import LOSS_NOTE, WheelRig
 from gritd.tools.proof.ours.cases import record
@@ -42,6 +43,35 @@ def test_a_ripple_of_either_torque_is_one_of_what_is_lost() -> None:
     assert {channel: apart.recorded(channel) for channel in apart.channels} == {
         channel: (channel,) for channel in apart.channels
     }
+
+
+def test_an_idle_motor_is_compared_without_the_axles_sensor() -> None:
+    """At rest the axle's torque is nil: its noise tells nothing of what the motor loses."""
+    signals = record(plan(), ())
+    rig, constant = WheelRig(signals, settings()), settings().drive.torque_constant.value
+    for run, one in zip(rig.runs, signals, strict=True):
+        resting = run.covariates["speed"] == 0.0
+        idle = run.used["torque"] & resting
+        assert idle.any()
+        assert run.idle is not None and np.array_equal(run.idle & run.used["torque"], idle)
+        motor = measured_of(one, "torque", constant)
+        np.testing.assert_array_equal(run.measured["torque"][idle], motor[idle])
+        assert np.array_equal(run.used["axle_torque"] & resting, idle)
+
+    noise = fit_base(rig, np.random.default_rng(0)).problem.noise
+    stack = noise.stack
+    own = stack.of("torque")
+    assert noise.loose[own & stack.idle].max() < 0.8 * np.median(noise.loose[own & ~stack.idle])
+
+
+def test_an_axle_that_holds_torque_at_rest_is_not_idle() -> None:
+    def held(one: Signals) -> Signals:
+        axle = one.analogue["axle_torque"]
+        return replace(one, analogue={**one.analogue, "axle_torque": axle + 1.0})
+
+    rig = WheelRig([held(one) for one in record(plan(), ())], settings())
+    assert rig.loss_of_drive
+    assert not Stack(rig).idle.any()
 
 
 def test_soil_does_not_change_the_loss() -> None:

@@ -13,6 +13,8 @@ from contextlib import suppress
 WORDS = ("failed to map segment", "cannot allocate", "can't start new thread", "not enough mem")
 # [bytes] of address space that numpy takes with its linear algebra, and scipy beyond it
 ROOM = 150 << 20
+# [bytes] of address space below which children find no room beside what they inherit
+AMPLE = 2 << 30
 
 
 def reserve(scipy: bool) -> None:
@@ -33,6 +35,13 @@ def reserve(scipy: bool) -> None:
         from scipy.linalg import blas
 
         blas.dgemm(1.0, square, square)
+
+
+def is_scarce() -> bool:
+    """Whether address space is limited so far that work is better done in one process: a child
+    that finds none ends with words of its own.
+    """
+    return 0 < _most() < AMPLE
 
 
 def _room() -> None:

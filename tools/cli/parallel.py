@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from gritd.tools.cli.memory import is_scarce
 from gritd.tools.cli.offspring import ends_with_us
 
 Item = TypeVar("Item")
@@ -27,14 +28,14 @@ _work: Callable[[Any], Any] | None = None  # what the children find when they ar
 def each(
     jobs: int, work: Callable[[Item], Made], items: Sequence[Item], kept: Sequence[object] = ()
 ) -> list[Made]:
-    """`work` of every item, in order. The result must be picklable, `work` and the items need not
-    be. Raises what `work` raised, and ChildProcessError where a child ended otherwise: a Pool would
-    begin another child in its place for ever.
+    """`work` of every item, in order; in this process alone where memory is scarce. The result must
+    be picklable, `work` and the items need not be. Raises what `work` raised, and ChildProcessError
+    where a child ended otherwise: a Pool would begin another child in its place for ever.
 
     kept: large objects that results hold and that are here already. They come back as they are
     here, not as copies.
     """
-    if jobs < 2 or len(items) < 2:
+    if jobs < 2 or len(items) < 2 or is_scarce():
         return [work(item) for item in items]
 
     global _work
@@ -91,9 +92,10 @@ def _forked(place: int) -> Any:
 @contextmanager
 def meanwhile(jobs: int, work: Callable[[], Made]) -> Iterator[Callable[[], Made]]:
     """What gives the result of `work`, which a child does meanwhile where there is more than one
-    job. The result must be picklable. Raises what `work` raised, when asked for the result.
+    job and memory is not scarce. The result must be picklable. Raises what `work` raised, when
+    asked for the result.
     """
-    if jobs < 2:
+    if jobs < 2 or is_scarce():
         made = work()
         del work  # it may hold much
         yield lambda: made

@@ -72,7 +72,7 @@ def _diagnose(
     decision = decide(search, jobs)
 
     step("holding out runs and conditions")
-    return explain(search, decision, redo)
+    return explain(search, decision, redo, jobs)
 
 
 def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:

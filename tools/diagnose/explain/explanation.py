@@ -7,6 +7,7 @@ from typing import Any
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
+from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
@@ -38,18 +39,26 @@ from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
-def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diagnosis:
-    """The result object of a search that was decided. redo: what doing it again needs."""
+def explain(
+    search: Search, decision: Decision, redo: Mapping[str, Any], jobs: int = 1
+) -> Diagnosis:
+    """The result object of a search that was decided. redo: what doing it again needs; jobs:
+    processes.
+    """
     problem, rig, base = search.problem, search.problem.stack.rig, search.base
     folds = run_folds(problem.stack)
     accepted = decision.best
     whole = decision.beside.model if decision.beside is not None else accepted
     before, after = held_out(base.fitted, folds), held_out(whole.fitted, folds)
 
-    location = _located(search, accepted, before)
+    with meanwhile(jobs, lambda: _located(search, accepted, before)) as located:
+        hypotheses = _hypotheses(search, decision, folds)
+        soil = soil_of(rig, base.fitted, decision)
+        proposed = next_experiment(search, decision)
+        learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
+        location = located()
+
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
-    hypotheses = _hypotheses(search, decision, folds)
-    soil = soil_of(rig, base.fitted, decision)
     left = remainders(problem, accepted)
     return Diagnosis(
         verdict=decision.verdict,
@@ -60,7 +69,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         soil=soil,
         fit=_fit(problem, before, after),
         law=law.law if law else None,
-        next_experiment=next_experiment(search, decision),
+        next_experiment=proposed,
         caveats=_caveats(problem, accepted, whole, redo),
         share=decision.share,
         remaining=left,
@@ -75,7 +84,7 @@ def explain(search: Search, decision: Decision, redo: Mapping[str, Any]) -> Diag
         lines=ripples_of(rig),
         latencies=latencies_of(rig),
         candidates=len(rig.effects),
-        learnt=learnt_form(problem, accepted, soil.after) if soil is not None else None,
+        learnt=learnt,
         baseline=tuple(e.name for e in rig.baseline),
         traces=traces(problem, before, after),
         scatters=scatters(problem, location, before, after),
@@ -96,10 +105,11 @@ def _located(search: Search, accepted: Model, before: HeldOut) -> tuple[Location
     """
     if not search.first.alarmed:
         return ()
-    if not accepted.names:
-        return locate(search.screening, search.base, before.predicted)
-    held = unmoved(search.screening, accepted)
-    return locate(search.screening, held, held.fitted.predicted)
+    with search.problem.stack.rig.aside():  # it may be done meanwhile
+        if not accepted.names:
+            return locate(search.screening, search.base, before.predicted)
+        held = unmoved(search.screening, accepted)
+        return locate(search.screening, held, held.fitted.predicted)
 
 
 def _hypotheses(

@@ -4,8 +4,9 @@ of its shapes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import product
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice, product
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,15 @@ from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.rig.interface import Index, Rig, Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT, WAY
+
+Taken = TypeVar("Taken")
+
+
+def some_of(every: Iterable[Taken]) -> Iterator[list[Taken]]:
+    """So many at a time that their columns are not all in memory at once."""
+    taken = iter(every)
+    while some := list(islice(taken, TUNING.screen.at_once)):
+        yield some
 
 
 def strengths(effect: type[Effect]) -> list[Parameter]:

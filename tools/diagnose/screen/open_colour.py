@@ -30,6 +30,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.evidence import Signature, strength_sizes
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.noise.colour import (
@@ -70,7 +71,10 @@ class SuitableColours:
 class OpenNoise:
     """Evidence of signatures on top of a fit, with the colour of every channel open."""
 
-    def __init__(self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature]) -> None:
+    def __init__(
+        self, problem: Problem, fitted: Fitted, signatures: Sequence[Signature], jobs: int = 1
+    ) -> None:
+        """jobs: processes."""
         stack = problem.stack
         centre = np.concatenate((fitted.u, fitted.x))
         base = np.column_stack(
@@ -91,11 +95,12 @@ class OpenNoise:
 
         self._colours = colours()
         self._prior = log_prior(self._colours, stack.gaps)
-        self._squares = [
-            _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
-            for own in (stack.of(channel) for channel in stack.rig.channels)
-            if own.any()
-        ]
+
+        def squares(own: Bools) -> Squares:
+            return _squares(columns[own], stack.gaps_of(own), problem.noise, own, self._colours)
+
+        channels = (stack.of(channel) for channel in stack.rig.channels)
+        self._squares = each(jobs, squares, [own for own in channels if own.any()])
         self._without = self._evidence(np.zeros(0, dtype=np.intp))
 
     def gain(self, number: int) -> float:

@@ -12,17 +12,17 @@ largest of *all* these surprises in every null, however many were tried and howe
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
-from typing import TypeVar
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.evidence import Signature, log_evidence, log_sum
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
+from gritd.tools.diagnose.fit.signatures import some_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE
@@ -185,16 +185,6 @@ def tail_chance(values: Array, value: float) -> float:
     return min(counted, max(fitted, TUNING.screen.trusted_tail * least))
 
 
-Taken = TypeVar("Taken")
-
-
-def some_of(every: Iterable[Taken]) -> Iterator[list[Taken]]:
-    """So many at a time that their columns are not all in memory at once."""
-    taken = iter(every)
-    while some := list(islice(taken, TUNING.screen.at_once)):
-        yield some
-
-
 def whitened(noise: Noise, signatures: Iterable[Signature]) -> Iterator[WhitenedSignature]:
     """Each in its turn, some whitened at a time."""
     for some in some_of(signatures):
@@ -219,15 +209,33 @@ class Weighed:
         return float(self.evidence[0])
 
 
+Part = Callable[[], Iterable[WhitenedSignature]]
+
+
 def screen_signatures(
     projection: Projection,
-    signatures: Iterable[WhitenedSignature],
+    parts: Sequence[Part],
     searched: Mapping[Shape, Array] | None = None,
+    jobs: int = 1,
+    kept: Sequence[object] = (),
 ) -> Screen:
     """Evidence of each candidate (averaged over its signatures) and its largest in every surrogate.
 
-    searched: shapes that were tried elsewhere (scans.py), with their averages (1 + draws,).
+    parts: give the signatures, all of one candidate in the same part; searched: shapes that were
+    tried elsewhere (scans.py), with their averages (1 + draws,); jobs: processes; kept: large
+    objects that the signatures hold (parallel.py).
     """
+    made = each(jobs, lambda part: _weighed_part(projection, part()), parts, kept)
+    weighed = {of: every for part, _ in made for of, every in part.items()}
+    if not weighed:
+        return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
+    return _ranked(weighed, {of: s for _, best in made for of, s in best.items()}, searched or {})
+
+
+def _weighed_part(
+    projection: Projection, signatures: Iterable[WhitenedSignature]
+) -> tuple[dict[Candidate, list[Weighed]], dict[Candidate, Signature]]:
+    """What is kept of every signature, and the likeliest of each candidate."""
     weighed: dict[Candidate, list[Weighed]] = {}
     best: dict[Candidate, tuple[float, Signature]] = {}
     for some in some_of(signatures):
@@ -238,10 +246,7 @@ def screen_signatures(
             )
             if of not in best or value > best[of][0]:
                 best[of] = value, s.signature
-
-    if not weighed:
-        return Screen({"none": 0.0}, {"none": (0.0, 1.0)}, {}, {}, np.zeros(2), {"none": 1.0})
-    return _ranked(weighed, {of: s for of, (_, s) in best.items()}, searched or {})
+    return weighed, {of: s for of, (_, s) in best.items()}
 
 
 def _evidence(projection: Projection, some: Sequence[WhitenedSignature]) -> Iterator[Array]:

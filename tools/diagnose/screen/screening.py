@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -19,7 +20,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
-from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature
+from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature, some_of
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
 from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.screen.habit import habits
@@ -28,9 +29,10 @@ from gritd.tools.diagnose.screen.open_form import gain_with_form_open
 from gritd.tools.diagnose.screen.ripples import loudest
 from gritd.tools.diagnose.screen.scans import Family, candidates, families, without_harmonics
 from gritd.tools.diagnose.screen.screen import (
+    Part,
     Screen,
+    WhitenedSignature,
     screen_signatures,
-    some_of,
     tail_chance,
     whitened,
 )
@@ -89,14 +91,27 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
         counts = max(_covered(screening), TUNING.screen.least_covered)
         open_ = counts * _open_form(screening, model, screen)
         return replace(screen, open=open_, ripple=_ripple(problem), counts=counts)
-    effects = _signatures(problem, model)
-    signatures = chain(effects, screening.functions, _strains(problem, model))
     searched = _averages(screening, model, jobs)
     projection = model.fitted.projection(drawn)
-    screen = screen_signatures(projection, whitened(problem.noise, signatures), searched)
+    kept = screening.functions
+    screen = screen_signatures(projection, _parts(screening, model), searched, jobs, kept)
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
-    return replace(screen, open=_open(screening, model, screen), ripple=_ripple(problem))
+    return replace(screen, open=_open(screening, model, screen, jobs), ripple=_ripple(problem))
+
+
+def _parts(screening: Screening, model: Model) -> list[Part]:
+    """Everything that is tried but waves and steps, some effects at a time."""
+    problem = screening.problem
+
+    def effects(names: Sequence[str]) -> Iterator[WhitenedSignature]:
+        with problem.stack.rig.aside():  # the same bits, whatever was tried before
+            yield from whitened(problem.noise, _signatures(problem, model, names))
+
+    def others() -> Iterator[WhitenedSignature]:
+        return whitened(problem.noise, chain(screening.functions, _strains(problem, model)))
+
+    return [*(partial(effects, names) for names in some_of(problem.stack.rig.effects)), others]
 
 
 def _averages(screening: Screening, model: Model, jobs: int) -> dict[Shape, Array]:
@@ -117,7 +132,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     """
     problem, stack = screening.problem, screening.problem.stack
     projection = model.fitted.projection(screening.surrogates)
-    effects = _signatures(problem, model, everywhere=True)
+    effects = _signatures(problem, model, problem.stack.rig.effects, everywhere=True)
     smooth = smooth_signatures(stack, everywhere=True)
     both = list(whitened(problem.noise, chain(effects, smooth)))
 
@@ -129,7 +144,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
         s.columns[~stack.new] = 0.0
     beside = without_harmonics(problem, model.fitted, screening.surrogates)
     searched = {family.shape: family.average(beside) for family in screening.families}
-    screen = screen_signatures(projection, both, searched)
+    screen = screen_signatures(projection, [lambda: both], searched)
 
     of_reference = families(stack, problem.noise, ~stack.new)
     rest = beside.of_rows(~stack.new)
@@ -147,11 +162,15 @@ def chance_of(
     return {shape: tail_chance(mean[1:], float(mean[0])) for shape, mean in averages.items()}
 
 
-def _signatures(problem: Problem, model: Model, everywhere: bool = False) -> Iterator[Signature]:
-    """Signatures about the model's fit; everywhere: in the reference campaign too."""
+def _signatures(
+    problem: Problem, model: Model, names: Iterable[str], everywhere: bool = False
+) -> Iterator[Signature]:
+    """Signatures of some effects about the model's fit; everywhere: in the reference campaign
+    too.
+    """
     stack, fitted = problem.stack, model.fitted
 
-    for effect in stack.rig.effects.values():
+    for effect in (stack.rig.effects[name] for name in names):
         tried = list(shape_grid(stack.rig, effect))
         prior = -np.log(max(len(tried), 1))
         for fixed in _worth(problem, model, effect, tried):
@@ -186,10 +205,12 @@ def _strains(problem: Problem, model: Model) -> Iterator[Signature]:
             yield Signature(shape, columns, (0,), {})
 
 
-def _open(screening: Screening, model: Model, screen: Screen) -> float:
+def _open(screening: Screening, model: Model, screen: Screen, jobs: int = 1) -> float:
     """The evidence of what stands out with the noise's colour open [nats]; one that is enough ends
     the search. What surprises most with one colour need not be what slow noise cannot be, so all
     are weighed.
+
+    jobs: processes.
     """
     chosen = _standing_out(screening, model, screen)
     if not chosen:
@@ -197,7 +218,7 @@ def _open(screening: Screening, model: Model, screen: Screen) -> float:
 
     most = -np.inf
     for some in some_of(chosen):
-        weighed = OpenNoise(screening.problem, model.fitted, some)
+        weighed = OpenNoise(screening.problem, model.fitted, some, jobs)
         for number in range(len(some)):
             most = max(most, weighed.gain(number))
             if most > TUNING.screen.sure:

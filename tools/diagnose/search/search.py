@@ -18,7 +18,7 @@ from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.settings import Settings, settings_of
-from gritd.tools.diagnose.fit.signatures import signature, strengths
+from gritd.tools.diagnose.fit.signatures import signature, some_of, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
@@ -155,7 +155,7 @@ def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> S
     """
     wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
     for model in starts:
-        candidates = [p for p in promises(search, model) if p.gain > TUNING.search.promising]
+        candidates = [p for p in promises(search, model, jobs) if p.gain > TUNING.search.promising]
         fresh = [(frozenset((*model.names, p.effect.name)), p) for p in candidates]
         fresh = [(names, p) for names, p in fresh if names not in wanted and not search.has(names)]
         wanted |= {names: (model, promise) for names, promise in fresh[:most]}
@@ -174,29 +174,41 @@ def shared(search: Search) -> list[object]:
     return [*allowed, *search.screening.forms, *search.models]
 
 
-def promises(search: Search, model: Model) -> list[Promise]:
+def promises(search: Search, model: Model, jobs: int = 1) -> list[Promise]:
     """Of every effect that may be what raised the alarm and is not in the model, the most promising
     first.
 
     A discrepancy of form that was learnt without an effect may have taken the effect's part. So
     each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
     so it may do better than linear algebra by a share.
+
+    jobs: processes.
     """
-    effects = search.problem.stack.rig.effects
-    first = search.first
-    settings, habit = settings_of(search.problem, model), first.habit
+    effects, first = search.problem.stack.rig.effects, search.first
+    settings = settings_of(search.problem, model)
+    names = [n for n in effects if n not in model.names and n in first.fixed]
+    if not first.on_grid:  # a ripple alone raised the alarm
+        names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
 
-    promised = []
-    for name in (n for n in effects if n not in model.names and n in first.fixed):
-        if not (first.on_grid or effects[name].fingerprint.covariate == TURNING):
-            continue  # a ripple alone raised the alarm
-        tried = list(_tried(search, model, effects[name], settings))
-        if tried:
-            best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
-            usual = TUNING.screen.habit * habit.get(name, 0.0)
-            promised.append(replace(best, gain=best.gain - usual))
+    def likeliest(some: Sequence[str]) -> list[Promise]:
+        with search.problem.stack.rig.aside():  # the same bits, whatever was tried before
+            every = (_promised(search, model, effects[name], settings) for name in some)
+            return [promise for promise in every if promise is not None]
 
-    return sorted(promised, key=lambda promise: -promise.gain)
+    made = each(jobs, likeliest, list(some_of(names)))
+    return sorted((one for some in made for one in some), key=lambda promise: -promise.gain)
+
+
+def _promised(
+    search: Search, model: Model, effect: type[Effect], settings: Settings
+) -> Promise | None:
+    """The best promise of an effect, less what a reference shows of it; None without any."""
+    tried = list(_tried(search, model, effect, settings))
+    if not tried:
+        return None
+    best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
+    usual = TUNING.screen.habit * search.first.habit.get(effect.name, 0.0)
+    return replace(best, gain=best.gain - usual)
 
 
 def _tried(

@@ -14,10 +14,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.search.search import Search, shared
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.breadth import Breadth
@@ -40,8 +41,13 @@ def decide(search: Search, jobs: int = 1) -> Decision:
 
     evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
-    alone = nameless_beside(search.screening, search.bare)
-    beside = nameless_beside(search.screening, best) if best.names else alone
+    models = [search.bare, best] if best.names else [search.bare]
+
+    def nameless(model: Model) -> Nameless | None:
+        with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
+            return nameless_beside(search.screening, model)
+
+    alone, beside = (2 * each(jobs, nameless, models, shared(search)))[:2]
 
     weighed = weigh(search, best, evidence, alone, beside)
     return judged(search, weighed, beside, learnt(len(_candidates(search))))

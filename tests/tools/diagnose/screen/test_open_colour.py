@@ -99,7 +99,9 @@ def test_what_no_slow_noise_can_be_counts_wherever_it_ranks(
     assert len(screen.stands_out) > 2 * TUNING.screen.at_once
 
     class _Open:
-        def __init__(self, problem: Problem, fitted: Fitted, some: Sequence[Signature]) -> None:
+        def __init__(
+            self, problem: Problem, fitted: Fitted, some: Sequence[Signature], jobs: int
+        ) -> None:
             self._of = [s.of for s in some]
 
         def gain(self, number: int) -> float:

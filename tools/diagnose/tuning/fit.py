@@ -21,7 +21,7 @@ class Fit:
 
     # --- base.py ---
     tolerance: float = tuned(
-        1.5e-3, "-", "of a channel's size: integration rules and idealised servos are off by it"
+        5e-4, "-", "of a channel's size: integration rules and idealised servos are off by it"
     )
     rough_rounds: int = tuned(3, "rounds", "of the first fit, whose only use is to linearise")
 

@@ -198,7 +198,8 @@ class _Strips:
             aimed = self._sinkage + np.clip(miss / np.maximum(rise, 1.0), -leap, leap)
             inside = (aimed > high) & (aimed < deep)
             known = np.isfinite(high) & np.isfinite(deep)
-            half = np.where(known, 0.5 * (high + deep), aimed)
+            with np.errstate(invalid="ignore"):  # of bounds that are not known yet
+                half = np.where(known, 0.5 * (high + deep), aimed)
             self._sinkage = np.where(inside, aimed, half)
 
     def _load(self, now: Moment, under: Under) -> tuple[Array, Array]:

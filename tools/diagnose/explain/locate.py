@@ -103,8 +103,10 @@ def locate(
     places = _smooth_places(stack, residual, projected, families, points)
     places += _strains(stack, model) + _ripples(screening, projection, projected, families)
     places.sort(key=lambda place: -place.nats)
-    named = {(p.location.channel, p.location.covariate): p.location for p in reversed(places)}
-    return tuple(named.values())[::-1][: TUNING.explain.places_listed]
+    named: dict[tuple[str, str], Location] = {}
+    for place in places:  # of those of one channel and covariate the first
+        named.setdefault((place.location.channel, place.location.covariate), place.location)
+    return tuple(named.values())[: TUNING.explain.places_listed]
 
 
 def _smooth_places(

@@ -101,21 +101,14 @@ def torque_is_held(runs: Sequence[Run]) -> bool:
 
     driven = np.concatenate(
         [
-            _of_motor(run)[run.used["torque"] & ~at & np.isfinite(_of_motor(run))]
-            for run, at in zip(runs, rest, strict=True)
+            values[run.used["torque"] & ~at]
+            for run, values, at in zip(runs, torque, rest, strict=True)
         ]
     )
     if len(means) < 2 or not driven.size:
         return False
     usual = float(np.sqrt(np.mean(driven**2)))
     return float(np.ptp(means)) >= TUNING.rig.holding * usual
-
-
-def _of_motor(run: Run) -> Array:
-    """The torque (n,) of the motor [N·m]."""
-    if run.idle is None:
-        return run.measured["torque"]
-    return run.measured["torque"] + np.where(run.idle, 0.0, run.measured["axle_torque"])
 
 
 def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:

@@ -93,11 +93,13 @@ def sinkage_from_prior(
 
 
 def torque_is_held(runs: Sequence[Run]) -> bool:
-    """Whether a servo holds torque at rest: the current at rest differs from rest to rest, so it
-    tells nothing.
+    """Whether a servo holds torque at rest: the current at rest differs from rest to rest, by more
+    than its noise, so it tells nothing.
     """
     torque, rest = [run.measured["torque"] for run in runs], [_resting(run) for run in runs]
-    means = [float(values[at].mean()) for values, at in zip(torque, rest, strict=True) if at.any()]
+    rests = [values[at] for values, at in zip(torque, rest, strict=True) if at.any()]
+    means = [float(values.mean()) for values in rests]
+    noise = max((float(v.std() / np.sqrt(v.size)) for v in rests), default=0.0)
 
     driven = np.concatenate(
         [
@@ -108,7 +110,8 @@ def torque_is_held(runs: Sequence[Run]) -> bool:
     if len(means) < 2 or not driven.size:
         return False
     usual = float(np.sqrt(np.mean(driven**2)))
-    return float(np.ptp(means)) >= TUNING.rig.holding * usual
+    least = max(TUNING.rig.holding * usual, TUNING.rig.holding_errors * noise)
+    return float(np.ptp(means)) >= least
 
 
 def without_torque_at_rest(runs: Sequence[Run]) -> list[Run]:

@@ -178,6 +178,9 @@ class Rig:
     holding: float = tuned(
         0.05, "-", "of the driving torque: current at rest that differs by more holds something"
     )
+    holding_errors: float = tuned(
+        4.0, "standard errors", "of the current at rest: less is its noise and holds nothing"
+    )
     slope_edge: int = tuned(2, "intervals", "at a run's ends a slope lacks its neighbours")
     unknown_offset: float = tuned(
         1e5, "N or N·m", "an offset less certain says that the channel was not measured"

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.method import diagnose, fit_base
 from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.recorded import measured_of
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.rig.wheel import LOSS_NOTE, WheelRig
+from gritd.tools.diagnose.rig.wheel import HOLDING_NOTE, LOSS_NOTE, WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import group, plan, settings
 
@@ -72,6 +72,20 @@ def test_an_axle_that_holds_torque_at_rest_is_not_idle() -> None:
     rig = WheelRig([held(one) for one in record(plan(), ())], settings())
     assert rig.loss_of_drive
     assert not Stack(rig).idle.any()
+
+
+def test_a_torque_that_a_servo_holds_at_rest_is_no_offset() -> None:
+    """A wheel on lugs: the current at rest differs from run to run by more than its noise."""
+    signals = record(plan(), ())
+    second = signals[1]
+    standing = np.abs(second.wheel_speed) < 1e-3
+    current = second.analogue["current"] + np.where(standing, 0.2, 0.0)
+    signals[1] = replace(second, analogue={**second.analogue, "current": current})
+
+    rig = WheelRig(signals, settings())
+    assert HOLDING_NOTE in rig.caveats
+    assert not any(r.used["torque"][r.covariates["speed"] == 0.0].any() for r in rig.runs)
+    assert HOLDING_NOTE not in WheelRig(record(plan(), ()), settings()).caveats
 
 
 def test_soil_does_not_change_the_loss() -> None:

@@ -7,6 +7,7 @@ import os
 import numpy as np
 import pytest
 
+from gritd.tools.cli import memory
 from gritd.tools.cli.parallel import each, meanwhile
 
 
@@ -20,6 +21,16 @@ def test_what_is_done_meanwhile_is_there_when_asked_for(jobs: int) -> None:
     with meanwhile(jobs, lambda: (os.getpid(), [1.5])) as result:
         process, made = result()
     assert made == [1.5] and (process == os.getpid()) == (jobs == 1)
+
+
+def test_where_memory_is_scarce_one_process_does_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def pids() -> set[int]:
+        with meanwhile(2, os.getpid) as result:
+            return {*each(2, lambda _: os.getpid(), [1, 2]), result()}
+
+    assert os.getpid() not in pids()
+    monkeypatch.setattr(memory, "_most", lambda: 500_000_000)
+    assert pids() == {os.getpid()}
 
 
 def test_an_error_of_a_child_is_raised_where_its_result_is_asked_for() -> None:

@@ -150,9 +150,8 @@ def calmer(
     idle: Bools,
 ) -> Noise:
     """Where the torque is the motor's alone, the noise is that of its current: found from idle
-    values (N,), and in force at all of them.
-
-    Neither its single values nor their mean count for more than they are found to.
+    values (N,), and in force at all of them. Neither single values nor their mean count for more
+    than they are found to. A difference of two torques is no quieter than the motor's alone.
     """
     stack = noise.stack
     if np.count_nonzero(idle) < TUNING.noise.idle_values:

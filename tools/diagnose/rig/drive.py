@@ -217,6 +217,7 @@ class DriveRig:
             {"torque": torque},
             {"torque": fastest > still},
             covariates,
+            {"torque": np.zeros(velocity.size)},
         )
 
 

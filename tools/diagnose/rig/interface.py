@@ -68,8 +68,7 @@ class Constant:
 @dataclass(frozen=True)
 class Run:
     """One run on the analysis grid; arrays (n,). `used` says which values of a channel the
-    comparison counts; `idle`, where there are any, at which values the torque is the motor's alone
-    although it is else what the drive loses.
+    comparison counts; `idle` is 1 where a torque is the motor's alone that else is a loss, else 0.
     """
 
     name: str
@@ -77,7 +76,7 @@ class Run:
     measured: Mapping[str, Array]
     used: Mapping[str, Bools]
     covariates: Mapping[str, Array]
-    idle: Bools | None = None
+    idle: Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -331,17 +330,8 @@ class Stack:
 
     @cached_property
     def idle(self) -> Bools:
-        """Values (N,) at which a torque is the motor's alone: see Run."""
-        if "torque" not in self.rig.channels:
-            return np.zeros(self.size, bool)
-        none = [np.zeros(run.time.size) for run in self.rig.runs]
-        marks = [
-            dict.fromkeys(self.rig.channels, no)
-            | {"torque": no if run.idle is None else run.idle.astype(float)}
-            for run, no in zip(self.rig.runs, none, strict=True)
-        ]
-        idle: Bools = self.joined(marks) > 0.0
-        return idle
+        """Marks the values (N,) at which a torque is the motor's alone: see Run."""
+        return np.asarray(self.joined([run.idle for run in self.rig.runs]), bool)
 
     @cached_property
     def motion_sigma(self) -> Array:

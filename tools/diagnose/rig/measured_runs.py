@@ -58,7 +58,10 @@ def measured_run(
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False
 
     used = {c: known & still.get(c, driving) & np.isfinite(measured[c]) for c in channels}
-    return Run(signals.name, np.asarray(motion.time), measured, used, along, idle)
+    alone = dict.fromkeys(channels, np.zeros(known.size))
+    if idle is not None:
+        alone["torque"] = idle.astype(float)
+    return Run(signals.name, np.asarray(motion.time), measured, used, along, alone)
 
 
 def idle_values(

@@ -176,7 +176,7 @@ class Rig:
 
     # --- wheel.py ---
     holding: float = tuned(
-        0.05, "-", "of the driving torque: current at rest that differs by more holds something"
+        0.05, "-", "of the torque that is compared: current at rest that differs by more is held"
     )
     holding_errors: float = tuned(
         4.0, "standard errors", "of the current at rest: less is its noise and holds nothing"

@@ -53,7 +53,7 @@ def test_an_idle_motor_is_compared_without_the_axles_sensor() -> None:
         resting = run.covariates["speed"] == 0.0
         idle = run.used["torque"] & resting
         assert idle.any()
-        assert run.idle is not None and np.array_equal(run.idle & run.used["torque"], idle)
+        assert np.array_equal((run.idle["torque"] > 0.0) & run.used["torque"], idle)
         motor = measured_of(one, "torque", constant)
         np.testing.assert_array_equal(run.measured["torque"][idle], motor[idle])
         assert np.array_equal(run.used["axle_torque"] & resting, idle)

@@ -32,8 +32,8 @@ from gritd.tools.diagnose.explain.result import Quantity, SoilFit, Trace
 from gritd.tools.diagnose.fit.problem import Fitted
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.noise.estimate import first_guess
-from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import read_all, sha256, signals
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.report import comparison
 from gritd.tools.report.comparison import Comparison

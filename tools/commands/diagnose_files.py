@@ -69,7 +69,7 @@ def of_files(
                 diagnosis = with_innovations(diagnosis, configuration, before(), again, jobs)
 
     if reference.files:
-        diagnosis = references.with_reference(diagnosis, rig, reference)
+        diagnosis = references.with_reference(diagnosis, reference)
     return replace(diagnosis, caveats=(*diagnosis.caveats, *remarks)), damage
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from gritd.estimator.visible import visible
 from gritd.tools.cli.wording import number, shown, spelled
@@ -12,6 +12,8 @@ from gritd.tools.diagnose.explain.result import (
     Fit,
     Hypothesis,
     NextExperiment,
+    Quantity,
+    Reference,
     SoilFit,
 )
 from gritd.tools.report.words import quantity
@@ -28,6 +30,7 @@ def text(diagnosis: Diagnosis) -> str:
         diagnosis.summary,
         *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:SHOWN]),
         *(_hypothesis(of) for of in diagnosis.hypotheses[:SHOWN] if _told(of)),
+        *_had(diagnosis.reference),
     ]
     if diagnosis.law is not None:
         lines.append(f"  law: {diagnosis.law.expression} (takes {diagnosis.law.share:.0%})")
@@ -50,10 +53,19 @@ def _told(of: Hypothesis) -> bool:
 def _hypothesis(of: Hypothesis) -> str:
     chance = f"probability {of.probability:.{DIGITS}f}"
     head = f"  {'accepted' if of.accepted else 'rival'}: {of.effect}, {chance}"
-    values = ", ".join(f"{name} {quantity(q)}" for name, q in of.parameters.items())
+    values = _listed(of.parameters)
     others = of.indistinguishable_from
     alike = f"; cannot be told apart from {', '.join(others)}" if others else ""
     return f"{head}{f': {values}' if values else ''}{alike}"
+
+
+def _had(reference: Reference | None) -> Iterator[str]:
+    for effect, parameters in reference.effects.items() if reference else ():
+        yield f"  in the reference too: {effect}: {_listed(parameters)}"
+
+
+def _listed(parameters: Mapping[str, Quantity]) -> str:
+    return ", ".join(f"{name} {quantity(q)}" for name, q in parameters.items())
 
 
 def _soil(soil: SoilFit) -> Iterator[str]:

@@ -3,6 +3,7 @@
     signals      readings of every recording on a common grid           rig/signals.py
     ripples      of the wheel, at the recordings' own rate               orders/lines.py
     rig          channels, constants with their priors, a prediction     rig/interface.py
+    reference    what it shows by itself, the steps below for it alone   search/anyway.py
     noise        size and colour of each channel, from the recordings    noise/estimate.py
     fit          soil and calibration within what is known of them       fit/base.py
     screen       evidence of every effect, and of misfits without name   screen/screening.py
@@ -24,13 +25,16 @@ import numpy as np
 
 from gritd.tools.cli.memory import give_back
 from gritd.tools.diagnose.explain.explanation import explain
+from gritd.tools.diagnose.explain.held_against import with_reference
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.fit.base import BaseFit, explainable, fit_roughly, refit
 from gritd.tools.diagnose.fit.reference import fit_beside_reference
 from gritd.tools.diagnose.noise.estimate import estimate
-from gritd.tools.diagnose.rig.interface import Rig, Stack
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import search_models
+from gritd.tools.diagnose.search.anyway import had_anyway
+from gritd.tools.diagnose.search.search import Search, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.diagnose.verdict.decide import decide
 
@@ -62,17 +66,33 @@ def first_answer() -> Iterator[None]:
 def _diagnose(
     rig: Rig, seed: int, redo: Mapping[str, Any], step: Callable[[str], None], jobs: int
 ) -> Diagnosis:
-    rng = np.random.default_rng(seed)
-    step("fitting the soil and the noise")
-    base = fit_base(rig, rng, jobs)
-    give_back()
+    alone = rig.reference
+    if alone is None:
+        return _of_campaign(rig, seed, redo, step, jobs)
 
-    screening = prepare_screening(base, rng)
-    search = search_models(screening, step, jobs)
+    step("fitting the reference")
+    search = _searched(alone, seed, lambda _: None, jobs)
+    decision = decide(search, jobs)
+    rig = rig.having(had_anyway(search, decision.best))
+    return with_reference(_of_campaign(rig, seed, redo, step, jobs), rig, decision.verdict)
+
+
+def _of_campaign(
+    rig: Rig, seed: int, redo: Mapping[str, Any], step: Callable[[str], None], jobs: int
+) -> Diagnosis:
+    step("fitting the soil and the noise")
+    search = _searched(rig, seed, step, jobs)
     decision = decide(search, jobs)
 
     step("holding out runs and conditions")
     return explain(search, decision, redo, jobs)
+
+
+def _searched(rig: Rig, seed: int, step: Callable[[str], None], jobs: int) -> Search:
+    rng = np.random.default_rng(seed)
+    base = fit_base(rig, rng, jobs)
+    give_back()
+    return search_models(prepare_screening(base, rng), step, jobs)
 
 
 def fit_base(rig: Rig, rng: np.random.Generator, jobs: int = 1) -> BaseFit:

@@ -219,6 +219,11 @@ def _caveats(diagnosis: Diagnosis) -> Markup | None:
             0,
             f"The configuration already models {listed([name_of(b) for b in diagnosis.baseline])}",
         )
+    if diagnosis.reference is not None and diagnosis.reference.effects:
+        had = listed([name_of(effect) for effect in diagnosis.reference.effects])
+        caveats.insert(
+            0, f"The reference shows {had} by itself, and both campaigns are fitted with it"
+        )
 
     return (
         section("Caveats", tag("ul", (tag("li", sentence(c)) for c in caveats)))

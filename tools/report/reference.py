@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
-from gritd.tools.diagnose.explain.coverage import coverage
-from gritd.tools.diagnose.explain.result import Diagnosis, Reference
-from gritd.tools.diagnose.rig.interface import Rig, Stack
+from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.rig.signals import sha256
 from gritd.tools.diagnose.rig.wheel import Bed
 
@@ -62,18 +60,19 @@ def again(redo: Mapping[str, Any]) -> Given:
     return Given(tuple(Path(name) for name in kept["files"]), kept["bed"])
 
 
-def with_reference(diagnosis: Diagnosis, rig: Rig, reference: Given) -> Diagnosis:
+def with_reference(diagnosis: Diagnosis, reference: Given) -> Diagnosis:
     """The result with what it was held against, and what of it lies outside."""
-    covered = coverage(Stack(rig))
+    assert diagnosis.reference is not None
     files = tuple(str(path) for path in reference.files)
-    kept = Reference(files, reference.verdict, reference.bed, covered.share, covered.outside)
+    verdict = reference.verdict or diagnosis.reference.verdict
+    kept = replace(diagnosis.reference, files=files, bed=reference.bed, verdict=verdict)
     caveats = diagnosis.caveats
 
-    if covered.share < WELL:
+    if kept.covered < WELL:
         caveats = (
             *caveats,
-            f"{covered.share:.0%} of the new campaign lies where the reference was driven;"
-            f" outside: {covered.outside}. What is said of the rest is less certain.",
+            f"{kept.covered:.0%} of the new campaign lies where the reference was driven;"
+            f" outside: {kept.outside}. What is said of the rest is less certain.",
         )
     return replace(diagnosis, reference=kept, caveats=caveats)
 

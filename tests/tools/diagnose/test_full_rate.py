@@ -16,8 +16,8 @@ from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of as recorded_rig
 from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.full_rate import beside_lines, restored
-from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import read_all
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import draw, record, record_fully, rig_of
 from tests.tools.diagnose.campaigns import plan, settings

@@ -12,7 +12,7 @@ from gritd.estimator.effects import make
 from gritd.tools.diagnose.explain.apply import applied
 from gritd.tools.diagnose.fit import heldout
 from gritd.tools.diagnose.method import diagnose
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.unlisted import BentRail, CableDrag

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import atan, cos, inf
+from math import atan, cos, hypot, inf
 
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings
@@ -28,15 +28,15 @@ KNOWN = ("consistent", "explained")  # verdicts under which the fitted soil is b
 
 
 def applied(configuration: Configuration, diagnosis: Diagnosis) -> str:
-    """The effective YAML text with the accepted effects; without one, as it was."""
+    """The effective YAML text with the effects found; without one, as it was."""
     document = EditedYaml(configuration.text, configuration.source)
     _set_effects(document, diagnosis)
     return document.text()
 
 
 def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> str:
-    """The text of a configuration file with the accepted effects, the fitted soil and what was
-    learnt of the discrepancy of form, where the verdict lets them be believed. Its comments stay.
+    """The text of a configuration file with the effects found, the fitted soil and what was learnt
+    of the discrepancy of form, where the verdict lets them be believed. Its comments stay.
     """
     document = EditedYaml(_without_header(text), configuration.source)
     _set_effects(document, diagnosis)
@@ -61,7 +61,9 @@ def _without_header(text: str) -> str:
 
 
 def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
-    parameters_of = {h.effect: h.parameters for h in diagnosis.accepted}
+    parameters_of = _had(diagnosis)
+    for h in diagnosis.accepted:
+        parameters_of[h.effect] = _more(h.effect, parameters_of.get(h.effect, {}), h.parameters)
     if diagnosis.law is not None and diagnosis.law.parameters:
         parameters_of["empirical_law"] = diagnosis.law.parameters
 
@@ -69,6 +71,31 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
         document.remove("effects", effect)
         for name, fragment in _fragments(effect, parameters).items():
             document.set(("effects", effect, name), fragment)
+
+
+def _had(diagnosis: Diagnosis) -> dict[str, Mapping[str, Quantity]]:
+    """What the reference shows by itself: soil and δ were found beside it."""
+    if diagnosis.reference is None or not is_known(diagnosis):
+        return {}
+    return dict(diagnosis.reference.effects)
+
+
+def _more(
+    effect: str, had: Mapping[str, Quantity], new: Mapping[str, Quantity]
+) -> Mapping[str, Quantity]:
+    """The parameters of an effect of which there is more than the rig had before: strengths add up,
+    its shape is that of what is new.
+    """
+    strengths = {p.name: p for p in EFFECTS[effect].parameters() if p.role == "strength"}
+    return {
+        name: _sum(had[name], q, strengths[name]) if name in had and name in strengths else q
+        for name, q in new.items()
+    }
+
+
+def _sum(had: Quantity, new: Quantity, strength: Parameter) -> Quantity:
+    value = min(max(had.value + new.value - strength.off, strength.low), strength.high)
+    return replace(new, value=value, sigma=hypot(had.sigma, new.sigma))
 
 
 def _fragments(effect: str, parameters: Mapping[str, Quantity]) -> dict[str, str]:

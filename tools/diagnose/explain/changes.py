@@ -23,7 +23,8 @@ from gritd.tools.diagnose.fit.evidence import log_bayes, log_evidence_singly
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.projection import Projected, Projection
 from gritd.tools.diagnose.noise.colour import whiten_rows
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screen import tail_quantile
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.tuning import TUNING

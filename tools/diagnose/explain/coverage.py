@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gritd.tools.diagnose.explain.wording import value_of
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.tuning import TUNING
 

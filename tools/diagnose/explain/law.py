@@ -26,7 +26,8 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
 from gritd.tools.diagnose.fit.signatures import signature
 from gritd.tools.diagnose.noise.colour import whiten
-from gritd.tools.diagnose.rig.interface import LawForm, Stack
+from gritd.tools.diagnose.rig.interface import LawForm
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.scans import in_step
 from gritd.tools.diagnose.screen.screening import Screening
 from gritd.tools.diagnose.search.search import Search

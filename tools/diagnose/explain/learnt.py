@@ -29,7 +29,9 @@ from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig, Stack
+from gritd.tools.diagnose.rig.constants import HAD
+from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 WHEN = ("delay", "blur")  # kinds of constants that move a channel in time
@@ -169,7 +171,7 @@ def _calibration(rig: Rig) -> list[int]:
         for number, constant in enumerate(rig.constants)
         if not constant.soil
         and not constant.changes
-        and constant.kind not in WHEN
+        and constant.kind not in (*WHEN, HAD)
         and constant.channel != other
     ]
 

@@ -24,7 +24,8 @@ from gritd.tools.diagnose.fit.projection import Projected, Projection
 from gritd.tools.diagnose.fit.ripples import orders_shown
 from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise.colour import whiten_rows
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.scans import candidates
 from gritd.tools.diagnose.screen.screen import tail_chance
 from gritd.tools.diagnose.screen.screening import Screening, chance_of

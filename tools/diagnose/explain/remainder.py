@@ -12,7 +12,7 @@ from gritd.tools.diagnose.explain.result import Discrepancy, Remainder
 from gritd.tools.diagnose.explain.wording import signed, value_of
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 

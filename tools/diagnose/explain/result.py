@@ -191,15 +191,17 @@ class Discrepancy:
 class Reference:
     """The campaign that a new one is held against: then names, places and fit speak of what is new.
 
-    verdict: of its own diagnosis, where one was given; covered: share of the new campaign's values
-        that lie where the reference was driven; outside: where the others lie.
+    verdict: of its own diagnosis; covered: share of the new campaign's values that lie where the
+        reference was driven; outside: where the others lie.
+    effects: that the reference shows by itself, which act in both campaigns: their parameters.
     """
 
-    files: tuple[str, ...]
-    verdict: str | None
-    bed: str
+    verdict: str
     covered: float
     outside: str
+    effects: Mapping[str, Mapping[str, Quantity]]
+    files: tuple[str, ...] = ()
+    bed: str = ""
 
 
 @dataclass(frozen=True)

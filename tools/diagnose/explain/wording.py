@@ -25,7 +25,8 @@ from gritd.tools.cli.wording import (
 from gritd.tools.diagnose.explain import changes
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.noise import lines
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 AT = {  # a value of a covariate, in words

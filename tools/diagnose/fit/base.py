@@ -21,7 +21,7 @@ from gritd.tools.diagnose.fit.signatures import raw_signatures, ripple_columns
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.noise.estimate import first_guess
 from gritd.tools.diagnose.noise.saturated import Explainable
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

@@ -35,7 +35,7 @@ from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
 

@@ -15,7 +15,8 @@ from gritd.estimator.model.discrepancy import features_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.noise.colour import Noise
-from gritd.tools.diagnose.rig.interface import Bools, FormSource, Stack
+from gritd.tools.diagnose.rig.interface import Bools, FormSource
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

@@ -16,7 +16,8 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Fitted
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 

@@ -19,7 +19,8 @@ from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.projection import Projection, ResizedProjections, Surrogates
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Bools, Constant, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 Maker = Callable[..., Effect]  # an effect's class, or one with some parameters given

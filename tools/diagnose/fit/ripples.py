@@ -7,7 +7,8 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.orders.lines import Line
-from gritd.tools.diagnose.rig.interface import Rig, Stack
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

@@ -30,7 +30,8 @@ from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 

@@ -13,7 +13,8 @@ import numpy as np
 from gritd.estimator.effects.base import Effect, Parameter
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature
-from gritd.tools.diagnose.rig.interface import Index, Rig, Stack
+from gritd.tools.diagnose.rig.interface import Index, Rig
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT, WAY
 

@@ -19,7 +19,8 @@ from scipy.linalg import solve_banded
 
 from gritd.estimator.compiled import whitening
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SLIGHT
 

@@ -23,7 +23,8 @@ from gritd.tools.diagnose.noise import replicates
 from gritd.tools.diagnose.noise.colour import Colour, Noise, products_of_innovations, step_of
 from gritd.tools.diagnose.noise.lines import standing
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SQUARE
 

@@ -16,7 +16,8 @@ from scipy.special import fdtrc
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.saturated import Explainable, saturated_mean
-from gritd.tools.diagnose.rig.interface import Index, Stack
+from gritd.tools.diagnose.rig.interface import Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN, SQUARE
 

@@ -22,7 +22,8 @@ from scipy.special import chdtrc
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.noise.colour import Colour, covariance
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

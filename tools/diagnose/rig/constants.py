@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gritd.estimator.config.settings import Calibration, Settings, Uncertain
+from gritd.estimator.config.settings import Calibration, ConfiguredEffect, Settings, Uncertain
 from gritd.estimator.effects import EFFECTS
 from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
@@ -20,20 +20,25 @@ UNITS = {
 }  # fmt: skip
 
 
+HAD = "had"  # kind of a parameter of an effect that a reference shows by itself
+
+
 def wheel_constants(
     settings: Settings,
     channels: Sequence[str],
     sets: WeightSets,
     weights_stated: bool,
+    had: Sequence[ConfiguredEffect],
 ) -> tuple[Constant, ...]:
-    """Soil, calibration of every channel, weights, configured effects.
+    """Soil, calibration of every channel, weights, configured effects, and those had anyway.
 
     weights_stated: whether all runs state their weights; else the load cell tells them.
     """
     return (
         *_soil(settings),
         *_calibrations(settings, channels, sets, weights_stated),
-        *_configured(settings),
+        *_floating(settings.effects),
+        *_floating(had, HAD),
     )
 
 
@@ -142,12 +147,10 @@ def _soil(settings: Settings) -> tuple[Constant, ...]:
     )
 
 
-def _configured(settings: Settings) -> tuple[Constant, ...]:
-    """Parameters of configured effects float within their own uncertainty, kept inside their
-    bounds.
-    """
+def _floating(effects: Sequence[ConfiguredEffect], kind: str = "") -> tuple[Constant, ...]:
+    """Parameters of effects float within their own uncertainty, kept inside their bounds."""
     constants = []
-    for effect in settings.effects:
+    for effect in effects:
         for p in EFFECTS[effect.name].parameters():
             stated = effect.parameters.get(p.name)
             if stated is not None and stated.sigma > 0.0:
@@ -159,6 +162,7 @@ def _configured(settings: Settings) -> tuple[Constant, ...]:
                         p.unit,
                         low=p.low,
                         high=p.high,
+                        kind=kind,
                     )
                 )
 

@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from gritd.estimator.config.settings import Settings
+from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.limits import limits, raised
@@ -33,9 +33,10 @@ from gritd.tools.cli.command import DAMAGED, CommandError
 from gritd.tools.diagnose.orders.campaigns import NO_LINES
 from gritd.tools.diagnose.orders.latency import Latency
 from gritd.tools.diagnose.rig.constants import of_channel
-from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Constant, FormSource, Held, Run
 from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.signals import Series
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 EFFECTS_OF_A_DRIVE = (
@@ -58,6 +59,7 @@ class DriveRig:
     held: Held | None = None
     lines = NO_LINES
     latencies: Sequence[Latency] = ()
+    reference = None
     menu = MENU
     heated = channels
     smooth = (
@@ -130,6 +132,10 @@ class DriveRig:
     def aside(self) -> AbstractContextManager[None]:
         """Nothing is kept of a prediction."""
         return nullcontext()
+
+    def having(self, effects: Sequence[ConfiguredEffect]) -> DriveRig:
+        """A drive has no reference that could show any."""
+        return self
 
     def predict(
         self, u: Array, effects: Sequence[Effect], everywhere: bool = False

@@ -15,7 +15,8 @@ from gritd.estimator.model.correction import Correction, weights_of
 from gritd.estimator.model.discrepancy import conditions_of, features_of
 from gritd.estimator.model.learnt import CHANNELS, LearntForm
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.interface import Run, Stack
+from gritd.tools.diagnose.rig.interface import Run
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

@@ -10,17 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.config.settings import ConfiguredEffect
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.model.discrepancy import Usual
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.orders.campaigns import Lines
 from gritd.tools.diagnose.orders.latency import Latency
+
+if TYPE_CHECKING:
+    from gritd.tools.diagnose.rig.stack import Stack
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
@@ -34,7 +37,8 @@ class Constant:
     log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept
         inside low … high.
     changes: the constant whose value in the new campaign is e^this times that in the reference.
-    channel, kind: of a calibration, what it is of: its scale, offset, delay or blur.
+    channel, kind: of a calibration, what it is of: its scale, offset, delay or blur; kind `had`: a
+        parameter of an effect that the rig has anyway.
     """
 
     name: str
@@ -197,6 +201,15 @@ class Rig(Protocol):
         """Of each run, whether candidates act in it; all of them where there is no reference."""
 
     @property
+    def reference(self) -> Rig | None:
+        """The rig with the runs of the reference alone; None where there is none."""
+
+    def having(self, effects: Sequence[ConfiguredEffect]) -> Rig:
+        """The rig with effects in both campaigns, whose parameters are constants. A candidate of
+        the same name is what is new of it.
+        """
+
+    @property
     def forms(self) -> tuple[FormSource, ...]:
         """Where the form of the model may be off."""
 
@@ -289,112 +302,3 @@ class Rig(Protocol):
     @property
     def shortcomings(self) -> Sequence[str]:
         """What these runs cannot show for want of a condition or a channel, a sentence each."""
-
-
-class Stack:
-    """The used values of all channels and runs as one vector (N,): by channel, run, then time."""
-
-    def __init__(self, rig: Rig) -> None:
-        self.rig = rig
-        self.parts = [
-            (channel, number) for channel in rig.channels for number in range(len(rig.runs))
-        ]
-        self._masks = [rig.runs[number].used[channel] for channel, number in self.parts]
-        sizes = [int(mask.sum()) for mask in self._masks]
-        self.channel: Index = np.repeat([rig.channels.index(c) for c, _ in self.parts], sizes)
-        self.run: Index = np.repeat([number for _, number in self.parts], sizes)
-        self.time: Array = self.joined([{c: run.time for c in rig.channels} for run in rig.runs])
-        self.size = int(sum(sizes))
-
-    def joined(self, values: Sequence[Mapping[str, Array]]) -> Array:
-        """Values (n,) per run and channel as one vector (N,)."""
-        pieces = [values[n][c][mask] for (c, n), mask in zip(self.parts, self._masks, strict=True)]
-        return np.concatenate(pieces) if pieces else np.zeros(0)
-
-    def covariate(self, name: str) -> Array:
-        """Of every value (N,), in the unit of the rig's `units`."""
-        return self.joined(
-            [dict.fromkeys(self.rig.channels, run.covariates[name]) for run in self.rig.runs]
-        )
-
-    @cached_property
-    def measured(self) -> Array:
-        """(N,) in the channels' units."""
-        return self.joined([run.measured for run in self.rig.runs])
-
-    @cached_property
-    def new(self) -> Bools:
-        """Values (N,) of runs in which candidates act."""
-        acting: Bools = np.array(self.rig.new)[self.run]
-        return acting
-
-    @cached_property
-    def idle(self) -> Bools:
-        """Marks the values (N,) at which a torque is the motor's alone: see Run."""
-        return np.asarray(self.joined([run.idle for run in self.rig.runs]), bool)
-
-    @cached_property
-    def motion_sigma(self) -> Array:
-        """(N,) in the channels' units: see Rig.motion_sigma."""
-        return self.joined(self.rig.motion_sigma)
-
-    @cached_property
-    def unrest(self) -> Array:
-        """Columns (N, k) in the channels' units: see Rig.unrest; those that act."""
-        return self._columns(self.rig.unrest)
-
-    @cached_property
-    def reliefs(self) -> Array:
-        """Columns (N, k) in the channels' units: see Rig.reliefs; those that act."""
-        return self._columns(self.rig.reliefs)
-
-    def _columns(self, parts: Sequence[Sequence[Mapping[str, Array]]]) -> Array:
-        columns = [self.joined(part) for part in parts]
-        return np.column_stack([np.zeros((self.size, 0)), *(c for c in columns if np.any(c))])
-
-    @cached_property
-    def gaps(self) -> Array:
-        """Time (N,) since the value before in the same channel and run [s]; inf at the first."""
-        return self.gaps_of(np.ones(self.size, bool))
-
-    def gaps_of(self, kept: Bools) -> Array:
-        """The same (n,), with only the n values kept that are marked (N,)."""
-        gap = np.diff(self.time[kept], prepend=0.0)
-        first = np.diff(self.channel[kept] * len(self.rig.runs) + self.run[kept], prepend=-1) != 0
-        return np.where(first, np.inf, gap)
-
-    def predict(self, u: Array, effects: Sequence[Effect] = (), everywhere: bool = False) -> Array:
-        """(N,) in the channels' units, for constants u (q,) in prior σ; everywhere: the effects act
-        in the reference campaign too.
-        """
-        if everywhere and self.referred:
-            return self.joined(self.rig.predict(u, effects, True))
-        return self.joined(self.rig.predict(u, effects))
-
-    @cached_property
-    def referred(self) -> bool:
-        """Whether some runs are of a reference campaign."""
-        return not all(self.rig.new)
-
-    @cached_property
-    def partial(self) -> dict[int, tuple[int, Array]]:
-        """Of each constant of `rig.partial`: the constant that it is a part of, and its
-        derivative's share of that one's (N,).
-        """
-        constants = self.rig.constants
-        place = {constant.name: i for i, constant in enumerate(constants)}
-        sigma = [constant.sigma for constant in constants]
-
-        out = {}
-        for name, (whole, masks) in self.rig.partial.items():
-            share = sigma[place[name]] / sigma[place[whole]]
-            marked = self.joined(
-                [dict.fromkeys(self.rig.channels, np.where(mask, share, 0.0)) for mask in masks]
-            )
-            out[place[name]] = place[whole], marked
-        return out
-
-    def of(self, channel: str) -> Bools:
-        """Marks the values of a channel (N,)."""
-        mask: Bools = self.channel == self.rig.channels.index(channel)
-        return mask

@@ -4,34 +4,29 @@ forward model out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from functools import cached_property
+from dataclasses import replace
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 
 from gritd.estimator.config.effects import configured
-from gritd.estimator.config.settings import Settings
+from gritd.estimator.config.settings import ConfiguredEffect, Settings
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.effects.empirical_law import EmpiricalLaw
 from gritd.estimator.terramechanics.soil import Array, Soil
 from gritd.tools.diagnose.orders.campaigns import NO_LINES, Lines
 from gritd.tools.diagnose.orders.latency import Latency
+from gritd.tools.diagnose.orders.phases import guide
 from gritd.tools.diagnose.rig.blur import blur_of, blur_of_reversal
 from gritd.tools.diagnose.rig.candidates import candidates, tables
 from gritd.tools.diagnose.rig.constants import UNITS, preparation, raised_to_floors, wheel_constants
 from gritd.tools.diagnose.rig.form import wheel_forms
+from gritd.tools.diagnose.rig.full_rate import aligned
 from gritd.tools.diagnose.rig.held import HeldForm
-from gritd.tools.diagnose.rig.interface import (
-    Bools,
-    Constant,
-    Foreseen,
-    FormSource,
-    LawForm,
-    Run,
-    Stack,
-)
+from gritd.tools.diagnose.rig.interface import Bools, Constant, Foreseen, FormSource, LawForm, Run
 from gritd.tools.diagnose.rig.load_error import load_errors_in
 from gritd.tools.diagnose.rig.measured_runs import (
     HOLDING_NOTE,
@@ -46,6 +41,7 @@ from gritd.tools.diagnose.rig.proposals import MENU
 from gritd.tools.diagnose.rig.recorded import channels_of, loss_measured, measured_of, motion_of
 from gritd.tools.diagnose.rig.relief import height_of, reliefs_of
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.stated_noise import noise_of_readings
 from gritd.tools.diagnose.rig.states import after_reversal
 from gritd.tools.diagnose.rig.unrest import unrest_in
@@ -93,15 +89,22 @@ class WheelRig:
         read_off: bool = True,
         lines: Lines = NO_LINES,
         latencies: Sequence[Latency] = (),
+        had: Sequence[ConfiguredEffect] = (),
     ) -> None:
         """reference: how many of the runs, the first ones, are of a reference campaign, in which no
         candidate acts; bed: whether the others drive on the same bed or on one prepared anew;
         read_off: where both torques are measured, channel torque is the loss between them;
-        lines, latencies: what the recordings show at their own rate.
+        lines, latencies: what the recordings show at their own rate; had: effects beyond the
+        configured ones that the rig has in both campaigns.
         """
+        self._again = partial(
+            WheelRig, signals, settings, reference, bed, read_off, lines, latencies
+        )
+        self._alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
+        self.baseline = configured(settings.effects)
+        known = [effect.name for effect in settings.effects]
         self.settings, self.lines, self.latencies = settings, lines, latencies
         self.new = [number >= reference for number in range(len(signals))]
-        self.baseline = configured(settings.effects)
         self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
 
         self._weights = weights = [weights_of(s, settings) for s in signals]
@@ -117,12 +120,13 @@ class WheelRig:
         self._anew = bool(reference) and bed == "prepared"
         prepared = preparation(settings) if self._anew else {}
         self.constants = (
-            *wheel_constants(settings, self.channels, self._driven.sets, stated),
+            *wheel_constants(settings, self.channels, self._driven.sets, stated, had),
             *(Constant(f"new_{n}", 0.0, sigma, changes=n) for n, sigma in prepared.items()),
         )
-        self.effects = candidates(signals, _left_out(self.baseline, stated))
+        self.effects = candidates(signals, _left_out(known, stated))
+        self._acting = replace(settings, effects=(*settings.effects, *had))
         self._prediction = Prediction(
-            settings,
+            self._acting,
             self.channels,
             self.constants,
             self._driven,
@@ -136,6 +140,17 @@ class WheelRig:
         self.caveats = [*self._sentences(signals, holding)]
         self.held = self._held_form()
         self.forms = self._forms(signals)
+
+    # ---- its reference ---------------------------------------------------------------------------
+
+    @property
+    def reference(self) -> WheelRig | None:
+        """See interface.Rig."""
+        return None if all(self.new) else self._alone()
+
+    def having(self, effects: Sequence[ConfiguredEffect]) -> WheelRig:
+        """See interface.Rig."""
+        return self._again(effects)
 
     # ---- prediction ------------------------------------------------------------------------------
 
@@ -267,7 +282,7 @@ class WheelRig:
                 motion,
                 self.settings,
                 self.channels,
-                sinkage_from_prior(motion, self.settings, soil, self.baseline),
+                sinkage_from_prior(motion, self.settings, soil, configured(self._acting.effects)),
                 idle,
                 self._tabled,
             )
@@ -301,6 +316,16 @@ class WheelRig:
         return wheel_forms(self.runs, self.channels, self.settings.wheel.radius, motor)
 
 
+def _reference_alone(
+    signals: Sequence[Signals], settings: Settings, read_off: bool, lines: Lines
+) -> WheelRig:
+    """Its runs and lines as those of a campaign of its own."""
+    own = Lines(lines.reference)
+    line = guide(own)
+    own = replace(own, aligned=line.at if line else 0.0)
+    return WheelRig(aligned(signals, line), settings, read_off=read_off, lines=own)
+
+
 def _driven(
     signals: Sequence[Signals], weights: Sequence[Weights], new: Sequence[bool], settings: Settings
 ) -> Driven:
@@ -318,8 +343,8 @@ def _driven(
     return Driven(motions, steps, new, weight_sets([np.asarray(m.load) for m in motions]))
 
 
-def _left_out(baseline: Sequence[Effect], weights_stated: bool) -> set[str]:
+def _left_out(configured: Collection[str], weights_stated: bool) -> set[str]:
     """Effects that are no candidates."""
-    names = {*LEFT_OUT, *(effect.name for effect in baseline)}
+    names = {*LEFT_OUT, *configured}
     # the measured load that drives the balance holds its friction already
     return names if weights_stated else names | {"load_axis_friction"}

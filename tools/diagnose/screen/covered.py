@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.estimator.model.discrepancy import features_of
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 
 

@@ -20,7 +20,8 @@ from gritd.tools.diagnose.fit.evidence import log_evidence
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate
 from gritd.tools.diagnose.fit.signatures import order_of
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screen import WhitenedSignature
 
 

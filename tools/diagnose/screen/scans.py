@@ -28,7 +28,8 @@ from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
-from gritd.tools.diagnose.rig.interface import Bools, Index, Stack
+from gritd.tools.diagnose.rig.interface import Bools, Index
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
 

@@ -26,7 +26,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.heldout import held_out
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.rig.interface import Bools, Stack
+from gritd.tools.diagnose.rig.interface import Bools
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.search.search import Search, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN

@@ -15,7 +15,7 @@ from gritd.estimator.filter.learnt_soil import learnt_soil
 from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.commands import diagnose, init
 from gritd.tools.diagnose.explain.apply import applied, rewritten
-from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity
+from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity, Reference
 from tests import forms
 from tests.tools.report.cases import base, soil
 
@@ -184,3 +184,20 @@ def test_a_second_discrepancy_takes_the_place_of_the_first(rig: Path) -> None:
     form = config.loads(second, "second", rig.parent).settings.discrepancy
     assert form is not None and form.load == 50.0
     assert second.count("discrepancy:") == 1
+
+
+def test_what_the_reference_shows_by_itself_is_written_too(rig: Path) -> None:
+    """And where there is more of it in the new campaign, the sum."""
+    had = {
+        "coulomb_friction": {"loss": Quantity(0.1, 0.02, "N*m")},
+        "viscous_friction": {"damping": Quantity(0.4, 0.1, "N*m*s/rad")},
+    }
+    held_against = Reference("explained", 1.0, "", had)
+    text, before = rig.read_text(), config.load(rig)
+    after = rewritten(text, before, found(reference=held_against))
+    effects = {e.name: e for e in config.loads(after, "new.yaml", rig.parent).settings.effects}
+    assert effects["coulomb_friction"].parameters["loss"].value == pytest.approx(0.3513, abs=1e-3)
+    assert effects["viscous_friction"].parameters["damping"].value == pytest.approx(0.4)
+
+    unknown = replace(found(reference=held_against), verdict="insufficient", hypotheses=())
+    assert "viscous_friction" not in rewritten(text, before, unknown)

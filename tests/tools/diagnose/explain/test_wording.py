@@ -7,7 +7,7 @@ import pytest
 
 from gritd.tools.diagnose.explain.wording import sentence
 from gritd.tools.diagnose.fit.shape import Shape
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan

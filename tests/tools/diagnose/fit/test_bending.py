@@ -14,7 +14,7 @@ from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.bending import _following, bending_freedoms
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record

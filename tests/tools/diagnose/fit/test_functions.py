@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gritd.tools.diagnose.fit.functions import smooth_signatures
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings

@@ -15,7 +15,7 @@ from gritd.tools.diagnose.fit.shared import (
     shared_columns,
     without_ripples,
 )
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings

@@ -13,8 +13,8 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.noise.colour import Colour, Noise
 from gritd.tools.diagnose.rig.drive import DriveRig
-from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import Series
+from gritd.tools.diagnose.rig.stack import Stack
 
 INERTIA, DAMPING, LOSS = 95.0, 200.0, 20.0
 RATE = 1000.0  # [Hz] of the log

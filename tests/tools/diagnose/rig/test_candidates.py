@@ -12,8 +12,8 @@ from gritd.tools.diagnose.fit.functions import smooth_signatures
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.fit.signatures import highest_order
 from gritd.tools.diagnose.rig.candidates import candidates, steady_states
-from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings

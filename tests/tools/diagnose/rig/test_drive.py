@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gritd.tools.cli.command import CommandError
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from tests.tools.diagnose.rig.drives import (
     DAMPING,
     INERTIA,

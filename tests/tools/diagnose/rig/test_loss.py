@@ -12,9 +12,9 @@ import pytest
 from gritd.estimator.effects import make
 from gritd.tools.diagnose.fit.discrepancy import _columns
 from gritd.tools.diagnose.method import diagnose, fit_base
-from gritd.tools.diagnose.rig.interface import Stack
 from gritd.tools.diagnose.rig.recorded import measured_of
 from gritd.tools.diagnose.rig.signals import Signals
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import HOLDING_NOTE, LOSS_NOTE, WheelRig
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import group, plan, settings

@@ -9,7 +9,7 @@ import pytest
 
 from gritd.estimator.config.settings import BedSettings, Repeatability
 from gritd.tools.diagnose.rig.constants import preparation
-from gritd.tools.diagnose.rig.interface import Stack
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import Bed, WheelRig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record

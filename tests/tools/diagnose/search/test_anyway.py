@@ -1,0 +1,99 @@
+"""What a reference shows by itself acts in both campaigns, and what is new is more of it or another
+thing.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import replace
+
+import numpy as np
+
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
+from gritd.estimator.effects import make
+from gritd.estimator.effects.base import Effect
+from gritd.tools.diagnose.method import first_answer, fit_base
+from gritd.tools.diagnose.rig.stack import Stack
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search.anyway import had_anyway
+from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
+
+LAG = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.06})
+RIPPLE = make("gear_ripple", {"ripple_cos": 0.2, "order": 23.0})
+HAD = ConfiguredEffect(
+    "contact_relaxation",
+    {
+        "forces": Uncertain(1.0, 3.0),
+        "sinkage": Uncertain(1.0, 3.0),
+        "length": Uncertain(0.06, 0.02),
+    },
+)
+
+
+def pair() -> WheelRig:
+    """Two campaigns of three runs, nothing acting."""
+    before, after = record(plan(seed=3), ()), record(plan(seed=4), ())
+    return WheelRig([*before, *after], settings(), len(before), "same")
+
+
+def test_it_acts_in_both_and_its_parameters_are_constants() -> None:
+    plain = pair()
+    having = plain.having([HAD])
+    more = [c.name for c in having.constants[len(plain.constants) :]]
+    assert more == [f"contact_relaxation.{name}" for name in HAD.parameters]
+
+    known, own = np.zeros(len(plain.constants)), np.zeros(len(having.constants))
+    acting = Stack(plain).predict(known, (LAG,), everywhere=True)
+    np.testing.assert_allclose(Stack(having).predict(own), acting)
+
+    longer = own.copy()
+    longer[having.constants.index(having.constants[-1])] = 1.0
+    other = replace(LAG, length=0.08)
+    told = Stack(plain).predict(known, (other,), everywhere=True)
+    np.testing.assert_allclose(Stack(having).predict(longer), told)
+
+
+def test_more_of_it_may_be_new_and_the_configuration_does_not_hold_it() -> None:
+    having = pair().having([HAD])
+    assert "contact_relaxation" in having.effects
+    assert "contact_relaxation" not in [effect.name for effect in having.baseline]
+
+
+def test_the_reference_alone_is_its_runs_and_a_campaign_without_one_has_none() -> None:
+    both = pair()
+    alone = both.reference
+    assert alone is not None and alone.reference is None and all(alone.new)
+    for own, run in zip(alone.runs, both.runs[:3], strict=True):
+        assert own.name == run.name
+        for channel in alone.channels:
+            np.testing.assert_array_equal(own.measured[channel], run.measured[channel])
+
+
+def searched(effect: Effect | None, quick: bool) -> Search:
+    rig = WheelRig(record(plan(seed=3), () if effect is None else (effect,)), settings())
+    rng = np.random.default_rng(0)
+    with first_answer() if quick else nullcontext():
+        return search_models(prepare_screening(fit_base(rig, rng), rng))
+
+
+def test_a_lag_lasts() -> None:
+    search = searched(LAG, True)
+    (found,) = had_anyway(search, search.bare)
+    assert found.name == "contact_relaxation"
+    assert abs(found.parameters["length"].value - 0.06) < 0.01
+    assert found.parameters["forces"].sigma == HAD.parameters["forces"].sigma
+
+
+def test_a_ripple_does_not() -> None:
+    """It has another phase in each run, and its own freedom."""
+    search = searched(RIPPLE, True)
+    assert "gear_ripple" in search.best().names
+    assert had_anyway(search, search.bare) == ()
+
+
+def test_nothing_is_had_where_nothing_alarms() -> None:
+    search = searched(None, False)
+    assert had_anyway(search, search.bare) == ()

@@ -1,0 +1,43 @@
+"""What a rig does anyway: the listed effects that its reference campaign shows by itself.
+
+No explanation is asked for of a reference, and what it does is a freedom of the fit
+(fit/reference.py). But that freedom is linear about the equations, and habits are not: the forces
+of a wheel that follow over 60 mm are no multiple of those that follow over 30 mm. What a straight
+line leaves of them becomes a large discrepancy of form, which hides what is new. So the reference
+is first searched as any campaign is, and the effects found act in both campaigns, with parameters
+that both tell.
+
+An effect that goes with time, heat, place or run may be another one a day later, and a ripple has
+another phase in each run: those stay with the freedoms of fit/shared.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
+from gritd.tools.diagnose.fit.functions import BEYOND_FORM
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.search.search import TURNING, Search
+
+PASSING = {*BEYOND_FORM, TURNING}
+
+
+def had_anyway(search: Search, best: Model) -> tuple[ConfiguredEffect, ...]:
+    """The lasting effects of what is decided of a reference alone, at their fitted values, each
+    with the sigma of an effect of which nothing is known: both campaigns will tell it anew.
+
+    best: the model that is accepted, or the bare one. Then the likeliest effects are taken. They
+    predict better than none, whether their names can be believed or not.
+    """
+    model = best if best.names else search.best()
+    effects = search.problem.stack.rig.effects
+    lasting = [n for n in model.names if effects[n].fingerprint.covariate not in PASSING]
+    return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in lasting)
+
+
+def _parameters(model: Model, name: str) -> Iterator[tuple[str, Uncertain]]:
+    for free, x in zip(model.fitted.free, model.fitted.x, strict=True):
+        if free.name == name:
+            sigma = free.parameter.sigma / free.weight
+            yield free.parameter.name, Uncertain(free.value(float(x)), sigma)

@@ -26,6 +26,10 @@ class Sizes:
     values: tuple[float, ...] = (1.0,)
     prior: tuple[float, ...] = (1.0,)
 
+    def up_to(self, number: int) -> Sizes:
+        """Without those above the one of this number."""
+        return Sizes(self.values[: number + 1], self.prior[: number + 1])
+
     @property
     def log_prior(self) -> Array:
         """Of each size (n,)."""

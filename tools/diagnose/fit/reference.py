@@ -21,6 +21,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.base import BaseFit, refit_beside, sized_beside
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
 from gritd.tools.diagnose.fit.shared import (
+    lasting,
     rippling_columns,
     shared_columns,
     shared_freedoms,
@@ -54,7 +55,9 @@ def fit_beside_reference(rough: BaseFit, rng: np.random.Generator) -> BaseFit:
     noise = restless(louder(noise, alone), calm)
 
     usual = _of_reference(again, noise, shared, ripples)
-    return sized_beside(usual, noise, shared_freedoms(noise, shared, ripples), usual.model.sizes)
+    more = shared_freedoms(noise, shared, ripples)
+    sizes = usual.model.sizes
+    return sized_beside(usual, noise, lasting(more, sizes[len(sizes) - len(more) :]), sizes)
 
 
 def _of_reference(

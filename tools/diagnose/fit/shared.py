@@ -18,7 +18,7 @@ known size. A run of larger forces or torques may ripple more in proportion, as 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
+from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.ripples import restored
 from gritd.tools.diagnose.fit.signatures import order_of, raw_signatures
 from gritd.tools.diagnose.noise.colour import Noise, whiten
@@ -105,12 +106,26 @@ def shared_freedoms(
     """Freedoms of the effects (N, m) by what they are of, and the ripples (N, r)."""
     sizes = Sizes(TUNING.fit.shared_sizes, TUNING.fit.shared_prior)
     freedoms = [
-        Freedom(f"{part} in both", *_reduced(columns, whiten(noise, columns)), sizes)
+        Freedom(_name(part), *_reduced(columns, whiten(noise, columns)), sizes)
         for part, columns in shared.items()
     ]
     if ripples.shape[1]:
         freedoms.append(Freedom("ripples in both", ripples, whiten(noise, ripples), Sizes()))
     return tuple(f for f in freedoms if f.columns.shape[1])
+
+
+def lasting(freedoms: Sequence[Freedom], sizes: Chosen) -> tuple[Freedom, ...]:
+    """The freedoms with what varies with time, heat, place or run no larger than its size in the
+    reference. Where nothing dried, warmed up or crept then, it is news if something does now.
+    """
+    return tuple(
+        replace(f, sizes=f.sizes.up_to(number)) if f.name == _name(CHANGES) else f
+        for f, number in zip(freedoms, sizes, strict=True)
+    )
+
+
+def _name(part: str) -> str:
+    return f"{part} in both"
 
 
 def _reduced(columns: Array, whitened: Array) -> tuple[Array, Array]:

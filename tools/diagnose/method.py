@@ -3,7 +3,7 @@
     signals      readings of every recording on a common grid           rig/signals.py
     ripples      of the wheel, at the recordings' own rate               orders/lines.py
     rig          channels, constants with their priors, a prediction     rig/interface.py
-    reference    what it shows by itself, the steps below for it alone   search/anyway.py
+    reference    what it shows by itself, the steps below for it alone   verdict/anyway.py
     noise        size and colour of each channel, from the recordings    noise/estimate.py
     fit          soil and calibration within what is known of them       fit/base.py
     screen       evidence of every effect, and of misfits without name   screen/screening.py
@@ -33,9 +33,9 @@ from gritd.tools.diagnose.noise.estimate import estimate
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.anyway import had_anyway
 from gritd.tools.diagnose.search.search import Search, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
+from gritd.tools.diagnose.verdict.anyway import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
 
 
@@ -71,9 +71,8 @@ def _diagnose(
         return _of_campaign(rig, seed, redo, step, jobs)
 
     step("fitting the reference")
-    search = _searched(alone, seed, lambda _: None, jobs)
-    decision = decide(search, jobs)
-    rig = rig.having(had_anyway(search, decision.best))
+    decision = decide(_searched(alone, seed, lambda _: None, jobs), jobs)
+    rig = rig.having(had_anyway(alone, decision))
     return with_reference(_of_campaign(rig, seed, redo, step, jobs), rig, decision.verdict)
 
 

@@ -18,21 +18,23 @@ from collections.abc import Iterator
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.search.search import TURNING, Search
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.search.search import TURNING
+from gritd.tools.diagnose.verdict.decision import Decision
 
 PASSING = {*BEYOND_FORM, TURNING}
 
 
-def had_anyway(search: Search, best: Model) -> tuple[ConfiguredEffect, ...]:
-    """The lasting effects of what is decided of a reference alone, at their fitted values, each
-    with the sigma of an effect of which nothing is known: both campaigns will tell it anew.
+def had_anyway(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ...]:
+    """The lasting effects that are accepted of a reference alone, at their fitted values, each with
+    the sigma of an effect of which nothing is known: both campaigns will tell it anew.
 
-    best: the model that is accepted, or the bare one. Then the likeliest effects are taken. They
-    predict better than none, whether their names can be believed or not.
+    Only those in whose place no other could stand. A name that its own campaign does not tell from
+    others, as steady states often do not, would predict the new campaign by the wrong one.
     """
-    model = best if best.names else search.best()
-    effects = search.problem.stack.rig.effects
-    lasting = [n for n in model.names if effects[n].fingerprint.covariate not in PASSING]
+    model = decision.best
+    sure = [name for name in model.names if not decision.groups[name]]
+    lasting = [n for n in sure if rig.effects[n].fingerprint.covariate not in PASSING]
     return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in lasting)
 
 

@@ -16,8 +16,10 @@ from gritd.tools.diagnose.method import first_answer, fit_base
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.anyway import had_anyway
-from gritd.tools.diagnose.search.search import Search, search_models
+from gritd.tools.diagnose.search.search import search_models
+from gritd.tools.diagnose.verdict.anyway import had_anyway
+from gritd.tools.diagnose.verdict.decide import decide
+from gritd.tools.diagnose.verdict.decision import Decision
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -72,28 +74,31 @@ def test_the_reference_alone_is_its_runs_and_a_campaign_without_one_has_none() -
             np.testing.assert_array_equal(own.measured[channel], run.measured[channel])
 
 
-def searched(effect: Effect | None, quick: bool) -> Search:
-    rig = WheelRig(record(plan(seed=3), () if effect is None else (effect,)), settings())
+def decided(*effects: Effect, quick: bool = True) -> tuple[WheelRig, Decision]:
+    """On a campaign without a reference."""
+    rig = WheelRig(record(plan(seed=3), effects), settings())
     rng = np.random.default_rng(0)
     with first_answer() if quick else nullcontext():
-        return search_models(prepare_screening(fit_base(rig, rng), rng))
+        return rig, decide(search_models(prepare_screening(fit_base(rig, rng), rng)))
 
 
-def test_a_lag_lasts() -> None:
-    search = searched(LAG, True)
-    (found,) = had_anyway(search, search.bare)
+def test_a_lag_lasts_if_nothing_could_stand_in_its_place() -> None:
+    rig, decision = decided(LAG)
+    (found,) = had_anyway(rig, decision)
     assert found.name == "contact_relaxation"
     assert abs(found.parameters["length"].value - 0.06) < 0.01
     assert found.parameters["forces"].sigma == HAD.parameters["forces"].sigma
 
+    unsure = replace(decision, groups={"contact_relaxation": ("sensor_latency",)})
+    assert had_anyway(rig, unsure) == ()
 
-def test_a_ripple_does_not() -> None:
-    """It has another phase in each run, and its own freedom."""
-    search = searched(RIPPLE, True)
-    assert "gear_ripple" in search.best().names
-    assert had_anyway(search, search.bare) == ()
+
+def test_a_ripple_has_another_phase_in_each_run() -> None:
+    rig, decision = decided(RIPPLE)
+    assert decision.best.names == ("gear_ripple",)
+    assert had_anyway(rig, decision) == ()
 
 
 def test_nothing_is_had_where_nothing_alarms() -> None:
-    search = searched(None, False)
-    assert had_anyway(search, search.bare) == ()
+    rig, decision = decided(quick=False)
+    assert decision.verdict == "consistent" and had_anyway(rig, decision) == ()

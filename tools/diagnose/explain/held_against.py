@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from gritd.tools.diagnose.explain.coverage import coverage
 from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, Reference
-from gritd.tools.diagnose.rig.constants import HAD
-from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 
 

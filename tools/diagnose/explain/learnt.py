@@ -29,8 +29,7 @@ from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
-from gritd.tools.diagnose.rig.constants import HAD
-from gritd.tools.diagnose.rig.interface import Bools, FormSource, Rig
+from gritd.tools.diagnose.rig.interface import HAD, Bools, FormSource, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 

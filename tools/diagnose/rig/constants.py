@@ -8,7 +8,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Calibration, ConfiguredEffect, Settings, Uncertain
 from gritd.estimator.effects import EFFECTS
-from gritd.tools.diagnose.rig.interface import Constant
+from gritd.tools.diagnose.rig.interface import HAD, Constant
 from gritd.tools.diagnose.rig.weight_sets import WeightSets
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SIZE, SPAN
@@ -18,9 +18,6 @@ UNITS = {
     "slip": "-", "speed": "m/s", "wheel_angle": "rad", "position": "m", "time": "s",
     "acceleration": "rad/s²", "heat": "A²·s", "run": "-", "direction": "-", "constant": "-",
 }  # fmt: skip
-
-
-HAD = "had"  # kind of a parameter of an effect that a reference shows by itself
 
 
 def wheel_constants(

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Bools = NDArray[np.bool_]
 Index = NDArray[np.intp]
+HAD = "had"  # kind of a constant: a parameter of an effect that a reference shows by itself
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,7 @@ class Constant:
     log: value · exp(u σ/value), for what is positive and known to a share; else value + u σ, kept
         inside low … high.
     changes: the constant whose value in the new campaign is e^this times that in the reference.
-    channel, kind: of a calibration, what it is of: its scale, offset, delay or blur; kind `had`: a
-        parameter of an effect that the rig has anyway.
+    channel, kind: of a calibration, what it is of: its scale, offset, delay or blur; or HAD.
     """
 
     name: str

@@ -23,7 +23,7 @@ import numpy as np
 
 from gritd.estimator.config import configuration as config
 from gritd.tools.cli.command import Parser
-from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.method import accustomed, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.signals import read_all
 from gritd.tools.diagnose.screen.screen import Screen
@@ -101,6 +101,7 @@ def screen_of(folder: Path, bed: str = "") -> Screen:
     rng = np.random.default_rng(0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
+        rig, _ = accustomed(rig)
         return screen_of_base(prepare_screening(fit_base(rig, rng), rng))
 
 

@@ -38,7 +38,7 @@ from gritd.tools.cli.command import CommandError, Parser
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Ground, Problem
-from gritd.tools.diagnose.method import fit_base
+from gritd.tools.diagnose.method import accustomed, fit_base
 from gritd.tools.diagnose.rig.adapter import rig_of
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.rig.signals import read_all
@@ -194,6 +194,7 @@ def run_case(case: Case) -> Outcome:
         try:
             rig = _recorded(case.folder) if case.folder else _drawn(rng)
             noise = np.random.default_rng(0)
+            rig, _ = accustomed(rig)
             search = search_models(prepare_screening(fit_base(rig, noise), noise))
             return Outcome(case.name, tuple(compared(name, search, case.starts, rng)))
         except CommandError as error:

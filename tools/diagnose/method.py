@@ -18,7 +18,7 @@ it. Each step is one call, and hands one frozen value to the next.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from gritd.tools.diagnose.search.search import Search, search_models
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.diagnose.verdict.anyway import had_anyway
 from gritd.tools.diagnose.verdict.decide import decide
+from gritd.tools.diagnose.verdict.decision import Verdict
 
 
 def diagnose(
@@ -52,8 +53,11 @@ def diagnose(
     redo: kept in the result; step: is told what begins; jobs: processes that fit; quick: a first
     answer, for which only the likeliest effects are fitted, each alone.
     """
-    with first_answer() if quick else nullcontext():
-        return _diagnose(rig, seed, {**(redo or {}), "seed": seed}, step, jobs)
+    kept = {**(redo or {}), "seed": seed}
+    if quick:  # what the reference shows by itself takes a search of its own
+        with first_answer():
+            return _diagnose(rig, None, seed, kept, step, jobs)
+    return _diagnose(*accustomed(rig, seed, step, jobs), seed, kept, step, jobs)
 
 
 @contextmanager
@@ -64,27 +68,34 @@ def first_answer() -> Iterator[None]:
 
 
 def _diagnose(
-    rig: Rig, seed: int, redo: Mapping[str, Any], step: Callable[[str], None], jobs: int
-) -> Diagnosis:
-    alone = rig.reference
-    if alone is None:
-        return _of_campaign(rig, seed, redo, step, jobs)
-
-    step("fitting the reference")
-    decision = decide(_searched(alone, seed, lambda _: None, jobs), jobs)
-    rig = rig.having(had_anyway(alone, decision))
-    return with_reference(_of_campaign(rig, seed, redo, step, jobs), rig, decision.verdict)
-
-
-def _of_campaign(
-    rig: Rig, seed: int, redo: Mapping[str, Any], step: Callable[[str], None], jobs: int
+    rig: Rig,
+    of_reference: Verdict | None,
+    seed: int,
+    redo: Mapping[str, Any],
+    step: Callable[[str], None],
+    jobs: int,
 ) -> Diagnosis:
     step("fitting the soil and the noise")
     search = _searched(rig, seed, step, jobs)
     decision = decide(search, jobs)
 
     step("holding out runs and conditions")
-    return explain(search, decision, redo, jobs)
+    found = explain(search, decision, redo, jobs)
+    return found if all(rig.new) else with_reference(found, rig, of_reference)
+
+
+def accustomed(
+    rig: Rig, seed: int = 0, step: Callable[[str], None] = lambda _: None, jobs: int = 1
+) -> tuple[Rig, Verdict | None]:
+    """The rig with what its reference shows by itself in both campaigns, and the verdict on that; a
+    rig without a reference as it is.
+    """
+    alone = rig.reference
+    if alone is None:
+        return rig, None
+    step("fitting the reference")
+    decision = decide(_searched(alone, seed, lambda _: None, jobs), jobs)
+    return rig.having(had_anyway(alone, decision)), decision.verdict
 
 
 def _searched(rig: Rig, seed: int, step: Callable[[str], None], jobs: int) -> Search:

@@ -10,7 +10,7 @@ from gritd.tools.diagnose.rig.interface import HAD, Rig
 from gritd.tools.diagnose.rig.stack import Stack
 
 
-def with_reference(diagnosis: Diagnosis, rig: Rig, verdict: str) -> Diagnosis:
+def with_reference(diagnosis: Diagnosis, rig: Rig, verdict: str | None) -> Diagnosis:
     """The result with the reference's own verdict, what it shows by itself, and how much of the new
     campaign it covers.
     """

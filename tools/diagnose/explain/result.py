@@ -191,12 +191,12 @@ class Discrepancy:
 class Reference:
     """The campaign that a new one is held against: then names, places and fit speak of what is new.
 
-    verdict: of its own diagnosis; covered: share of the new campaign's values that lie where the
-        reference was driven; outside: where the others lie.
+    verdict: of its own diagnosis, where there was one; covered: share of the new campaign's values
+        that lie where the reference was driven; outside: where the others lie.
     effects: that the reference shows by itself, which act in both campaigns: their parameters.
     """
 
-    verdict: str
+    verdict: str | None
     covered: float
     outside: str
     effects: Mapping[str, Mapping[str, Quantity]]

@@ -93,14 +93,12 @@ def judged(
     shares = np.exp(weights - logsumexp(weights)) * (1.0 - calibration.lapse)
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    best = _best(every)
     unlisted = sum(w.probability for w in every if not w.names)
+    listed = [w for w in every if w.names]
+    likely = unlisted < TUNING.verdict.nameless_most * (1.0 - calibration.lapse)
+    best = _best(listed if likely and listed else every)
     share = taken_share(search, best) if best.names else 0.0
-    named = (
-        bool(best.names)
-        and unlisted < TUNING.verdict.nameless_most * (1.0 - calibration.lapse)
-        and share > TUNING.verdict.explained_share
-    )
+    named = likely and bool(best.names) and share > TUNING.verdict.explained_share
     return Decision(
         "explained" if named else "unlisted",
         best if named else search.bare,
@@ -115,7 +113,7 @@ def judged(
 
 def _best(weighed: Sequence[Weighed]) -> Model:
     """The likeliest model of the likeliest number of effects: many alike sets of two weigh together
-    against one.
+    against one. Effects against none weigh together, however many they are: see judged.
     """
     sizes = {len(w.names) for w in weighed}
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -105,6 +105,28 @@ def test_the_verdict_is_that_of_the_evidence(monkeypatch: pytest.MonkeyPatch) ->
     strange = _judged(200.0, 900.0, 1.0, monkeypatch)
     assert strange.verdict == "unlisted" and strange.best.names == ()
     assert strange.probability["a"] + strange.unlisted == pytest.approx(1.0 - learnt().lapse)
+
+
+def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """None is the likeliest number, but two of three say that there is something listed."""
+    monkeypatch.setattr(decide, "taken_share", lambda *_: 1.0)
+    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    bare, one, two = (SimpleNamespace(names=names) for names in ((), ("a",), ("a", "b")))
+    by = learnt(30)
+    weighed: Any = [
+        decide.Weighed(bare, (), True, 900.0 - by.temperature * by.nameless),
+        decide.Weighed(one, ("a",), False, 900.0 - by.temperature * (by.listed - np.log(30))),
+        decide.Weighed(
+            two,
+            ("a", "b"),
+            False,
+            900.0 - by.temperature * (by.listed + by.more - 2.0 * np.log(30) + 0.2),
+        ),
+    ]
+    found = decide.judged(cast(Any, SimpleNamespace(bare=bare, screening=None)), weighed, None, by)
+    assert found.verdict == "explained" and found.best.names == ("a",)
 
 
 def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(

@@ -26,8 +26,9 @@ $(READY): pyproject.toml $(wildcard estimator/compiled/*.[ch])
 demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
 	@$(BIN)/gritd demo
 
+# a worker more than two cores: some tests wait for real time
 test: $(READY) ## the tests, without the slow ones
-	@$(BIN)/python -m pytest --quiet -n 2
+	@$(BIN)/python -m pytest --quiet -n 3
 
 tutorial: $(READY) ## the first day and the notebooks of docs/first-day, word for word
 	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs

@@ -25,7 +25,14 @@ def parameters(diagnosis: Diagnosis) -> Markup | None:
     parameters = [
         (h.effect, name, q) for h in diagnosis.accepted for name, q in h.parameters.items()
     ]
-    parameters += [("calibration", name, q) for name, q in _strayed(diagnosis.nuisance).items()]
+    had = diagnosis.reference.effects if diagnosis.reference is not None else {}
+    parameters += [
+        (f"{effect} in both campaigns", name, q)
+        for effect, of_both in had.items()
+        for name, q in of_both.items()
+    ]
+    own = {n: q for n, q in diagnosis.nuisance.items() if n.partition(".")[0] not in had}
+    parameters += [("calibration", name, q) for name, q in _strayed(own).items()]
     rows = [(f"{name_of(of)}: {name_of(name)}", quantity(q)) for of, name, q in parameters]
     if not rows:
         return None

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from gritd.tools.diagnose.explain.result import Hypothesis, Quantity
+from gritd.tools.diagnose.explain.result import Hypothesis, Quantity, Reference
 from gritd.tools.report import diagnosis, hypotheses
 from gritd.tools.report.html import escape, tag
 from tests.tools.report import cases
@@ -363,3 +363,13 @@ def spaced(page: str) -> str:
     root = parsed(page)
     entries = next(e for e in root.iter("dl") if e.get("class") == "masthead")
     return " ".join(" ".join(entries.itertext()).split())
+
+
+def test_what_the_reference_shows_too_is_told_and_is_no_calibration() -> None:
+    lag = {"length": Quantity(0.046, 0.002, "m")}
+    held_against = Reference("explained", 1.0, "", {"contact_relaxation": lag})
+    nuisance = {"contact_relaxation.length": lag["length"]}
+    page = unescape(diagnosis.render(cases.base(nuisance=nuisance, reference=held_against)))
+    assert "contact relaxation in both campaigns: length" in page
+    assert "46.0 ± 2.0 mm" in page and "calibration:" not in page
+    assert "The reference shows contact relaxation by itself" in page

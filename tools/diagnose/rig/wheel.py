@@ -343,8 +343,8 @@ def _driven(
     return Driven(motions, steps, new, weight_sets([np.asarray(m.load) for m in motions]))
 
 
-def _left_out(configured: Collection[str], weights_stated: bool) -> set[str]:
+def _left_out(known: Collection[str], weights_stated: bool) -> set[str]:
     """Effects that are no candidates."""
-    names = {*LEFT_OUT, *configured}
+    names = {*LEFT_OUT, *known}
     # the measured load that drives the balance holds its friction already
     return names if weights_stated else names | {"load_axis_friction"}

@@ -224,6 +224,13 @@ class Effect:
         ).strip()
 
 
+def order_of(effect: type[Effect]) -> str | None:
+    """The shape of an effect that is an order of the wheel angle, if it has one."""
+    return next(
+        (p.name for p in effect.parameters() if p.role == "shape" and p.scan and not p.unit), None
+    )
+
+
 def _parameter(
     name: str,
     centre: Any,

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import Effect, order_of
 from gritd.tools.diagnose.explain.result import Late, Quantity, Ripple
-from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.orders.lines import Line
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.tuning import TUNING

@@ -27,13 +27,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
-from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING

@@ -100,13 +100,6 @@ def _derivative(
     return np.full(stack.size, np.nan)
 
 
-def order_of(effect: type[Effect]) -> str | None:
-    """The shape of an effect that is an order of the wheel angle, if it has one."""
-    return next(
-        (p.name for p in effect.parameters() if p.role == "shape" and p.scan and not p.unit), None
-    )
-
-
 def shape_grid(rig: Rig, effect: type[Effect]) -> Iterator[dict[str, float]]:
     """Values of the effect's shapes worth trying on these recordings, all combinations."""
     shapes = [p for p in effect.parameters() if p.role == "shape"]
@@ -169,11 +162,16 @@ def orders(rig: Rig, parameter: Parameter) -> list[float]:
     )
 
     top = min(parameter.high, TUNING.fit.highest_order, highest)
-    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
-    least = max(parameter.low, TUNING.fit.least_turns / max(turned, SLIGHT))
+    least = max(parameter.low, TUNING.fit.least_turns * resolved_order(rig))
 
     whole = np.arange(np.ceil(least), np.floor(top) + 1.0)
     return [float(x) for x in whole[:: max(1, -(-len(whole) // TUNING.fit.most_orders))]]
+
+
+def resolved_order(rig: Rig) -> float:
+    """Ripples a turn by which two ripples must differ for the longest run to tell them apart."""
+    turned = max(float(np.ptp(run.covariates["wheel_angle"])) for run in rig.runs) / (2.0 * np.pi)
+    return 1.0 / max(turned, SLIGHT)
 
 
 def highest_order(stack: Stack) -> float:

@@ -18,11 +18,13 @@ Runs = Sequence[Mapping[str, Samples]]
 class Lines:
     """Lines of the new campaign and of the reference, which may be none. aligned: the ripples a
     turn by which the wheel angles of the new runs were aligned (phases.py); 0 where they were not.
+    configured: the ripples a turn of what the configuration has already.
     """
 
     new: tuple[Line, ...] = ()
     reference: tuple[Line, ...] = ()
     aligned: float = 0.0
+    configured: tuple[float, ...] = ()
 
     @property
     def every(self) -> tuple[Line, ...]:
@@ -44,11 +46,16 @@ class Lines:
         return own + [line for line in more if not any(same(line, other) for other in own)]
 
     def fresh(self, axis: str = "angle") -> list[Line]:
-        """Lines of the new campaign that are no harmonics, and that the reference does not have at
-        half their size at least.
+        """Lines of the new campaign that are no harmonics, that the configuration does not have,
+        and that the reference does not have at half their size at least.
         """
         own = (line for line in self.new if line.axis == axis and not line.harmonic)
+        own = (line for line in own if not self._configured(line))
         return [x for x in own if self.before(x) <= TUNING.orders.known * x.size]
+
+    def _configured(self, line: Line) -> bool:
+        near = TUNING.orders.same * line.cell
+        return line.axis == "angle" and any(abs(line.at - n) < near for n in self.configured)
 
     def before(self, line: Line) -> float:
         """Size of a line in the reference. One of few turns may stand there without being found

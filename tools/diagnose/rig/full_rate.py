@@ -10,6 +10,8 @@ from itertools import accumulate
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.effects import EFFECTS
+from gritd.estimator.effects.base import order_of
 from gritd.estimator.offline.windows import block_mean
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
@@ -32,7 +34,14 @@ def with_lines(
     hold. reference: so many of the runs, the first ones, are of a reference campaign.
     """
     reads = [partial(series_of, recording, settings) for recording in recordings]
-    return beside_lines(signals, reads, settings.drive.torque_constant.value, reference)
+    beside, lines = beside_lines(signals, reads, settings.drive.torque_constant.value, reference)
+    return beside, replace(lines, configured=_configured_orders(settings))
+
+
+def _configured_orders(settings: Settings) -> tuple[float, ...]:
+    """Ripples a turn of the configured effects."""
+    known = ((e.parameters, order_of(EFFECTS[e.name])) for e in settings.effects)
+    return tuple(values[order].value for values, order in known if order in values)
 
 
 def beside_lines(

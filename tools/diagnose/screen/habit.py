@@ -15,11 +15,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import logsumexp
 
+from gritd.estimator.effects.base import order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import log_evidence
 from gritd.tools.diagnose.fit.projection import Projection
 from gritd.tools.diagnose.fit.shape import Candidate
-from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.rig.interface import Bools
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.screen import WhitenedSignature

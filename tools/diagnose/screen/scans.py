@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import digamma
 
+from gritd.estimator.effects.base import order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.fit.evidence import Signature, log_sum, strength_sizes
 from gritd.tools.diagnose.fit.functions import size_of
@@ -25,7 +26,6 @@ from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.fit.projection import Block, Projection, Surrogates
 from gritd.tools.diagnose.fit.ripples import line_columns
 from gritd.tools.diagnose.fit.shape import Shape
-from gritd.tools.diagnose.fit.signatures import order_of
 from gritd.tools.diagnose.noise import lines
 from gritd.tools.diagnose.noise.colour import Noise, whiten
 from gritd.tools.diagnose.rig.interface import Bools, Index

@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
 from gritd.tools.diagnose.fit.base import BaseFit
@@ -20,7 +20,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
-from gritd.tools.diagnose.fit.signatures import order_of, shape_grid, signature, some_of
+from gritd.tools.diagnose.fit.signatures import shape_grid, signature, some_of
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
 from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.screen.habit import habits
@@ -98,6 +98,16 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
     return replace(screen, open=_open(screening, model, screen, jobs), ripple=_ripple(problem))
+
+
+def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
+    """A screen without a reference, where the configuration holds a learnt discrepancy: this rig is
+    known to be off the equations, so what is new must be more than a further discrepancy of any
+    size. bare: the model without effects with that.
+    """
+    if screening.problem.stack.rig.held is None or screen.habit or not screen.on_grid:
+        return screen
+    return replace(screen, open=min(screen.open, _open_form(screening, bare, screen)))
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect
+from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
@@ -18,13 +19,20 @@ from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.settings import Settings, settings_of
-from gritd.tools.diagnose.fit.signatures import signature, some_of, strengths
+from gritd.tools.diagnose.fit.signatures import (
+    resolved_order,
+    signature,
+    some_of,
+    strengths,
+)
 from gritd.tools.diagnose.noise.colour import whiten
+from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.screen.screening import Screening, screen_of_base
+from gritd.tools.diagnose.screen.screening import Screening, screen_of_base, with_form_open
 from gritd.tools.diagnose.tuning import TUNING
 
 TURNING = "wheel_angle"  # what an effect that ripples goes with
+NONE = np.zeros(0)  # parameters of no effect
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,9 @@ def search_models(
     step("screening every effect")
     search = begin(screening, jobs)
     give_back()  # of all that was screened
-    search = replace(search, models=(search.base, _bare(search, search.base)))
+    bare = _bare(search, search.base)
+    first = with_form_open(screening, bare, search.first)
+    search = replace(search, models=(search.base, bare), first=first)
     if not search.first.alarmed:
         return search
 
@@ -94,7 +104,7 @@ def search_models(
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs)
     if search.problem.stack.referred:  # beside what the reference tells by itself, too
         search = extended(search, [search.base], TUNING.search.effects_later, jobs)
-    search = _settled(search)
+    search = _settled(_calmed(search, jobs))
     for size in range(1, TUNING.search.most_effects):
         starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
         if starts:
@@ -118,6 +128,62 @@ def _bare(search: Search, start: Model) -> Model:
     sizes = start.sizes or tuple(0 for _ in screening.forms)
     begins = (start.fitted.u, np.zeros(0))
     return fit_model(screening.problem, screening.forms, (), (), begins, sizes)
+
+
+def _calmed(search: Search, jobs: int) -> Search:
+    """With the best models of a forward search that keeps the constants near what is known of them,
+    let go; as it is where the bare model leaves them there.
+
+    Where much is left out, the constants strain for it. From where they end, other effects look
+    like others, and no single one sets the constants free: a channel that is blurred until no
+    ripple is left of it turns a ripple round, and an offset keeps a strong friction's place. So
+    effects are added first, as many as help, and the constants follow.
+    """
+    if np.max(np.abs(search.bare.fitted.u), initial=0.0) < TUNING.search.strained:
+        return search
+    problem = search.problem.near(TUNING.search.near)
+    screening = replace(search.screening, problem=problem)
+    base = replace(search.base, fitted=problem.descend((), (), 0.0 * search.base.fitted.u, NONE))
+    near = Search(screening, (base,), search.first)
+    near = replace(near, models=(base, _bare(near, base)))
+
+    best = near.bare
+    for _ in range(TUNING.search.most_effects):
+        near = extended(near, [best], TUNING.search.effects_near, jobs)
+        more = near.sized(len(best.names) + 1)
+        if not more or near.weight(more[0]) < near.weight(best):
+            break
+        best = more[0]
+
+    found = [m for n in range(len(best.names)) for m in near.sized(n + 1)[:1]]
+    free = each(jobs, lambda model: _let_go(search, model), found, shared(near))
+    return replace(search, models=tuple(_the_better((*search.models, *free))))
+
+
+def _let_go(search: Search, model: Model) -> Model:
+    """A model that was fitted near the known constants, fitted with all their room."""
+    fitted, screening = model.fitted, search.screening
+    begins, bends = (fitted.u, fitted.x), model.other_forms
+    with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
+        return fit_model(
+            screening.problem,
+            screening.forms,
+            fitted.effects,
+            fitted.free,
+            begins,
+            model.sizes,
+            bends,
+        )
+
+
+def _the_better(models: Sequence[Model]) -> Iterator[Model]:
+    """The first two, and of the others the likeliest of each set of effects."""
+    best: dict[frozenset[str], Model] = {}
+    for model in models[2:]:
+        of = frozenset(model.names)
+        if of not in best or model.evidence > best[of].evidence:
+            best[of] = model
+    return chain(models[:2], best.values())
 
 
 def _settled(search: Search) -> Search:
@@ -262,7 +328,7 @@ def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
 def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
     fitted, screening = model.fitted, search.screening
     effects: tuple[Maker, ...] = (*fitted.effects, promise.effect)
-    free = (*fitted.free, *free_of((promise.effect,)))
+    free = (*fitted.free, *_free_near(search.problem.stack.rig, promise))
     begins = (fitted.u, np.concatenate((fitted.x, promise.start)))
 
     return fit_model(
@@ -274,6 +340,21 @@ def _fitted_with(search: Search, model: Model, promise: Promise) -> Model:
         promise.sizes,
         model.other_forms,
     )
+
+
+def _free_near(rig: Rig, promise: Promise) -> tuple[Free, ...]:
+    """The parameters of a promised effect. Its ripples a turn stay as near to where they begin as
+    the longest run resolves: farther off they are another ripple, and spectra at the recordings'
+    own rate were searched for those.
+    """
+    order, near = order_of(promise.effect), resolved_order(rig)
+    free = []
+    for known, x in zip(free_of((promise.effect,)), promise.start.tolist(), strict=True):
+        p, value = known.parameter, known.value(x)
+        if p.name == order:
+            p = replace(p, low=max(p.low, value - near), high=min(p.high, value + near))
+        free.append(replace(known, parameter=p))
+    return tuple(free)
 
 
 def _retested(search: Search) -> Search:
@@ -295,14 +376,11 @@ def without(search: Search, model: Model, name: str) -> Model:
     if known:
         return max(known, key=lambda m: m.evidence)
 
-    types = tuple(search.problem.stack.rig.effects[n] for n in kept)
-    free = free_of(types)
-    begins = (model.fitted.u, np.array([_at(model, f) for f in free]))
+    fitted = model.fitted
+    types = tuple(e for e, n in zip(fitted.effects, model.names, strict=True) if n != name)
+    still = [f.name != name for f in fitted.free]
+    free = tuple(f for f, stays in zip(fitted.free, still, strict=True) if stays)
+    begins = (fitted.u, fitted.x[np.array(still, bool)])
     screening = search.screening
     bends = model.other_forms.of(kept)
     return fit_model(screening.problem, screening.forms, types, free, begins, model.sizes, bends)
-
-
-def _at(model: Model, wanted: Free) -> float:
-    fitted = model.fitted
-    return float(next(x for f, x in zip(fitted.free, fitted.x, strict=True) if f == wanted))

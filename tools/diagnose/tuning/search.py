@@ -34,6 +34,11 @@ class Search:
     same: float = tuned(
         1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
     )
+    strained: float = tuned(
+        4.0, "σ", "of a constant, from which a search with the constants near goes first"
+    )
+    near: float = tuned(2.0, "σ", "that the constants may be off in that search")
+    effects_near: int = tuned(4, "effects", "fitted at each step of that search", "run time")
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
     least_start: float = tuned(

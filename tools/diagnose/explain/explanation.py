@@ -137,6 +137,7 @@ def _hypotheses(
                 sentence=EFFECTS[name].sentence(),
                 score_nats=search.first.evidence.get(name, 0.0),
                 separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
+                other_forms=decision.best.form_share(name) if accepted else 0.0,
             )
         )
 

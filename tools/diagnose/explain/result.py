@@ -71,6 +71,9 @@ class Location:
 class Hypothesis:
     """One effect, fitted jointly with the soil to all channels, scored on runs and conditions it
     was not fitted to.
+
+    other_forms: of an accepted effect, the share by which what it does may differ where it is
+        driven otherwise: published forms of it do.
     """
 
     effect: str
@@ -84,6 +87,7 @@ class Hypothesis:
     separated_by: Mapping[str, str] = field(
         default_factory=dict
     )  # rival -> what would tell them apart, in words
+    other_forms: float = 0.0
 
 
 SOIL = {  # in words

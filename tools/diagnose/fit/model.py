@@ -74,6 +74,14 @@ class Model:
 
         return own, whitened
 
+    def form_share(self, name: str) -> float:
+        """Root mean square share by which an effect may act in another form than ours."""
+        if self.marginal is None:
+            return 0.0
+        every = list(enumerate(self.marginal.freedoms))[len(self.sizes) :]
+        own = [number for number, freedom in every if freedom.name == name]
+        return self.marginal.size_of(self.chosen, own[-1]) if own else 0.0
+
     def constants(self) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of
         all freedoms: how far the forms may be off is part of what is not known of the soil.

@@ -320,7 +320,7 @@ def _reference_alone(
     signals: Sequence[Signals], settings: Settings, read_off: bool, lines: Lines
 ) -> WheelRig:
     """Its runs and lines as those of a campaign of its own."""
-    own = Lines(lines.reference)
+    own = Lines(lines.reference, configured=lines.configured)
     line = guide(own)
     own = replace(own, aligned=line.at if line else 0.0)
     return WheelRig(aligned(signals, line), settings, read_off=read_off, lines=own)

@@ -103,11 +103,14 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
 def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
     """A screen without a reference, where the configuration holds a learnt discrepancy: this rig is
     known to be off the equations, so what is new must be more than a further discrepancy of any
-    size. bare: the model without effects with that.
+    size, the more so where it was not learnt. bare: the model without effects with that.
     """
-    if screening.problem.stack.rig.held is None or screen.habit or not screen.on_grid:
+    held = screening.problem.stack.rig.held
+    if held is None or screening.problem.stack.referred or not screen.on_grid:
         return screen
-    return replace(screen, open=min(screen.open, _open_form(screening, bare, screen)))
+    counts = max(held.covered, TUNING.screen.least_covered)
+    left = counts * _open_form(screening, bare, screen)
+    return replace(screen, open=min(screen.open, left), counts=counts)
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:

@@ -9,6 +9,7 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.model.learnt import CHANNELS
 from gritd.tools.diagnose.explain.apply import rewritten
 from gritd.tools.diagnose.explain.learnt import _above_zero, _ends, _parted
@@ -36,14 +37,14 @@ def test_the_domain_stays_where_conditions_are() -> None:
     assert _above_zero(np.array([20.0, 100.0]), 2)[0] == pytest.approx(18.0, abs=0.5)
 
 
-def _bent(signals: Signals) -> Signals:
+def _bent(signals: Signals, by: float = 0.15) -> Signals:
     """The same run without motor and torque sensor; its pull bends with slip as no listed effect
-    has it.
+    has it, by a share.
     """
     rim = settings().wheel.radius * np.maximum(signals.wheel_speed, 1e-6)
     slip = 1.0 - settings().pulley_radius * signals.carriage_rate / rim
     kept = {n: v for n, v in signals.analogue.items() if n not in ("current", "axle_torque")}
-    bend = 1.0 + 0.15 * np.sin(2.0 * np.pi * np.clip(slip, 0.0, 1.0))
+    bend = 1.0 + by * np.sin(2.0 * np.pi * np.clip(slip, 0.0, 1.0))
     return replace(signals, analogue={**kept, "drawbar_pull": bend * kept["drawbar_pull"]})
 
 
@@ -67,6 +68,16 @@ def test_a_rig_without_torque_learns_its_form_and_is_diagnosed_with_it() -> None
     known = replace(applied.settings, effects=())
     rig = WheelRig(later, known)
     assert rig.held is not None and "torque" not in rig.channels
+    assert rig.held.covered > 0.9
     assert diagnose(rig, quick=True).verdict == "consistent"
     without = WheelRig(later, replace(known, discrepancy=None))
     assert diagnose(without, quick=True).verdict != "consistent"
+
+    # a little more of what is off already is no news; much more is
+    assert _verdict(0.19, known) == "consistent"
+    assert _verdict(0.25, known) == "unlisted"
+
+
+def _verdict(by: float, known: Settings) -> str:
+    runs = [_bent(s, by) for s in record(plan(seed=4, seconds=30.0), ())]
+    return diagnose(WheelRig(runs, known), quick=True).verdict

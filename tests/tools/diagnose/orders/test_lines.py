@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,13 @@ def test_harmonics_are_told_and_support_a_count() -> None:
     assert [line.harmonic for line in lines] == [0.0, pytest.approx(30.0, abs=0.1)]
     (plain,) = find_lines(campaign(struck(4, 30.0, 0.0)))
     assert lines[0].support > plain.support + 10.0
+
+
+def test_what_the_configuration_ripples_alike_is_not_new() -> None:
+    lines = lines_of(campaign(_runs(6, ripple=(0.2, 0.0, 41.0))))
+    assert [round(line.at) for line in lines.fresh()] == [41]
+    assert replace(lines, configured=(41.0,)).fresh() == []
+    assert [round(line.at) for line in replace(lines, configured=(40.0,)).fresh()] == [41]
 
 
 def test_what_a_reference_ripples_alike_is_not_new() -> None:

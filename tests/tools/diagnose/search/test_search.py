@@ -7,15 +7,28 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.effects import make
+from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.settings import _smaller, settings_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
-from gritd.tools.diagnose.search.search import _bare, _tried, begin, extended, promises
+from gritd.tools.diagnose.search.search import (
+    Promise,
+    Search,
+    _bare,
+    _calmed,
+    _free_near,
+    _tried,
+    begin,
+    extended,
+    promises,
+)
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -78,3 +91,48 @@ def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> N
     assert rippling.first.alarmed
     tried = {promise.effect.name for promise in promises(rippling, bare)}
     assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}
+
+
+def test_where_the_constants_strain_effects_are_added_with_the_constants_near() -> None:
+    """A channel that is blurred until no ripple is left of it turns the ripple round: the fit of a
+    ripple that begins there ends at one of the wrong sign.
+    """
+    true = {"ripple_cos": 1.4, "ripple_sin": 0.4, "order": 15.0}
+    rig = WheelRig(record(plan(), (make("gear_ripple", true),)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    blur = [c.name for c in rig.constants].index("torque_blur")
+
+    calm = replace(search, models=(search.base, _strained(search, blur, 0.0)))
+    assert _calmed(calm, 1) is calm
+
+    search = replace(search, models=(search.base, _strained(search, blur, 8.0)))
+    first = next(m for m in _calmed(search, 1).models if m.names == ("gear_ripple",))
+    (ripple,) = first.fitted.acting
+    assert ripple.ripple_cos == pytest.approx(1.4, abs=0.1)
+    assert abs(first.fitted.u[blur]) < TUNING.search.near
+    assert search.problem.far > TUNING.search.near
+
+
+def _strained(search: Search, number: int, strain: float) -> Model:
+    """The bare model with one constant strained, not fitted."""
+    bare, u = _bare(search, search.base), np.zeros(len(search.base.fitted.u))
+    u[number] = strain
+    fitted = search.problem.descend((), (), u, np.zeros(0), 0)
+    return replace(bare, fitted=fitted)
+
+
+def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:
+    """A count that leaves its line in the fit is another ripple."""
+    rig = WheelRig(
+        record(plan(), (make("gear_ripple", {"order": 15.0, "ripple_cos": 0.3}),)), settings()
+    )
+    kind = rig.effects["gear_ripple"]
+    start = np.array([1.0, 0.0, (15.0 - 40.0) / 30.0])
+    *strengths, order = _free_near(rig, Promise(1.0, kind, start, ()))
+
+    assert [f.parameter for f in strengths] == list(kind.parameters())[:2]
+    turns = max(float(np.ptp(r.covariates["wheel_angle"])) for r in rig.runs) / (2.0 * np.pi)
+    assert order.parameter.low == pytest.approx(15.0 - 1.0 / turns)
+    assert order.parameter.high == pytest.approx(15.0 + 1.0 / turns)
+    assert order.value(1e3) == order.parameter.high

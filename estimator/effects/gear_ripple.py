@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart, turning
 from gritd.estimator.stages.situation import Situation
 from gritd.estimator.terramechanics.soil import Scalar
 
@@ -15,7 +15,9 @@ from gritd.estimator.terramechanics.soil import Scalar
 class GearRipple(Effect):
     """Meshing teeth make the motor torque ripple at a fixed order of the wheel angle.
 
-    T_loss = a cos Nψ + b sin Nψ
+    T_loss = (a cos Nψ + b sin Nψ) s²,   s = tanh(ω/ω₀)
+
+    A wheel at rest has none: static friction holds it, with no current.
 
     Source: first harmonic of the transmission error, Armstrong-Hélouvry, Dupont, Canudas de Wit
     (1994), Automatica 30, 1083-1138, position-dependent friction.
@@ -37,4 +39,5 @@ class GearRipple(Effect):
 
     def torque_loss(self, situation: Situation) -> Scalar:
         phase = self.order * situation.wheel_angle
-        return self.ripple_cos * np.cos(phase) + self.ripple_sin * np.sin(phase)
+        ripple = self.ripple_cos * np.cos(phase) + self.ripple_sin * np.sin(phase)
+        return ripple * turning(situation.wheel_speed) ** 2

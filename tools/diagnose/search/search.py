@@ -32,7 +32,6 @@ from gritd.tools.diagnose.screen.screening import Screening, screen_of_base, wit
 from gritd.tools.diagnose.tuning import TUNING
 
 TURNING = "wheel_angle"  # what an effect that ripples goes with
-NONE = np.zeros(0)  # parameters of no effect
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ def search_models(
         if starts:
             step(f"looking beside {', or '.join(' and '.join(m.names) for m in starts)}")
             search = extended(search, starts, TUNING.search.effects_later, jobs)
-        search = _retested(search)
+        search = _retested(search, jobs)
         if len(search.best().names) <= size:
             break
     return search
@@ -143,7 +142,9 @@ def _calmed(search: Search, jobs: int) -> Search:
         return search
     problem = search.problem.near(TUNING.search.near)
     screening = replace(search.screening, problem=problem)
-    base = replace(search.base, fitted=problem.descend((), (), 0.0 * search.base.fitted.u, NONE))
+    base = replace(
+        search.base, fitted=problem.descend((), (), 0.0 * search.base.fitted.u, np.zeros(0))
+    )
     near = Search(screening, (base,), search.first)
     near = replace(near, models=(base, _bare(near, base)))
 
@@ -357,14 +358,15 @@ def _free_near(rig: Rig, promise: Promise) -> tuple[Free, ...]:
     return tuple(free)
 
 
-def _retested(search: Search) -> Search:
-    """With the best model less each of its effects, if that was not fitted yet."""
+def _retested(search: Search, jobs: int) -> Search:
+    """With the best model less each of its effects, fitted from where the best one stands: no
+    effect may owe its place to a fit of the others that ended elsewhere.
+    """
     best = search.best()
-    for leave in best.names[:-1] if len(best.names) > 1 else ():
-        less = without(search, best, leave)
-        if less not in search.models:
-            search = replace(search, models=(*search.models, less))
-    return search
+    if len(best.names) < 2:
+        return search
+    less = each(jobs, lambda leave: _less(search, best, leave), best.names, shared(search))
+    return replace(search, models=tuple(_the_better((*search.models, *less))))
 
 
 def without(search: Search, model: Model, name: str) -> Model:
@@ -373,14 +375,18 @@ def without(search: Search, model: Model, name: str) -> Model:
     if not kept:
         return search.bare
     known = [m for m in search.models if set(m.names) == set(kept)]
-    if known:
-        return max(known, key=lambda m: m.evidence)
+    return max(known, key=lambda m: m.evidence) if known else _less(search, model, name)
 
-    fitted = model.fitted
+
+def _less(search: Search, model: Model, name: str) -> Model:
+    """A model less one of its several effects, fitted from where it stands."""
+    fitted, kept = model.fitted, tuple(n for n in model.names if n != name)
     types = tuple(e for e, n in zip(fitted.effects, model.names, strict=True) if n != name)
     still = [f.name != name for f in fitted.free]
     free = tuple(f for f, stays in zip(fitted.free, still, strict=True) if stays)
     begins = (fitted.u, fitted.x[np.array(still, bool)])
-    screening = search.screening
-    bends = model.other_forms.of(kept)
-    return fit_model(screening.problem, screening.forms, types, free, begins, model.sizes, bends)
+    screening, bends = search.screening, model.other_forms.of(kept)
+    with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
+        return fit_model(
+            screening.problem, screening.forms, types, free, begins, model.sizes, bends
+        )

@@ -23,7 +23,9 @@ from gritd.tools.diagnose.search.search import (
     _bare,
     _calmed,
     _free_near,
+    _retested,
     _tried,
+    _with_effect,
     begin,
     extended,
     promises,
@@ -136,3 +138,24 @@ def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:
     assert order.parameter.low == pytest.approx(15.0 - 1.0 / turns)
     assert order.parameter.high == pytest.approx(15.0 + 1.0 / turns)
     assert order.value(1e3) == order.parameter.high
+
+
+def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
+    """A model of one effect whose fit got stuck is fitted again from the model of two."""
+    rig = WheelRig(record(plan(), (make("bulldozing", {"share": 0.75}),)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    search = replace(search, models=(search.base, _bare(search, search.base)))
+
+    alone = extended(search, [search.bare], 1, 1)
+    (one,) = alone.models[2:]
+    beside = Promise(1.0, rig.effects["viscous_friction"], np.array([0.1]), one.sizes)
+    two = _with_effect(alone, one, beside)
+    stuck = replace(one, evidence=one.evidence - 200.0)
+    caught = replace(search, models=(search.base, search.bare, stuck, two))
+    assert caught.best() is two
+
+    free = _retested(caught, 1)
+    again = next(m for m in free.models if m.names == one.names)
+    assert again.evidence == pytest.approx(one.evidence, abs=0.5)
+    assert free.best() is again

@@ -63,7 +63,8 @@ def diagnose(
 @contextmanager
 def first_answer() -> Iterator[None]:
     """The search ends after the likeliest single effects."""
-    with replaced("search", effects_first=TUNING.search.effects_quick, most_effects=1):
+    few = TUNING.search.effects_quick
+    with replaced("search", effects_first=few, most_effects=1, strained=np.inf):
         yield
 
 

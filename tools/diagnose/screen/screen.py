@@ -50,7 +50,8 @@ class Screen:
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
-    counts: the share of evidence that counts beside a reference, which was driven elsewhere too.
+    counts: the share of evidence that counts beside a reference, or a discrepancy that was learnt:
+        it was driven elsewhere too.
     habit:  the largest surprise of each candidate in a run of the reference (habit.py).
     apart:  candidates whose habit says nothing of others: a rig that ripples is off its model in
         nothing else.

@@ -19,12 +19,7 @@ from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.settings import Settings, settings_of
-from gritd.tools.diagnose.fit.signatures import (
-    resolved_order,
-    signature,
-    some_of,
-    strengths,
-)
+from gritd.tools.diagnose.fit.signatures import resolved_order, signature, some_of, strengths
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.screen import Screen
@@ -104,12 +99,14 @@ def search_models(
     if search.problem.stack.referred:  # beside what the reference tells by itself, too
         search = extended(search, [search.base], TUNING.search.effects_later, jobs)
     search = _settled(_calmed(search, jobs))
+    tested: Model | None = None
     for size in range(1, TUNING.search.most_effects):
         starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
         if starts:
             step(f"looking beside {', or '.join(' and '.join(m.names) for m in starts)}")
             search = extended(search, starts, TUNING.search.effects_later, jobs)
-        search = _retested(search, jobs)
+        if (best := search.best()) is not tested:
+            search, tested = _retested(search, best, jobs), best
         if len(search.best().names) <= size:
             break
     return search
@@ -142,9 +139,8 @@ def _calmed(search: Search, jobs: int) -> Search:
         return search
     problem = search.problem.near(TUNING.search.near)
     screening = replace(search.screening, problem=problem)
-    base = replace(
-        search.base, fitted=problem.descend((), (), 0.0 * search.base.fitted.u, np.zeros(0))
-    )
+    known = np.zeros_like(search.base.fitted.u)
+    base = replace(search.base, fitted=problem.descend((), (), known, np.zeros(0)))
     near = Search(screening, (base,), search.first)
     near = replace(near, models=(base, _bare(near, base)))
 
@@ -358,11 +354,10 @@ def _free_near(rig: Rig, promise: Promise) -> tuple[Free, ...]:
     return tuple(free)
 
 
-def _retested(search: Search, jobs: int) -> Search:
+def _retested(search: Search, best: Model, jobs: int) -> Search:
     """With the best model less each of its effects, fitted from where the best one stands: no
     effect may owe its place to a fit of the others that ended elsewhere.
     """
-    best = search.best()
     if len(best.names) < 2:
         return search
     less = each(jobs, lambda leave: _less(search, best, leave), best.names, shared(search))

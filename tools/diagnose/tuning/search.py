@@ -35,7 +35,7 @@ class Search:
         1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
     )
     strained: float = tuned(
-        4.0, "σ", "of a constant, from which a search with the constants near goes first"
+        4.0, "σ", "of a constant, from which effects are added with the constants near, too"
     )
     near: float = tuned(2.0, "σ", "that the constants may be off in that search")
     effects_near: int = tuned(4, "effects", "fitted at each step of that search", "run time")

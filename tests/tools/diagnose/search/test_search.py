@@ -155,7 +155,7 @@ def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
     caught = replace(search, models=(search.base, search.bare, stuck, two))
     assert caught.best() is two
 
-    free = _retested(caught, 1)
+    free = _retested(caught, two, 1)
     again = next(m for m in free.models if m.names == one.names)
     assert again.evidence == pytest.approx(one.evidence, abs=0.5)
     assert free.best() is again

@@ -278,18 +278,27 @@ def _gain(projected: Projected, own: Index) -> tuple[float, float]:
 
 
 def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
-    """Families of a channel by evidence, each beside those before it."""
+    """Families of a channel by evidence, each beside those before it and beside the channel's
+    mean, which all of them hold.
+    """
+    mean = [f for f in families if f.shape.along == ("constant",)]
     taken: list[Family] = []
     best = 0.0
 
     while True:
         tried = {f: _evidence(projected, [*taken, f]) for f in families if f not in taken}
         first = max(tried, key=lambda f: tried[f], default=None)
-        if first is None or tried[first] < best + max(
-            TUNING.explain.beside_gain, TUNING.explain.least_share * best
-        ):
+        if first is None or not _adds(tried[first], best):
             return taken
+        for alone in mean if not taken else ():
+            first = first if _adds(tried[first], tried[alone]) else alone
         taken, best = [*taken, first], tried[first]
+
+
+def _adds(evidence: float, before: float) -> bool:
+    """Whether one more family of a channel is worth naming."""
+    least = max(TUNING.explain.beside_gain, TUNING.explain.least_share * before)
+    return evidence >= before + least
 
 
 def _evidence(projected: Projected, families: list[Family]) -> float:

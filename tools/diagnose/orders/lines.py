@@ -103,6 +103,7 @@ class _Channel:
 
     def __init__(self, name: str, parts: Sequence[_Part]) -> None:
         self.name, self.parts = name, list(parts)
+        self._waves: dict[tuple[str, float], list[Array]] = {}  # of each line taken, in each part
         self.places = {axis: places_of([p.samples for p in parts], axis) for axis in AXES}
         self._renew()
         self._first = dict(self.chances)
@@ -115,10 +116,17 @@ class _Channel:
         self._cleaned: dict[str, float] = {}  # of the strongest place of each axis
         self.chances = {axis: log_chance(spectra) for axis, spectra in self.spectra.items()}
 
-    def strongest(self, axis: str) -> tuple[float, int]:
-        """Log chance of the likeliest line, and its place."""
-        place = int(np.argmin(self.chances[axis]))
-        return float(self.chances[axis][place]), place
+    def strongest(self, axis: str, sure: float) -> tuple[float, int]:
+        """Log chance of the strongest line, and its place: the loudest of those whose log chance is
+        below `sure`, for a line of short stretches has quieter ones beside it, which may look as
+        likely; without such the likeliest.
+        """
+        chances = self.chances[axis]
+        place = int(np.argmin(chances))
+        if chances[place] < sure:
+            power = np.sum([s.power * s.known for s in self.spectra[axis]], axis=0)
+            place = int(np.argmax(np.where(chances < sure, power, 0.0)))
+        return float(chances[place]), place
 
     def support(self, axis: str, at: float) -> float:
         """Evidence [nats] of a line and its next harmonics in the readings as they were."""
@@ -189,14 +197,23 @@ class _Channel:
         return tuple(_together(each) for each in of_runs)
 
     def take(self, axis: str, at: float) -> None:
-        """Leave a line out."""
-        self.parts = [
-            replace(p, samples=p.samples.with_values(
-                p.samples.values - wave_of(p.samples, axis, at)
-            ))
-            for p in self.parts
-        ]  # fmt: skip
+        """Leave a line out. Those taken before it are told anew beside it, each in turn: Li and
+        Stoica (1996), IEEE Trans. Signal Process. 44, 281-295.
+        """
+        self._waves[axis, at] = [np.zeros(part.samples.values.size) for part in self.parts]
+        for _ in range(TUNING.orders.sweeps if len(self._waves) > 1 else 1):
+            for line in reversed(self._waves):
+                self._retake(*line)
         self._renew()
+
+    def _retake(self, axis: str, at: float) -> None:
+        """Put a line back and leave it out as it now is."""
+        for number, part in enumerate(self.parts):
+            waves = self._waves[axis, at]
+            whole = part.samples.with_values(part.samples.values + waves[number])
+            waves[number] = wave_of(whole, axis, at)
+            left = whole.with_values(whole.values - waves[number])
+            self.parts[number] = replace(part, samples=left)
 
     def cell(self, axis: str) -> float:
         """What the longest part resolves."""
@@ -289,10 +306,13 @@ def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
 def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channel, str, int] | None:
     """Log chance, channel, axis and place of the likeliest line of all."""
     strongest = []
+    sure, promising = (
+        float(np.log(p / tried)) for p in (TUNING.orders.level, TUNING.orders.promising)
+    )
     for channel in channels:
         for axis in AXES:
-            chance, place = channel.strongest(axis)
-            if chance + np.log(tried) < np.log(TUNING.orders.promising):
+            chance, place = channel.strongest(axis, sure)
+            if chance < promising:
                 chance = min(chance, channel.cleaned(axis, place))
             strongest.append((chance, channel, axis, place))
 
@@ -304,7 +324,7 @@ def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channe
 
 def _taken(channel: _Channel, axis: str, at: float, p: float, support: float, runs: int) -> Line:
     """The line, which the channel loses. The noise about it is what is left."""
-    before = channel.parts
+    before = list(channel.parts)
     channel.take(axis, at)
     amplitudes = channel.amplitudes(before, axis, at, runs)
 

@@ -47,6 +47,7 @@ class Orders:
     rest: float = tuned(0.03, "-", "of a louder line near by: what is left about it")
     rest_cells: float = tuned(20.0, "cells", "about a louder line")
     most_lines: int = tuned(16, "lines", "at most", "run time")
+    sweeps: int = tuned(3, "times", "all lines of a channel are told anew beside another")
     refinements: int = tuned(4, "times", "a line's place is looked for more finely")
     refined_places: int = tuned(9, "places", "of each such look")
     prefer_angle: float = tuned(

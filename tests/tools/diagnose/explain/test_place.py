@@ -67,6 +67,17 @@ def located(name: str, repeated: bool = False, **parameters: float) -> tuple[Loc
     return locate(screening, held, held.fitted.predicted)
 
 
+def test_a_mean_is_not_told_as_a_small_wave_about_it() -> None:
+    drawn = plan(loads=(40.0, 70.0, 100.0), seed=3)
+    friction = make("coulomb_friction", {"loss": 1.2})
+    ripple = make("gear_ripple", {"ripple_cos": 0.1, "order": 23.0})
+    screening = prepared(WheelRig(record(drawn, (friction, ripple)), drawn.settings))
+    held = unmoved(screening, explained(screening, friction))
+    first = locate(screening, held, held.fitted.predicted)[0]
+    assert first.covariate == "constant"
+    assert "while the wheel turns 1.2 N·m more than the model" in first.where
+
+
 def test_a_patch_is_given_from_where_to_where() -> None:
     first = located("soil_patch", **PATCH)[0]
     assert first.covariate == "position"

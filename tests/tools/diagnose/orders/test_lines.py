@@ -39,6 +39,22 @@ def test_a_loud_ripple_brings_no_others() -> None:
     assert line.size == pytest.approx(30.0, rel=2e-3)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_loud_ripples_in_short_stretches_bring_no_others(seed: int) -> None:
+    """Nine stretches of 4 s at one speed, a second apart: spectra have lines beside each line."""
+    rng = np.random.default_rng(seed)
+    begins = 5.0 * np.arange(9)
+    time = (begins[:, None] + np.arange(0.0, 4.0, 1.0 / RATE)).ravel()
+    number = np.repeat(np.arange(begins.size), time.size // begins.size)
+    angle = 0.28 * time
+    for ripples in ({23.0: 10.0}, {23.0: 10.0, 41.0: 2.0}, {60.0: 3.0, 90.0: 30.0}):
+        values = rng.standard_normal(time.size)
+        for order, size in ripples.items():
+            values += size * np.cos(order * angle + 1.0)
+        lines = find_lines(campaign([Samples(time, angle / TURN, values, number)]))
+        assert {round(line.at): round(line.size) for line in lines} == ripples
+
+
 def test_harmonics_are_told_and_support_a_count() -> None:
     def struck(seed: int, order: float, more: float) -> list[Samples]:
         out = []

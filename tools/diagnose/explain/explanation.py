@@ -34,7 +34,7 @@ from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.search.search import Search
+from gritd.tools.diagnose.search.search import Search, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
@@ -117,10 +117,8 @@ def _hypotheses(
 ) -> tuple[Hypothesis, ...]:
     every = (folds, condition_folds(search.problem.stack))
     before = [held_out(search.base.fitted, f) for f in every]
-    ranked = sorted(decision.probability.items(), key=lambda item: -item[1])
-
     out = []
-    for name, probability in ranked[: TUNING.explain.shown_hypotheses]:
+    for name, probability in _ranked(search, decision)[: TUNING.explain.shown_hypotheses]:
         models = [m for m in search.models if name in m.names]
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
@@ -142,6 +140,24 @@ def _hypotheses(
         )
 
     return tuple(out)
+
+
+def _ranked(search: Search, decision: Decision) -> list[tuple[str, float]]:
+    """Effects and their probabilities, the likeliest first; of accepted ones that are as likely the
+    one first without which the evidence falls most.
+    """
+    best = decision.best
+    several = decision.verdict == "explained" and len(best.names) > 1
+    lost = {
+        name: best.evidence - without(search, best, name).evidence
+        for name in (best.names if several else ())
+    }
+
+    def order(item: tuple[str, float]) -> tuple[float, float]:
+        name, probability = item
+        return -round(probability, 2), -lost.get(name, 0.0)
+
+    return sorted(decision.probability.items(), key=order)
 
 
 def _key(one: str, other: str) -> str | None:

@@ -30,6 +30,7 @@ import numpy as np
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.evidence import Signature
 from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
@@ -84,6 +85,15 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
             freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
 
     return tuple(freedoms)
+
+
+def varied_along_place(stack: Stack, effect: type[Effect], made: Signature) -> list[Array]:
+    """Each strength of a signature as it may vary along the bed (N, m), by the largest share."""
+    places = along_place(stack)
+    if effect.stage in NOWHERE or effect.free_along or not places.shape[1]:
+        return []
+    share = TUNING.fit.place_sizes[-1] / np.sqrt(places.shape[1])
+    return [share * column[:, None] * places for column in made.columns.T]
 
 
 def _place_sizes() -> Sizes:

@@ -58,20 +58,32 @@ class Model:
 
     def discrepancy(self) -> tuple[Array, Array]:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
-        allowance, slack = self.fitted.allowance, self.fitted.slack
+        return self._amount(0, self._of_form)
+
+    def bent(self) -> tuple[Array, Array]:
+        """What the other forms of the model's effects amount to (N,): in the channels' units, and
+        whitened.
+        """
+        return self._amount(self._of_form, len(self.fitted.allowance.parts) - 1)
+
+    @property
+    def _of_form(self) -> int:
+        """How many freedoms of form act."""
         freedoms = self.marginal.freedoms if self.marginal else ()
         sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
-        first = allowance.parts[0][0].columns.shape[1]
-        acting = sum(size > 0.0 for size in sizes)
+        return sum(size > 0.0 for size in sizes)
 
+    def _amount(self, begin: int, end: int) -> tuple[Array, Array]:
+        """Of the acting freedoms begin … end − 1, beside what every fit has."""
+        allowance, slack = self.fitted.allowance, self.fitted.slack
+        ends = np.cumsum([freedom.columns.shape[1] for freedom, _ in allowance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
-        for freedom, size in allowance.parts[1:][:acting]:
-            weights = slack[first : first + freedom.columns.shape[1]]
+        for number in range(begin + 1, end + 1):
+            freedom, size = allowance.parts[number]
+            weights = slack[ends[number - 1] : ends[number]]
             own = own + size * (freedom.columns @ weights)
             whitened = whitened + size * (freedom.whitened @ weights)
-            first += freedom.columns.shape[1]
-
         return own, whitened
 
     def form_share(self, name: str) -> float:

@@ -14,7 +14,8 @@ from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
-from gritd.tools.diagnose.fit.evidence import Signature, log_evidence
+from gritd.tools.diagnose.fit.bending import varied_along_place
+from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
@@ -203,13 +204,14 @@ def _near(search: Search, model: Model) -> bool:
 @dataclass(frozen=True)
 class Promise:
     """What an effect would gain beside a model by linear algebra [nats], where its fit begins, and
-    the sizes of the forms beside which it gains that.
+    the sizes of the forms beside which it gains that; others: where else the fit may begin.
     """
 
     gain: float
     effect: type[Effect]
     start: Array  # of its parameters, in their units
     sizes: Chosen
+    others: tuple[Promise, ...] = ()
 
 
 def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> Search:
@@ -265,35 +267,107 @@ def promises(search: Search, model: Model, jobs: int = 1) -> list[Promise]:
 def _promised(
     search: Search, model: Model, effect: type[Effect], settings: Settings
 ) -> Promise | None:
-    """The best promise of an effect, less what a reference shows of it; None without any."""
-    tried = list(_tried(search, model, effect, settings))
-    if not tried:
+    """The best promise of an effect, less what a reference shows of it, with those at its other
+    shapes; None without any.
+    """
+    ranked, likeliest = search.first.fixed[effect.name], TUNING.search.again
+    first = _best_of(search, model, effect, ranked[:likeliest], settings)
+    if first is None:
         return None
-    best = max(tried, key=lambda promise: np.round(promise.gain / TUNING.search.same))
     usual = TUNING.screen.habit * search.first.habit.get(effect.name, 0.0)
-    return replace(best, gain=best.gain - usual)
+    sharp = not model.names and any(p.scan and p.unit == "m" for p in effect.parameters())
+    elsewhere = _apart(ranked)[: TUNING.search.elsewhere] if sharp else []
+    others = (_best_of(search, model, effect, [fixed], settings) for fixed in elsewhere)
+    kept = tuple(p for p in others if p is not None and p.gain > TUNING.search.promising)
+    return replace(first, gain=first.gain - usual, others=kept)
+
+
+def _best_of(
+    search: Search,
+    model: Model,
+    effect: type[Effect],
+    shapes: Sequence[dict[str, float]],
+    settings: Settings,
+) -> Promise | None:
+    """The best promise of an effect of some shapes."""
+    tried = (p for fixed in shapes for p in _tried(search, model, effect, fixed, settings))
+    return max(tried, key=lambda p: np.round(p.gain / TUNING.search.same), default=None)
+
+
+def _apart(ranked: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """Of shapes that were tried, the likeliest first, those that are not beside a likelier one in
+    the grid.
+    """
+    grid = {name: sorted({fixed[name] for fixed in ranked}) for name in ranked[0]}
+    places = [np.array([grid[name].index(fixed[name]) for name in grid]) for fixed in ranked]
+    return [
+        fixed
+        for number, fixed in enumerate(ranked)
+        if all(np.abs(places[number] - other).max() > 1 for other in places[:number])
+    ]
 
 
 def _tried(
-    search: Search, model: Model, effect: type[Effect], settings: Settings
+    search: Search,
+    model: Model,
+    effect: type[Effect],
+    fixed: dict[str, float],
+    settings: Settings,
 ) -> Iterator[Promise]:
-    """The promise of an effect for each of its likeliest signatures and each setting."""
+    """The promise of an effect of some shape for each setting."""
     fitted, problem = model.fitted, search.problem
+    made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
+    if made is None:
+        return
 
-    for fixed in search.first.fixed[effect.name][: TUNING.search.again]:
-        made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
-        if made is None:
-            continue
+    varied = [] if model.names else varied_along_place(problem.stack, effect, made)
+    count = len(made.sign)
+    columns = whiten(problem.noise, np.column_stack((made.columns, *varied)))
+    for sizes, cost, a, b in settings.project(columns):
+        own = log_evidence(a[:count, :count], b[:count], made.sign)
+        amplitude = _amplitude(a[:count, :count], b[:count])
+        yield _promise(effect, made, float(own), cost, amplitude, sizes)
+        for bayes, amplitude in _gains_varied(made, a, b):
+            yield _promise(effect, made, bayes, cost, amplitude, sizes)
 
-        columns = whiten(problem.noise, made.columns)
-        for sizes, cost, a, b in settings.project(columns):
-            gain = (1.0 + TUNING.search.curved) * float(log_evidence(a, b, made.sign)) - cost
-            yield Promise(gain, effect, _start(effect, made, a, b), sizes)
+
+def _gains_varied(made: Signature, a: Array, b: Array) -> Iterator[tuple[float, Array]]:
+    """Log Bayes factor of an effect of which one strength varies along the bed, and the strengths
+    (p,); of each strength. What varies about a mean that constants take tells the strength too.
+    """
+    count = len(made.sign)
+    waves = (len(b) - count) // count
+    for number in range(count if waves else 0):
+        first = count + number * waves
+        index = np.concatenate((np.arange(count), np.arange(first, first + waves)))
+        own, right = a[np.ix_(index, index)], b[index]
+        sign = (*made.sign, *(0,) * waves)
+        amplitude = _amplitude(own, right)
+        told = float(np.sqrt(np.mean(amplitude[count:] ** 2)))
+        amplitude = amplitude[:count]
+        amplitude[number] = np.copysign(max(abs(amplitude[number]), told), amplitude[number])
+        yield float(log_bayes(own, right, sign)) + TUNING.search.varied, amplitude
 
 
-def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
-    """Where the fit of an effect's parameters begins: strengths at their linear estimate."""
-    amplitude = np.asarray(np.linalg.solve(a + TUNING.search.least_precision * np.eye(len(b)), b))
+def _promise(
+    effect: type[Effect],
+    made: Signature,
+    bayes: float,
+    cost: float,
+    amplitude: Array,
+    sizes: Chosen,
+) -> Promise:
+    gain = (1.0 + TUNING.search.curved) * bayes - cost
+    return Promise(gain, effect, _start(effect, made, amplitude), sizes)
+
+
+def _amplitude(a: Array, b: Array) -> Array:
+    """Linear estimate of strengths (p,)."""
+    return np.asarray(np.linalg.solve(a + TUNING.search.least_precision * np.eye(len(b)), b))
+
+
+def _start(effect: type[Effect], made: Signature, amplitude: Array) -> Array:
+    """Where the fit of an effect's parameters begins: strengths at their linear estimate (p,)."""
     amplitude = np.where(
         np.array(made.sign) > 0, np.maximum(amplitude, TUNING.search.least_start), amplitude
     )
@@ -310,10 +384,12 @@ def _start(effect: type[Effect], made: Signature, a: Array, b: Array) -> Array:
 
 
 def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
-    """The model with one more effect. Where it ends well below the model that it holds, it has
-    lost its way: it is fitted again from there, with the effect's strengths at nought.
+    """The model with one more effect, the best of its starts. Where it ends well below the model
+    that it holds, it has lost its way: it is fitted again from there, with the effect's strengths
+    at nought.
     """
-    made = _fitted_with(search, model, promise)
+    every = [_fitted_with(search, model, start) for start in (promise, *promise.others)]
+    made = max(every, key=lambda m: m.evidence)
     if made.evidence > model.evidence - TUNING.search.lost:
         return made
 

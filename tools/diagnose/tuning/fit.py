@@ -189,7 +189,7 @@ class Fit:
         (0.4, 1.0, 2.0), "choice", "values of a shape tried, of its expected one"
     )
     patch_lengths: tuple[float, ...] = tuned(
-        (0.12, 0.25, 0.5), "share", "of the bed that was driven: lengths tried"
+        (0.12, 0.25, 0.5, 0.75), "share", "of the bed that was driven: lengths tried"
     )
     patch_centres: int = tuned(13, "places", "along the bed that are tried")
     turning_share: float = tuned(

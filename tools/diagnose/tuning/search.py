@@ -21,6 +21,9 @@ class Search:
     again: int = tuned(
         4, "signatures", "of an effect tried beside a model: the screen's likeliest", "run time"
     )
+    elsewhere: int = tuned(
+        4, "starts", "of a fit whose effect has edges, at other places", "run time"
+    )
     curved: float = tuned(
         0.1, "share", "of an effect's linear evidence by which its fit may do better"
     )
@@ -39,6 +42,7 @@ class Search:
     )
     near: float = tuned(2.0, "σ", "that the constants may be off in that search")
     effects_near: int = tuned(4, "effects", "fitted at each step of that search", "run time")
+    varied: float = tuned(-2.3, "nats", "log prior of an effect that varies along the bed")
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
     least_start: float = tuned(

@@ -122,8 +122,8 @@ def _best(weighed: Sequence[Weighed]) -> Model:
 
 
 def taken_share(search: Search, model: Model) -> float:
-    """Share of the misfit that a model's effects take, 0 to 1: of the squares beyond noise that it
-    leaves when its effects are switched off and all else stays.
+    """Share of the misfit that a model's effects take, 0 to 1, other forms of them counted: of the
+    squares beyond noise that it leaves when its effects are switched off and all else stays.
     """
     fitted = model.fitted
     off = search.problem.descend((), (), fitted.u, np.zeros(0), rounds=0)
@@ -132,7 +132,7 @@ def taken_share(search: Search, model: Model) -> float:
     if search.problem.stack.referred:  # what both campaigns do is no misfit
         shared = model.discrepancy()[1]
 
-    left = [f.residual - shared for f in (off, fitted)]
+    left = [off.residual - shared, fitted.residual - shared - model.bent()[1]]
     before, after = (float(r @ r) - r.size for r in left)
     return float(np.clip(1.0 - max(after, 0.0) / max(before, SPAN), 0.0, 1.0))
 

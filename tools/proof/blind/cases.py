@@ -19,10 +19,11 @@ from gritd.tools.proof.blind.plant.contact import Ground
 from gritd.tools.proof.blind.plant.effect import Effect
 from gritd.tools.proof.blind.plant.respond import World
 from gritd.tools.proof.blind.plant.scene import Rig
-from gritd.tools.proof.blind.strata import LEVELS, Assignment
+from gritd.tools.proof.blind.strata import LEVELS, USUAL, Assignment
 
 ATTEMPTS = 25  # campaigns tried until one shows the effect as strongly as wanted
-COMPARED = ("single", "absorbed", "confounded")
+USUAL_SHARE = (0.2, 0.6)  # of the largest plausible strength, between which the usual one lies
+COMPARED = ("single", "usual", "absorbed", "confounded")
 CHANNELS = {
     "sinkage": "sinkage",
     "current": "torque",
@@ -132,7 +133,11 @@ def _attempt(
     facts = detector.facts()
 
     made = [effect_drawn(name, rng, facts) for name in assignment.effects]
-    fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
+    if assignment.level == USUAL:
+        made = [replace(e, strength=e.strength * rng.uniform(*USUAL_SHARE)) for e in made]
+        fitted = [(effect, detector.detectability([effect])) for effect in made]
+    else:
+        fitted = [detect.strengthened(detector, effect, wanted) for effect in made]
     effects = tuple(effect for effect, _ in fitted)
 
     return Case(

@@ -17,7 +17,7 @@ from gritd.tools.proof.blind.verdicts import Row
 
 BY = ("name", "table", "engine", "plant")  # how a name counts as right
 AT_HOME = tuple(name for name in STRATA if name not in ("foreign", "pair"))
-ONE = ("single", "absorbed", "confounded")  # strata with one listed effect
+ONE = ("single", "usual", "absorbed", "confounded")  # strata with one listed effect
 
 
 def score(rows: Sequence[Row]) -> dict[str, Any]:
@@ -34,6 +34,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
         "failed": counted(row.verdict == "failed" for row in rows),
         "false_alarms": _false_alarms([row for row in home if not row.truth]),
         "detectable_singles": _names(detectable),
+        "usual_singles": _names([r for r in home if r.stratum == "usual" and r.detectable]),
         "companions": _companions([row for row in effects if row.stratum != "unlisted"]),
         "strata": _strata(rows),
         "effects": {

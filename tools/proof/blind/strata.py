@@ -16,19 +16,21 @@ from gritd.tools.proof.blind.plant.worlds import PAPER, WORLDS, concealable
 Item = TypeVar("Item")
 
 SHARES = {
-    "none": 0.13,
+    "none": 0.14,
     "awkward": 0.10,
-    "single": 0.20,
-    "absorbed": 0.05,
+    "single": 0.13,
+    "usual": 0.13,
+    "absorbed": 0.03,
     "confounded": 0.03,
-    "two": 0.06,
+    "two": 0.05,
     "unlisted": 0.08,
-    "foreign": 0.12,
-    "pair": 0.23,
+    "foreign": 0.10,
+    "pair": 0.21,
 }
 STRATA = tuple(SHARES)
 # times the detection limit; the strongest is what bends the form of the model most
 LEVELS = {"weak": 1.5, "medium": 4.0, "strong": 12.0, "very strong": 40.0}
+USUAL = "usual"  # a level: as strong as such an effect is on a testbed, however well it shows
 PLAIN = ("medium", "strong")  # levels in foreign worlds and of what is new
 # What one case in so many conceals, in foreign worlds and as what is new: one of the list,
 # nothing, or physics outside the list.
@@ -108,6 +110,9 @@ def _of(
         return _in_worlds("foreign", count, foreign, FOREIGN_KINDS, rng)
     if stratum == "pair":
         return [_paired(one, rng) for one in _in_worlds("pair", count, worlds, PAIR_KINDS, rng)]
+
+    if stratum == "usual":
+        return [Assignment("usual", (name,), USUAL) for name in _shuffled(LISTED, count, rng)]
 
     names = {"single": tuple(LISTED), "absorbed": ABSORBED, "unlisted": tuple(UNLISTED)}[stratum]
     leveled = _at_levels(names, count, tuple(LEVELS), rng)

@@ -88,6 +88,7 @@ def _alarms(alarms: Mapping[str, Any]) -> Table:
 def _named(score: Mapping[str, Any]) -> Table:
     singles, two, unlisted = score["detectable_singles"], score["two"], score["unlisted"]
     first, companions, sure = singles["first"], score["companions"], score["accepted"]
+    usual = score["usual_singles"]
 
     return [
         ("detectable single effects: detected", share_text(singles["detected"])),
@@ -96,6 +97,8 @@ def _named(score: Mapping[str, Any]) -> Table:
         ("  … by the group it states", share_text(first["engine"])),
         ("  … by what the campaign can tell", share_text(first["plant"])),
         ("  among the first three, by the fixed groups", share_text(singles["three"]["table"])),
+        ("single effects of usual strength: detected", share_text(usual["detected"])),
+        ("  first name right, by the fixed groups", share_text(usual["first"]["table"])),
         ("a further name that is not there, by the fixed groups", share_text(companions["table"])),
         ("  … nor in the group it is stated with", share_text(companions["engine"])),
         ("names stated with 0.9 or more that are right", share_text(sure["name"]["sure"])),

@@ -28,6 +28,9 @@ class Verdict:
     explained_share: float = tuned(
         0.1, "share", "of the misfit that names must take to be an explanation"
     )
+    rivals: int = tuned(
+        3, "models", "of a size, beside which what has no name is fitted", "run time"
+    )
     power: float = tuned(
         0.4, "share", "of the effects that must be detectable at their expected size: consistent"
     )

@@ -41,16 +41,32 @@ def decide(search: Search, jobs: int = 1) -> Decision:
 
     evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
-    models = [search.bare, best] if best.names else [search.bare]
+    beside = _beside(search, [search.bare, best] if best.names else [search.bare], jobs)
+    if beside.get(best) is not None:  # what pays beside the best may pay beside its rivals
+        beside |= _beside(search, _rivals(search, evidence, best), jobs)
+
+    weighed = weigh(search, evidence, beside)
+    return judged(search, weighed, beside, learnt(len(_candidates(search))))
+
+
+def _beside(search: Search, models: Sequence[Model], jobs: int) -> dict[Model, Nameless | None]:
+    """What has no name beside each of some models."""
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
             return nameless_beside(search.screening, model)
 
-    alone, beside = (2 * each(jobs, nameless, models, shared(search)))[:2]
+    return dict(zip(models, each(jobs, nameless, models, shared(search)), strict=True))
 
-    weighed = weigh(search, best, evidence, alone, beside)
-    return judged(search, weighed, beside, learnt(len(_candidates(search))))
+
+def _rivals(search: Search, evidence: Mapping[Model, float], best: Model) -> list[Model]:
+    """The likeliest models of as many effects as the best one, and of fewer."""
+    weight = {m: search.weight(m) - search.news(m) + evidence[m] for m in search.models[1:]}
+    standing = sorted((m for m in weight if np.isfinite(weight[m])), key=lambda m: -weight[m])
+    rivals = []
+    for size in range(1, len(best.names) + 1):
+        rivals += [m for m in standing if len(m.names) == size][: TUNING.verdict.rivals]
+    return [m for m in rivals if m is not best]
 
 
 def _candidates(search: Search) -> Sequence[str]:
@@ -59,30 +75,29 @@ def _candidates(search: Search) -> Sequence[str]:
 
 def weigh(
     search: Search,
-    best: Model,
     evidence: Mapping[Model, float],
-    alone: Nameless | None,
-    beside: Nameless | None,
+    beside: Mapping[Model, Nameless | None],
 ) -> list[Weighed]:
     """All explanations with their evidence [nats above the bare model].
 
-    best: the likeliest model; evidence: of every model, as it counts (breadth.py); alone, beside:
-    functions without a name in the place of effects, and beside the best ones.
+    evidence: of every model, as it counts (breadth.py); beside: functions without a name beside
+    some of them, the bare one among these.
     """
     bare = search.bare.evidence
     standing = [m for m in search.models[1:] if np.isfinite(evidence[m])]
     every = [Weighed(m, m.names, False, evidence[m] - bare) for m in standing]
-
-    if alone is not None:
-        every.append(Weighed(alone.model, (), True, alone.gain))
-    if beside is not None and best.names:
-        gain = evidence[best] - bare + beside.gain
-        every.append(Weighed(beside.model, best.names, True, gain))
+    for model, nameless in beside.items():
+        if nameless is not None:
+            gain = (evidence[model] if model.names else bare) - bare + nameless.gain
+            every.append(Weighed(nameless.model, model.names, True, gain))
     return every
 
 
 def judged(
-    search: Search, weighed: Sequence[Weighed], beside: Nameless | None, calibration: Calibration
+    search: Search,
+    weighed: Sequence[Weighed],
+    beside: Mapping[Model, Nameless | None],
+    calibration: Calibration,
 ) -> Decision:
     """The decision from the evidence of all explanations."""
     weights = calibration.weights(
@@ -99,11 +114,14 @@ def judged(
     best = _best(listed if likely and listed else every)
     share = taken_share(search, best) if best.names else 0.0
     named = likely and bool(best.names) and share > TUNING.verdict.explained_share
+    told = best if named else search.bare
+    if told not in beside:
+        beside = {told: nameless_beside(search.screening, told)}
     return Decision(
         "explained" if named else "unlisted",
-        best if named else search.bare,
+        told,
         share,
-        beside if named or not best.names else nameless_beside(search.screening, search.bare),
+        beside[told],
         _probabilities(every),
         unlisted,
         _groups(every, best),
@@ -117,8 +135,18 @@ def _best(weighed: Sequence[Weighed]) -> Model:
     """
     sizes = {len(w.names) for w in weighed}
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
+    together = _together(weighed)
     plain = [w for w in weighed if len(w.names) == size and not w.nameless]
-    return max(plain, key=lambda w: w.probability).model
+    return max(plain, key=lambda w: together[frozenset(w.names)]).model
+
+
+def _together(weighed: Sequence[Weighed]) -> dict[frozenset[str], float]:
+    """Probability of each set of effects, with functions without a name beside it and without."""
+    out: dict[frozenset[str], float] = {}
+    for w in weighed:
+        of = frozenset(w.names)
+        out[of] = out.get(of, 0.0) + w.probability
+    return out
 
 
 def taken_share(search: Search, model: Model) -> float:
@@ -160,9 +188,10 @@ def _quiet(screen: Screen) -> dict[str, float]:
 
 def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:
     """For each effect of the best model, those that could stand in its place."""
+    together = _together(weighed)
     sized = [w for w in weighed if len(w.names) == len(best.names) and not w.nameless]
-    sized.sort(key=lambda w: -w.probability)
-    top = max((w.probability for w in sized if w.model is best), default=1.0)
+    sized.sort(key=lambda w: -together[frozenset(w.names)])
+    top = together.get(frozenset(best.names), 1.0)
 
     out: dict[str, tuple[str, ...]] = {}
     for name in best.names:
@@ -172,7 +201,7 @@ def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...
             for w in sized
             if rest <= set(w.names)
             and w.model is not best
-            and w.probability > top * np.exp(-TUNING.verdict.alike)
+            and together[frozenset(w.names)] > top * np.exp(-TUNING.verdict.alike)
         ]
         out[name] = tuple(dict.fromkeys(n for w in rivals for n in w.names if n not in rest))
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -83,18 +83,25 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
     assert score > np.mean([log_truth(case, overconfident) for case in cases])
 
 
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model of which the names alone matter."""
+
+    names: tuple[str, ...]
+
+
 def _judged(listed: float, nameless: float, share: float, monkeypatch: pytest.MonkeyPatch) -> Any:
     """One effect against functions without a name, of so much evidence each [nats]."""
     monkeypatch.setattr(decide, "taken_share", lambda *_: share)
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
-    bare, best = (SimpleNamespace(names=names) for names in ((), ("a",)))
+    bare, best = Fit(()), Fit(("a",))
     search: Any = SimpleNamespace(bare=bare, screening=None)
     weighed: Any = [
         decide.Weighed(bare, (), False, 0.0),
         decide.Weighed(best, ("a",), False, listed),
         decide.Weighed(bare, (), True, nameless),
     ]
-    return decide.judged(search, weighed, None, learnt(30))
+    return decide.judged(search, weighed, {}, learnt(30))
 
 
 def test_the_verdict_is_that_of_the_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,7 +120,7 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
     """None is the likeliest number, but two of three say that there is something listed."""
     monkeypatch.setattr(decide, "taken_share", lambda *_: 1.0)
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
-    bare, one, two = (SimpleNamespace(names=names) for names in ((), ("a",), ("a", "b")))
+    bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     by = learnt(30)
     weighed: Any = [
         decide.Weighed(bare, (), True, 900.0 - by.temperature * by.nameless),
@@ -125,8 +132,24 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
             900.0 - by.temperature * (by.listed + by.more - 2.0 * np.log(30) + 0.2),
         ),
     ]
-    found = decide.judged(cast(Any, SimpleNamespace(bare=bare, screening=None)), weighed, None, by)
+    found = decide.judged(cast(Any, SimpleNamespace(bare=bare, screening=None)), weighed, {}, by)
     assert found.verdict == "explained" and found.best.names == ("a",)
+
+
+def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A companion gains little, and functions without a name gain much beside either model."""
+    monkeypatch.setattr(decide, "taken_share", lambda *_: 1.0)
+    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
+    alone: Any = [
+        decide.Weighed(one, ("a",), False, 900.0),
+        decide.Weighed(two, ("a", "b"), False, 905.0),
+        decide.Weighed(two, ("a", "b"), True, 1005.0),
+    ]
+    search: Any = SimpleNamespace(bare=bare, screening=None)
+    assert decide.judged(search, alone, {}, learnt(30)).best is two
+    alone.append(decide.Weighed(one, ("a",), True, 1000.0))
+    assert decide.judged(search, alone, {}, learnt(30)).best is one
 
 
 def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,11 +60,12 @@ class Model:
         """What the discrepancies of form amount to (N,): in the channels' units, and whitened."""
         return self._amount(0, self._of_form)
 
-    def bent(self) -> tuple[Array, Array]:
-        """What the other forms of the model's effects amount to (N,): in the channels' units, and
-        whitened.
+    def zeros(self) -> Array:
+        """What zeros without a law amount to beyond our formula of them (N,), whitened: of effects
+        that go as they like along some covariate.
         """
-        return self._amount(self._of_form, len(self.fitted.allowance.parts) - 1)
+        free = {effect.name for effect in self.fitted.acting if effect.free_along}
+        return self._amount(self._of_form, len(self.fitted.allowance.parts) - 1, free)[1]
 
     @property
     def _of_form(self) -> int:
@@ -73,14 +74,18 @@ class Model:
         sizes = _values(freedoms[: len(self.sizes)], self.sizes) if freedoms else []
         return sum(size > 0.0 for size in sizes)
 
-    def _amount(self, begin: int, end: int) -> tuple[Array, Array]:
-        """Of the acting freedoms begin … end − 1, beside what every fit has."""
+    def _amount(
+        self, begin: int, end: int, names: Collection[str] | None = None
+    ) -> tuple[Array, Array]:
+        """Of the acting freedoms begin … end − 1, beside what every fit has; of some names only."""
         allowance, slack = self.fitted.allowance, self.fitted.slack
         ends = np.cumsum([freedom.columns.shape[1] for freedom, _ in allowance.parts])
         own = np.zeros_like(self.fitted.residual)
         whitened = np.zeros_like(self.fitted.residual)
         for number in range(begin + 1, end + 1):
             freedom, size = allowance.parts[number]
+            if names is not None and freedom.name not in names:
+                continue
             weights = slack[ends[number - 1] : ends[number]]
             own = own + size * (freedom.columns @ weights)
             whitened = whitened + size * (freedom.whitened @ weights)

@@ -278,8 +278,9 @@ def _promised(
     sharp = not model.names and any(p.scan and p.unit == "m" for p in effect.parameters())
     elsewhere = _apart(ranked)[: TUNING.search.elsewhere] if sharp else []
     others = (_best_of(search, model, effect, [fixed], settings) for fixed in elsewhere)
-    kept = tuple(p for p in others if p is not None and p.gain > TUNING.search.promising)
-    return replace(first, gain=first.gain - usual, others=kept)
+    kept = [p for p in others if p is not None and p.gain > TUNING.search.promising]
+    new = tuple(p for p in kept if not np.array_equal(p.start, first.start))
+    return replace(first, gain=first.gain - usual, others=new)
 
 
 def _best_of(

@@ -4,7 +4,7 @@ have taken its part.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.effects import make
+from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
+from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.settings import _smaller, settings_of
 from gritd.tools.diagnose.method import fit_base
@@ -75,7 +77,8 @@ def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
 
     kind, every = rig.effects["bulldozing"], settings_of(search.problem, bare)
     assert (every.sizes[0], every.costs[0]) == (bare.sizes, 0.0)
-    tried = list(_tried(search, bare, kind, every))
+    shapes = search.first.fixed["bulldozing"][: TUNING.search.again]
+    tried = [p for fixed in shapes for p in _tried(search, bare, kind, fixed, every)]
     as_it_is = max(p.gain for p in tried if p.sizes == bare.sizes)
     best = next(p for p in promises(search, bare) if p.effect is kind)
     assert best.gain > as_it_is + 5.0
@@ -167,3 +170,51 @@ def test_no_effect_owes_its_place_to_a_fit_that_ended_elsewhere() -> None:
     again = next(m for m in free.models if m.names == one.names)
     assert again.evidence == pytest.approx(one.evidence, abs=0.5)
     assert free.best() is again
+
+
+@dataclass(frozen=True)
+class RoughWall(SideWallRubbing):
+    """A wall that is rough in waves of 60 mm."""
+
+    def testbed(self, reaction: Reaction, situation: Situation) -> Reaction:
+        rough = 1.0 + 0.7 * np.cos(2.0 * np.pi * situation.position / 0.06)
+        return SideWallRubbing.testbed(replace(self, share=self.share * rough), reaction, situation)
+
+
+def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One load: a wall's mean friction looks like a weaker soil, its waves do not."""
+    rig = WheelRig(record(plan(loads=(70.0, 70.0)), (RoughWall(0.05),)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    bare = _bare(search, search.base)
+    search = replace(search, models=(search.base, bare))
+
+    def promised() -> Promise:
+        return next(p for p in promises(search, bare) if p.effect.name == "side_wall_rubbing")
+
+    varied = promised()
+    fitted = _with_effect(search, bare, varied)
+    assert fitted.fitted.acting[0].share == pytest.approx(0.05, rel=0.25)  # type: ignore[attr-defined]
+    assert fitted.evidence > bare.evidence + 50.0
+
+    monkeypatch.setattr(searching, "varied_along_place", lambda *_: [])
+    assert varied.gain > promised().gain + 50.0
+
+
+def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
+    patch = make("soil_patch", {"friction_change": -0.2, "centre": 0.2, "length": 0.2})
+    rig = WheelRig(record(plan(), (patch,)), settings())
+    rng = np.random.default_rng(0)
+    search = begin(prepare_screening(fit_base(rig, rng), rng))
+    bare = _bare(search, search.base)
+    search = replace(search, models=(search.base, bare))
+
+    promise = next(p for p in promises(search, bare) if p.effect.name == "soil_patch")
+    assert 0 < len(promise.others) <= TUNING.search.elsewhere
+    starts = [tuple(p.start) for p in (promise, *promise.others)]
+    assert len(set(starts)) == len(starts)
+    best = _with_effect(search, bare, promise).evidence
+    alone = [_with_effect(search, bare, replace(p, others=())).evidence for p in promise.others]
+    assert best >= max(alone) - 1e-6

@@ -305,6 +305,8 @@ def _parts(runs: Sequence[Mapping[str, Samples]], name: str) -> Iterator[_Part]:
 
 def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channel, str, int] | None:
     """Log chance, channel, axis and place of the likeliest line of all."""
+    if not channels:
+        return None
     strongest = []
     sure, promising = (
         float(np.log(p / tried)) for p in (TUNING.orders.level, TUNING.orders.promising)
@@ -316,8 +318,6 @@ def _likeliest(channels: Sequence[_Channel], tried: int) -> tuple[float, _Channe
                 chance = min(chance, channel.cleaned(axis, place))
             strongest.append((chance, channel, axis, place))
 
-    if not strongest:
-        return None
     prefer = {"angle": TUNING.orders.prefer_angle, "time": 0.0}
     return min(strongest, key=lambda each: each[0] - prefer[each[2]])
 

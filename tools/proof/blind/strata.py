@@ -16,16 +16,16 @@ from gritd.tools.proof.blind.plant.worlds import PAPER, WORLDS, concealable
 Item = TypeVar("Item")
 
 SHARES = {
-    "none": 0.14,
+    "none": 0.15,
     "awkward": 0.10,
-    "single": 0.13,
+    "single": 0.14,
     "usual": 0.13,
     "absorbed": 0.03,
     "confounded": 0.03,
     "two": 0.05,
     "unlisted": 0.08,
     "foreign": 0.10,
-    "pair": 0.21,
+    "pair": 0.19,
 }
 STRATA = tuple(SHARES)
 # times the detection limit; the strongest is what bends the form of the model most

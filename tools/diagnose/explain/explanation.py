@@ -153,9 +153,9 @@ def _ranked(search: Search, decision: Decision) -> list[tuple[str, float]]:
         for name in (best.names if several else ())
     }
 
-    def order(item: tuple[str, float]) -> tuple[float, float]:
+    def order(item: tuple[str, float]) -> tuple[float, float, float]:
         name, probability = item
-        return -round(probability, 2), -lost.get(name, 0.0)
+        return -round(probability, 2), -lost.get(name, 0.0), -probability
 
     return sorted(decision.probability.items(), key=order)
 

@@ -278,10 +278,8 @@ def _gain(projected: Projected, own: Index) -> tuple[float, float]:
 
 
 def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
-    """Families of a channel by evidence, each beside those before it and beside the channel's
-    mean, which all of them hold.
-    """
-    mean = [f for f in families if f.shape.along == ("constant",)]
+    """Families of a channel by evidence, each beside those before it and the mean they all hold."""
+    mean = next((f for f in families if f.shape.along == ("constant",)), None)
     taken: list[Family] = []
     best = 0.0
 
@@ -290,8 +288,8 @@ def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
         first = max(tried, key=lambda f: tried[f], default=None)
         if first is None or not _adds(tried[first], best):
             return taken
-        for alone in mean if not taken else ():
-            first = first if _adds(tried[first], tried[alone]) else alone
+        if mean and not taken and not _adds(tried[first], tried[mean]):
+            first = mean
         taken, best = [*taken, first], tried[first]
 
 

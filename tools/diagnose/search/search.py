@@ -10,24 +10,17 @@ from itertools import chain
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, order_of
-from gritd.estimator.terramechanics.soil import Array
+from gritd.estimator.effects.base import order_of
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
-from gritd.tools.diagnose.fit.bending import varied_along_place
-from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_evidence
-from gritd.tools.diagnose.fit.marginal import Chosen
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
-from gritd.tools.diagnose.fit.settings import Settings, settings_of
-from gritd.tools.diagnose.fit.signatures import resolved_order, signature, some_of, strengths
-from gritd.tools.diagnose.noise.colour import whiten
+from gritd.tools.diagnose.fit.signatures import resolved_order
 from gritd.tools.diagnose.rig.interface import Rig
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.screen.screening import Screening, screen_of_base, with_form_open
+from gritd.tools.diagnose.search.promises import Promise, promises
 from gritd.tools.diagnose.tuning import TUNING
-
-TURNING = "wheel_angle"  # what an effect that ripples goes with
 
 
 @dataclass(frozen=True)
@@ -201,26 +194,14 @@ def _near(search: Search, model: Model) -> bool:
 # ---- one more effect ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Promise:
-    """What an effect would gain beside a model by linear algebra [nats], where its fit begins, and
-    the sizes of the forms beside which it gains that; others: where else the fit may begin.
-    """
-
-    gain: float
-    effect: type[Effect]
-    start: Array  # of its parameters, in their units
-    sizes: Chosen
-    others: tuple[Promise, ...] = ()
-
-
 def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> Search:
     """With fits of each of some models and one more effect, so many of each at most, but no two of
     the same effects.
     """
     wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
     for model in starts:
-        candidates = [p for p in promises(search, model, jobs) if p.gain > TUNING.search.promising]
+        every = promises(search.problem, search.first, model, jobs)
+        candidates = [p for p in every if p.gain > TUNING.search.promising]
         fresh = [(frozenset((*model.names, p.effect.name)), p) for p in candidates]
         fresh = [(names, p) for names, p in fresh if names not in wanted and not search.has(names)]
         wanted |= {names: (model, promise) for names, promise in fresh[:most]}
@@ -237,151 +218,6 @@ def shared(search: Search) -> list[object]:
     """What fits of a search hold: its freedoms and its models."""
     allowed = (freedom for freedom, _ in search.problem.allowance.parts)
     return [*allowed, *search.screening.forms, *search.models]
-
-
-def promises(search: Search, model: Model, jobs: int = 1) -> list[Promise]:
-    """Of every effect that may be what raised the alarm and is not in the model, the most promising
-    first.
-
-    A discrepancy of form that was learnt without an effect may have taken the effect's part. So
-    each effect is judged beside smaller discrepancies too, at what these cost. A fit is not linear,
-    so it may do better than linear algebra by a share.
-
-    jobs: processes.
-    """
-    effects, first = search.problem.stack.rig.effects, search.first
-    settings = settings_of(search.problem, model)
-    names = [n for n in effects if n not in model.names and n in first.fixed]
-    if not first.on_grid:  # a ripple alone raised the alarm
-        names = [n for n in names if effects[n].fingerprint.covariate == TURNING]
-
-    def likeliest(some: Sequence[str]) -> list[Promise]:
-        with search.problem.stack.rig.aside():  # the same bits, whatever was tried before
-            every = (_promised(search, model, effects[name], settings) for name in some)
-            return [promise for promise in every if promise is not None]
-
-    made = each(jobs, likeliest, list(some_of(names)))
-    return sorted((one for some in made for one in some), key=lambda promise: -promise.gain)
-
-
-def _promised(
-    search: Search, model: Model, effect: type[Effect], settings: Settings
-) -> Promise | None:
-    """The best promise of an effect, less what a reference shows of it, with those at its other
-    shapes; None without any.
-    """
-    ranked, likeliest = search.first.fixed[effect.name], TUNING.search.again
-    first = _best_of(search, model, effect, ranked[:likeliest], settings)
-    if first is None:
-        return None
-    usual = TUNING.screen.habit * search.first.habit.get(effect.name, 0.0)
-    sharp = not model.names and any(p.scan and p.unit == "m" for p in effect.parameters())
-    elsewhere = _apart(ranked)[: TUNING.search.elsewhere] if sharp else []
-    others = (_best_of(search, model, effect, [fixed], settings) for fixed in elsewhere)
-    kept = [p for p in others if p is not None and p.gain > TUNING.search.promising]
-    new = tuple(p for p in kept if not np.array_equal(p.start, first.start))
-    return replace(first, gain=first.gain - usual, others=new)
-
-
-def _best_of(
-    search: Search,
-    model: Model,
-    effect: type[Effect],
-    shapes: Sequence[dict[str, float]],
-    settings: Settings,
-) -> Promise | None:
-    """The best promise of an effect of some shapes."""
-    tried = (p for fixed in shapes for p in _tried(search, model, effect, fixed, settings))
-    return max(tried, key=lambda p: np.round(p.gain / TUNING.search.same), default=None)
-
-
-def _apart(ranked: Sequence[dict[str, float]]) -> list[dict[str, float]]:
-    """Of shapes that were tried, the likeliest first, those that are not beside a likelier one in
-    the grid.
-    """
-    grid = {name: sorted({fixed[name] for fixed in ranked}) for name in ranked[0]}
-    places = [np.array([grid[name].index(fixed[name]) for name in grid]) for fixed in ranked]
-    return [
-        fixed
-        for number, fixed in enumerate(ranked)
-        if all(np.abs(places[number] - other).max() > 1 for other in places[:number])
-    ]
-
-
-def _tried(
-    search: Search,
-    model: Model,
-    effect: type[Effect],
-    fixed: dict[str, float],
-    settings: Settings,
-) -> Iterator[Promise]:
-    """The promise of an effect of some shape for each setting."""
-    fitted, problem = model.fitted, search.problem
-    made = signature(problem.stack, fitted.u, fitted.predicted, effect, fixed, fitted.acting)
-    if made is None:
-        return
-
-    varied = [] if model.names else varied_along_place(problem.stack, effect, made)
-    count = len(made.sign)
-    columns = whiten(problem.noise, np.column_stack((made.columns, *varied)))
-    for sizes, cost, a, b in settings.project(columns):
-        own = log_evidence(a[:count, :count], b[:count], made.sign)
-        amplitude = _amplitude(a[:count, :count], b[:count])
-        yield _promise(effect, made, float(own), cost, amplitude, sizes)
-        for bayes, amplitude in _gains_varied(made, a, b):
-            yield _promise(effect, made, bayes, cost, amplitude, sizes)
-
-
-def _gains_varied(made: Signature, a: Array, b: Array) -> Iterator[tuple[float, Array]]:
-    """Log Bayes factor of an effect of which one strength varies along the bed, and the strengths
-    (p,); of each strength. What varies about a mean that constants take tells the strength too.
-    """
-    count = len(made.sign)
-    waves = (len(b) - count) // count
-    for number in range(count if waves else 0):
-        first = count + number * waves
-        index = np.concatenate((np.arange(count), np.arange(first, first + waves)))
-        own, right = a[np.ix_(index, index)], b[index]
-        sign = (*made.sign, *(0,) * waves)
-        amplitude = _amplitude(own, right)
-        told = float(np.sqrt(np.mean(amplitude[count:] ** 2)))
-        amplitude = amplitude[:count]
-        amplitude[number] = np.copysign(max(abs(amplitude[number]), told), amplitude[number])
-        yield float(log_bayes(own, right, sign)) + TUNING.search.varied, amplitude
-
-
-def _promise(
-    effect: type[Effect],
-    made: Signature,
-    bayes: float,
-    cost: float,
-    amplitude: Array,
-    sizes: Chosen,
-) -> Promise:
-    gain = (1.0 + TUNING.search.curved) * bayes - cost
-    return Promise(gain, effect, _start(effect, made, amplitude), sizes)
-
-
-def _amplitude(a: Array, b: Array) -> Array:
-    """Linear estimate of strengths (p,)."""
-    return np.asarray(np.linalg.solve(a + TUNING.search.least_precision * np.eye(len(b)), b))
-
-
-def _start(effect: type[Effect], made: Signature, amplitude: Array) -> Array:
-    """Where the fit of an effect's parameters begins: strengths at their linear estimate (p,)."""
-    amplitude = np.where(
-        np.array(made.sign) > 0, np.maximum(amplitude, TUNING.search.least_start), amplitude
-    )
-
-    size = dict(zip((p.name for p in strengths(effect)), amplitude.tolist(), strict=True))
-    values = [
-        size[p.name] if p.name in size else (made.fixed[p.name] - p.centre) / p.sigma
-        for p in effect.parameters()
-    ]
-
-    return np.asarray(
-        np.clip(np.array(values), -TUNING.search.farthest_start, TUNING.search.farthest_start)
-    )
 
 
 def _with_effect(search: Search, model: Model, promise: Promise) -> Model:

@@ -19,19 +19,18 @@ from gritd.tools.diagnose.fit.settings import _smaller, settings_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screening import prepare_screening
+from gritd.tools.diagnose.search import promises as promising
 from gritd.tools.diagnose.search import search as searching
+from gritd.tools.diagnose.search.promises import Beside, Promise, _tried, promises
 from gritd.tools.diagnose.search.search import (
-    Promise,
     Search,
     _bare,
     _calmed,
     _free_near,
     _retested,
-    _tried,
     _with_effect,
     begin,
     extended,
-    promises,
 )
 from gritd.tools.diagnose.tuning import TUNING, replaced
 from gritd.tools.proof.ours.cases import record
@@ -77,10 +76,11 @@ def test_an_effect_that_the_discrepancy_took_keeps_its_promise() -> None:
 
     kind, every = rig.effects["bulldozing"], settings_of(search.problem, bare)
     assert (every.sizes[0], every.costs[0]) == (bare.sizes, 0.0)
+    beside = Beside(search.problem, search.first, bare, every)
     shapes = search.first.fixed["bulldozing"][: TUNING.search.again]
-    tried = [p for fixed in shapes for p in _tried(search, bare, kind, fixed, every)]
+    tried = [p for fixed in shapes for p in _tried(beside, kind, fixed)]
     as_it_is = max(p.gain for p in tried if p.sizes == bare.sizes)
-    best = next(p for p in promises(search, bare) if p.effect is kind)
+    best = next(p for p in promises(search.problem, search.first, bare) if p.effect is kind)
     assert best.gain > as_it_is + 5.0
     assert max(best.sizes) < max(bare.sizes)
 
@@ -95,7 +95,7 @@ def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> N
 
     rippling = replace(quiet, first=replace(quiet.first, ripple=1e-9))
     assert rippling.first.alarmed
-    tried = {promise.effect.name for promise in promises(rippling, bare)}
+    tried = {promise.effect.name for promise in promises(rippling.problem, rippling.first, bare)}
     assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}
 
 
@@ -192,14 +192,18 @@ def test_what_varies_along_the_bed_tells_an_effect_whose_mean_the_soil_takes(
     search = replace(search, models=(search.base, bare))
 
     def promised() -> Promise:
-        return next(p for p in promises(search, bare) if p.effect.name == "side_wall_rubbing")
+        return next(
+            p
+            for p in promises(search.problem, search.first, bare)
+            if p.effect.name == "side_wall_rubbing"
+        )
 
     varied = promised()
     fitted = _with_effect(search, bare, varied)
     assert fitted.fitted.acting[0].share == pytest.approx(0.05, rel=0.25)  # type: ignore[attr-defined]
     assert fitted.evidence > bare.evidence + 50.0
 
-    monkeypatch.setattr(searching, "varied_along_place", lambda *_: [])
+    monkeypatch.setattr(promising, "varied_along_place", lambda *_: [])
     assert varied.gain > promised().gain + 50.0
 
 
@@ -211,7 +215,9 @@ def test_an_effect_with_edges_is_fitted_from_several_places() -> None:
     bare = _bare(search, search.base)
     search = replace(search, models=(search.base, bare))
 
-    promise = next(p for p in promises(search, bare) if p.effect.name == "soil_patch")
+    promise = next(
+        p for p in promises(search.problem, search.first, bare) if p.effect.name == "soil_patch"
+    )
     assert 0 < len(promise.others) <= TUNING.search.elsewhere
     starts = [tuple(p.start) for p in (promise, *promise.others)]
     assert len(set(starts)) == len(starts)

@@ -95,6 +95,17 @@ def test_strength_follows_detectability() -> None:
     assert detector.detectability([half]) == pytest.approx(0.5 * case.detectability, rel=0.05)
 
 
+def test_what_is_as_strong_as_on_a_testbed_is_so_however_well_it_shows() -> None:
+    drawn = strata.assignments(41, np.random.default_rng(6), ("usual",))
+    assert {a.effects for a in drawn} == {(name,) for name in LISTED}
+    for seed in range(4):
+        case = cases.drawn(1, seed, Assignment("usual", ("coulomb_friction",), strata.USUAL))
+        (effect,) = case.effects
+        most = 0.6 * Detector(case.trial).facts().torque
+        assert 0.2 * most <= effect.strength <= 0.6 * most
+        assert case.single == (pytest.approx(Detector(case.trial).detectability([effect])),)
+
+
 def test_what_is_off_is_invisible(null: cases.Case) -> None:
     detector = Detector(null.trial)
     facts = detector.facts()

@@ -10,7 +10,9 @@ FILE keeps what was compared, a line of JSON for each campaign: a campaign that 
 compared again. Of each search the bare model and the models within reach of the best one decide.
 Each is given to scipy's trust region reflective least squares (Branch, Coleman and Li 1999, SIAM
 J. Sci. Comput. 21, 1-23) with the same bounds and priors, from where our descent ended and from K
-points about it. A fit is off by what the best of these gains [nats].
+points about it. The other forms of the effects are made anew where a descent ends, and the evidence
+takes the last step by linear algebra (fit/marginal.py). So a fit is off by what the best of these
+reaches beyond the optimum that the evidence counts, or misses of it [nats].
 """
 
 from __future__ import annotations
@@ -57,8 +59,9 @@ FAR = 1e6  # a residual where the model runs away
 
 @dataclass(frozen=True)
 class Compared:
-    """One fit. nats: its objective; gain: what the best full optimisation gains, from where our
-    descent ended and from points about it.
+    """One fit. nats: its objective at the optimum that its evidence counts; gain: what the best
+    full optimisation gains beyond it, from where our descent ended and from points about it;
+    negative where the linear algebra counts more than there is.
     """
 
     case: str
@@ -109,6 +112,18 @@ def optimised(problem: Problem, model: Model, start: Array) -> float:
     return float(optimum.cost)
 
 
+def counted(problem: Problem, model: Model) -> float:
+    """The objective [nats] of a model's optimum as its evidence counts it: by the slopes of where
+    the descent ended, what stands at a bound held.
+    """
+    fitted = model.fitted
+    ground = problem.ground(fitted.effects, fitted.free)
+    here = ground.moved(fitted, ground.tried(fitted.centre)[0])
+    free = np.flatnonzero(~fitted.held)
+    pull = here.gradient[free]
+    return here.nats - float(0.5 * pull @ np.linalg.solve(here.curvature[np.ix_(free, free)], pull))
+
+
 def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
     """All whose squares are the objective: values, what is allowed, and strains."""
     tried, nats = ground.tried(centre)
@@ -133,7 +148,7 @@ def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -
 
     for model in deciding(search):
         problem, here = problem_of(search, model), model.fitted.centre
-        ours = problem.ground(model.fitted.effects, model.fitted.free).tried(here)[1]
+        ours = counted(problem, model)
         near = optimised(problem, model, here)
         moved = [here + SPREAD * rng.standard_normal(here.size) for _ in range(starts)]
         elsewhere = min((optimised(problem, model, m) for m in moved), default=near)
@@ -226,8 +241,8 @@ def _drawn(rng: np.random.Generator) -> Rig:
 def page(outcomes: Sequence[Outcome], asked: int) -> str:
     """The result in Markdown."""
     rows = [row for outcome in outcomes for row in outcome.rows]
-    off = [r for r in rows if max(r.gain, r.gain_elsewhere) > LIMIT]
-    near = [r for r in rows if r.gain > LIMIT]
+    off = [r for r in rows if _off(r) > LIMIT]
+    near = [r for r in rows if abs(r.gain) > LIMIT]
     done = [outcome for outcome in outcomes if not outcome.failed]
 
     lines = [
@@ -249,9 +264,14 @@ def page(outcomes: Sequence[Outcome], asked: int) -> str:
         lines += [
             f"| {r.case} | {', '.join(r.names) or 'bare'} | {'yes' if r.converged else 'no'}"
             f" | {r.gain:.2f} | {r.gain_elsewhere:.2f} |"
-            for r in sorted(off, key=lambda r: -max(r.gain, r.gain_elsewhere))
+            for r in sorted(off, key=_off, reverse=True)
         ]
     return "\n".join([*lines, ""])
+
+
+def _off(row: Compared) -> float:
+    """By what a fit is off [nats], to either side."""
+    return max(abs(row.gain), row.gain_elsewhere)
 
 
 def kept(file: Path) -> list[Outcome]:

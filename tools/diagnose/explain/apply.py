@@ -15,7 +15,7 @@ from gritd.estimator.effects.base import Parameter
 from gritd.estimator.visible import visible
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
 from gritd.tools.diagnose.explain.apply_form import set_discrepancy
-from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity, SoilFit
+from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, SoilFit
 
 HEADER = "# made by gritd diagnose: "
 SOIL_KEYS = {"c": "cohesion", "tan_phi": "tan_phi", "k": "shear_modulus", "n": "exponent"}
@@ -63,8 +63,7 @@ def _without_header(text: str) -> str:
 def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
     parameters_of = _had(diagnosis)
     for h in diagnosis.accepted:
-        found = _in_any_form(h)
-        parameters_of[h.effect] = _more(h.effect, parameters_of.get(h.effect, {}), found)
+        parameters_of[h.effect] = _more(h.effect, parameters_of.get(h.effect, {}), h.parameters)
     if diagnosis.law is not None and diagnosis.law.parameters:
         parameters_of["empirical_law"] = diagnosis.law.parameters
 
@@ -79,20 +78,6 @@ def _had(diagnosis: Diagnosis) -> dict[str, Mapping[str, Quantity]]:
     if diagnosis.reference is None or not is_known(diagnosis):
         return {}
     return dict(diagnosis.reference.effects)
-
-
-def _in_any_form(hypothesis: Hypothesis) -> Mapping[str, Quantity]:
-    """The parameters of an accepted effect, its strengths as uncertain as its form makes them: the
-    next campaign drives elsewhere, and there another form has another strength.
-    """
-    strengths = {p.name: p for p in EFFECTS[hypothesis.effect].parameters() if p.role == "strength"}
-    share = hypothesis.other_forms
-    return {
-        name: replace(q, sigma=hypot(q.sigma, share * (q.value - strengths[name].off)))
-        if name in strengths
-        else q
-        for name, q in hypothesis.parameters.items()
-    }
 
 
 def _more(

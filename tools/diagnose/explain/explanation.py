@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import hypot
 from typing import Any
 
 from gritd.estimator.effects import EFFECTS
@@ -31,7 +32,7 @@ from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import described, label
 from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import Fitted, Problem
+from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import Bools, Rig
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.search.search import Search, without
@@ -123,19 +124,21 @@ def _hypotheses(
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
         alike = _alike(decision, name)
+        forms = decision.best.form_share(name) if accepted else 0.0
+        rig = search.problem.stack.rig
 
         out.append(
             Hypothesis(
                 effect=name,
                 probability=probability,
                 heldout_gain_nats=_gain(before, best, every) if best else 0.0,
-                parameters=parameters(search.problem.stack.rig, best.fitted, name) if best else {},
+                parameters=parameters(rig, best, name, forms) if best else {},
                 indistinguishable_from=alike,
                 accepted=accepted,
                 sentence=EFFECTS[name].sentence(),
                 score_nats=search.first.evidence.get(name, 0.0),
                 separated_by={r: EXPERIMENTS[k] for r in alike if (k := _key(name, r)) is not None},
-                other_forms=decision.best.form_share(name) if accepted else 0.0,
+                other_forms=forms,
             )
         )
 
@@ -183,19 +186,19 @@ def _gain(before: list[HeldOut], model: Model, every: Sequence[Sequence[Bools]])
     return min(gains, default=0.0)
 
 
-def parameters(rig: Rig, fitted: Fitted, name: str) -> dict[str, Quantity]:
-    """Fitted values of an effect, in what its units mean for the rig."""
-    sigma = fitted.sigma[len(fitted.u) :]
+def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[str, Quantity]:
+    """What a model says of an effect's parameters, in what their units mean for the rig.
 
-    return {
-        p.name: Quantity(
-            f.value(float(x)) * rig.unit_factor(p.unit),
-            float(s) * p.sigma * rig.unit_factor(p.unit),
-            p.unit,
-        )
-        for f, x, s in zip(fitted.free, fitted.x, sigma, strict=False)
-        if f.name == name and (p := f.parameter)
-    }
+    forms: the share by which another form of the effect may differ. Its strength differs by as
+    much: the fit alone knows a strength as if our formula were exact.
+    """
+    found = {}
+    for f, x, s in zip(model.fitted.free, *model.parameters(), strict=True):
+        if f.name == name and (p := f.parameter):
+            value, own, unit = f.value(float(x)), float(s) * p.sigma, rig.unit_factor(p.unit)
+            other = forms * (value - p.off) if p.role == "strength" else 0.0
+            found[p.name] = Quantity(value * unit, hypot(own, other) * unit, p.unit)
+    return found
 
 
 # ---- fit and noise -- ------------------------------------------------------------------

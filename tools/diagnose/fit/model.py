@@ -108,6 +108,17 @@ class Model:
             return self.fitted.u, self.fitted.covariance()[:count, :count]
         return self.marginal.constants(self.chosen, count)
 
+    def parameters(self) -> tuple[Array, Array]:
+        """Mean and standard deviation (p,) of the effects' parameters in expected sizes, averaged
+        likewise.
+        """
+        first = len(self.fitted.u)
+        wanted = np.arange(first, first + len(self.fitted.x))
+        if self.marginal is None:
+            return self.fitted.x, self.fitted.sigma[wanted]
+        mean, covariance = self.marginal.moments(self.chosen, wanted)
+        return mean, np.sqrt(np.diag(covariance))
+
 
 def fit_model(
     problem: Problem,

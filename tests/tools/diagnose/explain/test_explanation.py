@@ -5,10 +5,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from gritd.tools.diagnose.explain.explanation import _remaining, _summary
+from gritd.estimator.effects.stribeck_friction import StribeckFriction
+from gritd.tools.diagnose.explain.explanation import _remaining, _summary, parameters
 from gritd.tools.diagnose.explain.result import Remainder
+from gritd.tools.diagnose.fit.problem import Free
 
 
 @pytest.mark.parametrize(
@@ -60,3 +63,19 @@ def test_what_the_names_leave_is_told_in_the_unit_that_is_shown(formed: bool, ve
     who = "Without its discrepancy of form, the model" if formed else "The model"
     assert told == (f"{who} misses sinkage by 4.6 mm (−2.8 mm at 5 % slip, +6.8 mm at 49 % slip).")
     assert _remaining(decision, [], {}, formed) == "Nothing above the noise remains."
+
+
+def test_a_strength_is_as_uncertain_as_its_form_makes_it() -> None:
+    """The fit knows it as if our formula were exact; what is no strength has one meaning."""
+    excess, speed = StribeckFriction.parameters()
+    free = tuple(Free(StribeckFriction, p, "stribeck_friction") for p in (excess, speed))
+    x = np.array([2.0 / excess.sigma, 0.0])
+    sigma = np.array([0.3 / excess.sigma, 0.1])
+    model: Any = SimpleNamespace(fitted=SimpleNamespace(free=free), parameters=lambda: (x, sigma))
+    rig: Any = SimpleNamespace(unit_factor=lambda unit: 1.0)
+
+    exact = parameters(rig, model, "stribeck_friction")
+    told = parameters(rig, model, "stribeck_friction", forms=0.2)
+    assert (told["excess"].value, told["excess"].sigma) == pytest.approx((2.0, 0.5))
+    assert exact["excess"].sigma == pytest.approx(0.3)
+    assert told["speed"] == exact["speed"]

@@ -57,18 +57,6 @@ def test_effects_and_soil_are_the_next_prior_and_comments_stay(rig: Path) -> Non
     )
 
 
-def test_a_strength_is_written_as_uncertain_as_its_form_makes_it(rig: Path) -> None:
-    """Elsewhere another form of an effect has another strength; what is no strength stays."""
-    told = {"excess": Quantity(2.0, 0.3, "N*m"), "speed": Quantity(0.6, 0.07, "rad/s")}
-    stuck = Hypothesis("stribeck_friction", 0.8, 9.0, told, accepted=True, other_forms=0.2)
-    diagnosis = base(verdict="explained", hypotheses=(stuck,))
-    after = rewritten(rig.read_text(), config.load(rig), diagnosis)
-    effects = {e.name: e for e in config.loads(after, "new.yaml", rig.parent).settings.effects}
-    written = effects["stribeck_friction"].parameters
-    assert written["excess"].sigma == pytest.approx(0.5, rel=1e-3)
-    assert written["speed"].sigma == pytest.approx(0.07, rel=1e-3)
-
-
 @pytest.mark.parametrize("sigmas", [0.003, 1.0, 1e3])
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_what_is_written_of_any_effect_can_be_read_again(

@@ -3,7 +3,8 @@ simulated cases whose plants have other forms than the library's.
 
 The evidence of every explanation [nats] becomes a probability by one temperature, the odds of a
 listed effect, of one more effect and of what is in no list, and the share of cases in which all
-evidence misleads.
+evidence misleads. A rig that has a reference is one that the equations do not quite follow, so what
+is new on it is told apart by less: it has a table of its own.
 """
 
 from __future__ import annotations
@@ -45,9 +46,14 @@ class Calibration:
         return np.asarray(evidence / self.temperature + odds)
 
 
+def of(referred: bool) -> str:
+    """The table for campaigns beside a reference, or for campaigns alone."""
+    return "pairs" if referred else "alone"
+
+
 @cache
-def learnt(candidates: int = 1) -> Calibration:
-    """What calibration.json holds, for so many listed effects."""
-    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))
+def learnt(candidates: int = 1, referred: bool = False) -> Calibration:
+    """What calibration.json holds, for so many listed effects; referred: beside a reference."""
+    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))[of(referred)]
     names = [n for n in Calibration.__dataclass_fields__ if n != "candidates"]
     return Calibration(**{name: float(table[name]) for name in names}, candidates=candidates)

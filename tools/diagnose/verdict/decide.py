@@ -46,7 +46,8 @@ def decide(search: Search, jobs: int = 1) -> Decision:
         beside |= _beside(search, _rivals(search, evidence, best), jobs)
 
     weighed = weigh(search, evidence, beside)
-    return judged(search, weighed, beside, learnt(len(_candidates(search))))
+    by = learnt(len(_candidates(search)), search.problem.stack.referred)
+    return judged(search, weighed, beside, by)
 
 
 def _beside(search: Search, models: Sequence[Model], jobs: int) -> dict[Model, Nameless | None]:

@@ -1,12 +1,13 @@
-"""`python -m gritd.tools.proof.ours.calibrate --out OUT PATH…`: learn how far evidence is to be
-trusted.
+"""`python -m gritd.tools.proof.ours.calibrate [--pairs] --out OUT PATH…`: learn how far evidence is
+to be trusted, of campaigns alone or of pairs.
 
 Each PATH is a file of trials (`python -m gritd.tools.proof.ours.trials --out FILE`) or the folder
 of an opened batch of blind trials (`gritd prove --output FOLDER`). The temperature and the odds are
 those that give the truth of every case the largest probability, on average: the logarithmic score,
 which only stated probabilities that are true maximise (Good 1952). A prior (START, PRIOR) keeps
 what few cases do not tell. The truth of a case is any set of effects that holds a true one,
-weighted by how many of its effects are true; of one outside the list, an explanation without names.
+weighted by how many of its effects are true; of one outside the list, or of a pair in which nothing
+is new, an explanation without names. OUT keeps the other table that it holds.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from scipy.special import expit, logsumexp
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.verdict.calibration import Calibration
+from gritd.tools.diagnose.verdict.calibration import Calibration, of
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
 # ln temperature; log odds: listed, more, nameless; logit of the lapse
 START = np.array([np.log(3.0), 1.1, -1.9, 0.0, -3.5])
-PRIOR = np.array([1.0, 1.0, 1.0, 1.0, 0.5])  # standard deviations about START
+PRIOR = 1.0  # standard deviation of each about START
 # where the formula is the diagnosis' own, names come too easily
 LEARNT_FROM = ("cousin", "pair", "unlisted")
 OTHERS = 30  # names among which a lapse spreads
@@ -111,11 +112,12 @@ def learn(cases: Sequence[Case]) -> tuple[Calibration, float]:
 # ---- where cases come from ---------------------------------------------------------------------
 
 
-def read(path: Path) -> list[Case]:
-    """The cases of a file of trials or a folder of blind trials that alarmed, rightly, on what
-    another author might have recorded: the others say nothing of names.
+def read(path: Path, pairs: bool = False) -> list[Case]:
+    """The cases of a file of trials or a folder of blind trials that alarmed on what another author
+    might have recorded: the others say nothing of names. A campaign alone counts where it alarmed
+    rightly. pairs: those of a folder instead of its campaigns alone.
     """
-    return _batch(path) if path.is_dir() else _trials(path)
+    return _batch(path, pairs) if path.is_dir() else _trials(path)
 
 
 def _trials(path: Path) -> list[Case]:
@@ -127,15 +129,17 @@ def _trials(path: Path) -> list[Case]:
     ]
 
 
-def _batch(folder: Path) -> list[Case]:
+def _batch(folder: Path, pairs: bool) -> list[Case]:
     cases = []
     for result in sorted(folder.glob("cases/*/result.json")):
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
-        if diagnosis["explanations"] and answers["effects"]:
+        if diagnosis["explanations"] and bool(answers.get("bed")) == pairs:
+            if not pairs and not answers["effects"]:
+                continue
             unlisted = not set(answers["effects"]) & EFFECTS.keys()
-            held = () if answers.get("bed") else HELD[answers.get("world", PAPER)]
+            held = () if pairs else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]
             cases.append(
                 case_of(diagnosis["explanations"], answers["effects"], unlisted, count, held)
@@ -144,24 +148,29 @@ def _batch(folder: Path) -> list[Case]:
     return cases
 
 
+def _keep(out: Path, name: str, table: dict[str, Any]) -> None:
+    """A table beside the others of a file."""
+    kept = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {}
+    out.write_text(json.dumps(kept | {name: table}, indent=1) + "\n", encoding="utf-8")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m gritd.tools.proof.ours.calibrate", description=__doc__
     )
     parser.add_argument("paths", nargs="+", type=Path, metavar="PATH")
+    parser.add_argument("--pairs", action="store_true", help="of folders, the pairs")
     parser.add_argument("--out", type=Path)
     parser.add_argument("--note", default="", help="how the cases were made; kept with the table")
     arguments = parser.parse_args(argv)
 
-    cases = [case for path in arguments.paths for case in read(path)]
+    cases = [case for path in arguments.paths for case in read(path, arguments.pairs)]
     by, mean_log_truth = learn(cases)
     table = {name: value for name, value in asdict(by).items() if name != "candidates"}
-    text = json.dumps(
-        table | {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}, indent=1
-    )
-    print(text)
+    table |= {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}
+    print(json.dumps(table, indent=1))
     if arguments.out is not None:
-        arguments.out.write_text(text + "\n", encoding="utf-8")
+        _keep(arguments.out, of(arguments.pairs), table)
     return 0
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -26,7 +28,7 @@ from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict import decide
 from gritd.tools.diagnose.verdict.calibration import learnt
-from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth
+from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth, main, read
 from gritd.tools.proof.ours.cases import record
 from gritd.tools.proof.ours.other_forms import LorentzStribeck
 from tests.tools.diagnose.campaigns import plan, settings
@@ -159,11 +161,43 @@ def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(
     assert _judged(900.0, 200.0, 0.05, monkeypatch).verdict == "unlisted"
 
 
-def test_the_learnt_table_is_sound() -> None:
-    by = learnt()
+@pytest.mark.parametrize("referred", [False, True])
+def test_the_learnt_table_is_sound(referred: bool) -> None:
+    by = learnt(referred=referred)
     assert 0.5 < by.temperature < 50.0
     assert max(by.more, by.nameless) < 3.0 and by.listed > -5.0
     assert 0.0 < by.lapse < 0.3
+
+
+def test_beside_a_reference_the_same_evidence_says_less() -> None:
+    """A rig with a reference is off the equations: names beside names come more easily there."""
+    alone, pairs = learnt(30), learnt(30, referred=True)
+    evidence, count, none = np.array([30.0, 40.0]), np.array([1, 2]), np.zeros(2)
+    less, more = (by.weights(evidence, count, none) @ [-1.0, 1.0] for by in (pairs, alone))
+    assert less < more
+
+
+def test_a_table_is_learnt_beside_the_other(tmp_path: Path) -> None:
+    """Campaigns alone and pairs of a batch each have their own."""
+    for number, bed in enumerate([None, "same"]):
+        case = tmp_path / "cases" / f"case-{number}"
+        case.mkdir(parents=True)
+        said = {"names": ["grousers"], "nameless": False, "evidence": 9.0 + number}
+        found = {"explanations": [said], "candidates": 30}
+        (case / "result.json").write_text(json.dumps(found))
+        (tmp_path / "answers").mkdir(exist_ok=True)
+        answers = {"effects": ["grousers"], "bed": bed}
+        (tmp_path / "answers" / f"{case.name}.json").write_text(json.dumps({"answers": answers}))
+
+    assert [c.evidence.tolist() for c in read(tmp_path)] == [[9.0]]
+    assert [c.evidence.tolist() for c in read(tmp_path, pairs=True)] == [[10.0]]
+
+    out = tmp_path / "table.json"
+    assert main([str(tmp_path), "--out", str(out)]) == 0
+    alone = json.loads(out.read_text())
+    assert main([str(tmp_path), "--pairs", "--out", str(out)]) == 0
+    both = json.loads(out.read_text())
+    assert both.keys() == {"alone", "pairs"} and both["alone"] == alone["alone"]
 
 
 def test_the_evidence_of_a_fit_is_the_integral() -> None:

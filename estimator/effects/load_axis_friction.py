@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
+from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
 from gritd.estimator.stages.history import path_relaxed, smoothed
 from gritd.estimator.stages.situation import Recall, Situation
 from gritd.estimator.terramechanics.soil import Scalar
-
-PRESLIDING = 1e-4  # [m] travel over which the friction turns round
 
 
 @dataclass(frozen=True)
@@ -22,12 +20,21 @@ class LoadAxisFriction(Effect):
     W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z
     s = 1 at the start: the wheel was lowered on the soil
 
-    The friction keeps its last direction when the axis stops. Source: presliding model of Dahl
+    The friction keeps its last direction when the axis stops. Stiff guides turn it round within
+    0.02 mm, plain bushes on soft brackets within a millimetre. Source: presliding model of Dahl
     (1968), Aerospace Corp. TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),
     Automatica 30, 1083-1138.
     """
 
     friction: float = strength("friction of the axis, F", "N", typical=2.0, low=0.0, high=30.0)
+    travel: float = shape(
+        "travel over which the friction turns round, δ",
+        "m",
+        mean=2e-4,
+        sigma=4e-4,
+        low=2e-5,
+        high=3e-3,
+    )
 
     stage = "testbed"
     fingerprint = Fingerprint(
@@ -43,11 +50,11 @@ class LoadAxisFriction(Effect):
 
     def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
         (direction,), moved = memory, situation.sinking * step
-        share = -np.expm1(-np.abs(moved) / PRESLIDING)
+        share = -np.expm1(-np.abs(moved) / self.travel)
         return (float(direction + (np.sign(moved) - direction) * share),)
 
     def _direction(self, situation: Situation) -> Scalar:
         """s, −1 after rising … 1 after sinking."""
         if self.name in situation.memory:
             return situation.memory[self.name][0]
-        return path_relaxed(smoothed(situation.time, situation.sinkage), PRESLIDING)
+        return path_relaxed(smoothed(situation.time, situation.sinkage), self.travel)

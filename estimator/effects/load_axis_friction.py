@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.history import path_relaxed, smoothed
+from gritd.estimator.stages.history import presliding, smoothed, turned_round
 from gritd.estimator.stages.situation import Recall, Situation
 from gritd.estimator.terramechanics.soil import Scalar
 
@@ -17,12 +17,13 @@ class LoadAxisFriction(Effect):
     """The vertical axis sticks: the soil feels less than the weights while the wheel sinks, more
     while it rises.
 
-    W = w − F s,   ds/dz = (sign(dz) − s)/δ along the path of z
+    W = w − F s,   ds/dz = sign(dz) (1 − s sign(dz))^i/δ along the path of z
     s = 1 at the start: the wheel was lowered on the soil
 
     The friction keeps its last direction when the axis stops. Stiff guides turn it round within
-    0.02 mm, plain bushes on soft brackets within a millimetre. Source: presliding model of Dahl
-    (1968), Aerospace Corp. TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),
+    0.02 mm, plain bushes on soft brackets within a millimetre. With i = 0 it is a spring that
+    slips, with i = 1 it nears ±1 more and more slowly. Source: presliding model of Dahl (1968),
+    Aerospace Corp. TOR-0158(3107-18)-1; Armstrong-Hélouvry, Dupont, Canudas de Wit (1994),
     Automatica 30, 1083-1138.
     """
 
@@ -34,6 +35,9 @@ class LoadAxisFriction(Effect):
         sigma=4e-4,
         low=2e-5,
         high=3e-3,
+    )
+    exponent: float = shape(
+        "how slowly it turns round at last, i", "", mean=1.0, sigma=0.5, low=0.0, high=3.0
     )
 
     stage = "testbed"
@@ -49,12 +53,12 @@ class LoadAxisFriction(Effect):
         return load - np.minimum(self.friction, np.maximum(load, 0.0)) * self._direction(situation)
 
     def remember(self, memory: Recall, step: float, situation: Situation) -> Recall:
-        (direction,), moved = memory, situation.sinking * step
-        share = -np.expm1(-np.abs(moved) / self.travel)
-        return (float(direction + (np.sign(moved) - direction) * share),)
+        moved = float(situation.sinking) * step / self.travel
+        return (turned_round(memory[0], moved, self.exponent),)
 
     def _direction(self, situation: Situation) -> Scalar:
         """s, −1 after rising … 1 after sinking."""
         if self.name in situation.memory:
             return situation.memory[self.name][0]
-        return path_relaxed(smoothed(situation.time, situation.sinkage), self.travel)
+        path = np.atleast_1d(smoothed(situation.time, situation.sinkage))
+        return presliding(path, self.travel, self.exponent)

@@ -4,6 +4,9 @@ of time.
 
 from __future__ import annotations
 
+from itertools import accumulate
+from math import exp, log1p
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,7 @@ from gritd.estimator.terramechanics.soil import Array, Scalar
 Bools = NDArray[np.bool_]
 
 SMOOTHING = 0.2  # [s] span over which a measured speed or sinkage is averaged
+LINEAR = 1e-8  # a share whose logarithm is linear
 
 
 def smoothed(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
@@ -63,11 +67,28 @@ def followed(target: Scalar, share: Array, run: Scalar = 0.0) -> Array:
     return _relax(np.asarray(target), np.where(run_begins(run, share.size), 1.0, share))
 
 
-def path_relaxed(path: Scalar, length: float, start: float = 1.0) -> Array:
-    """y (n,) with length · dy/ds = sign(dx) − y along the path length s [m] of x (n,) [m]."""
-    moved = np.diff(path, prepend=np.ravel(path)[:1])
-    share = -np.expm1(-np.abs(moved) / length)
-    return _relax(np.append(start, np.sign(moved)), np.append(1.0, share))[1:]
+def turned_round(state: float, moved: float, exponent: float) -> float:
+    """s, −1 … 1, after a step x, given over δ, of ds/dx = sign(dx) (1 − s sign(dx))^i: Dahl (1968).
+
+    With u = 1 − s sign(dx), u^(1−i) falls by (1 − i) |x|; for i = 1 ln u falls by |x|.
+    """
+    sign, rest = (1.0 if moved > 0.0 else -1.0), 1.0 - exponent
+    left = 1.0 - state * sign
+    if moved == 0.0 or left <= 0.0:
+        return state
+
+    fall = abs(moved) * left**-rest
+    if rest * fall >= 1.0:  # it slips
+        return sign
+    log_left = -fall if abs(rest * fall) < LINEAR else log1p(-rest * fall) / rest
+    return sign * (1.0 - left * exp(log_left))
+
+
+def presliding(path: Array, travel: float, exponent: float, start: float = 1.0) -> Array:
+    """s (n,) of `turned_round` along a path (n,) [m], where δ is a travel [m]."""
+    moved = (np.diff(path, prepend=path[:1]) / travel).tolist()
+    turned = accumulate(moved, lambda s, x: turned_round(s, x, exponent), initial=start)
+    return np.fromiter(turned, dtype=float)[1:]
 
 
 def run_begins(run: Scalar, count: int) -> Bools:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from gritd.estimator.stages.history import rate_of, smoothed
+from gritd.estimator.stages.history import presliding, rate_of, smoothed, turned_round
 
 
 def test_a_straight_line_is_not_bent_by_smoothing_and_its_rate_is_its_slope() -> None:
@@ -17,3 +19,35 @@ def test_a_straight_line_is_not_bent_by_smoothing_and_its_rate_is_its_slope() ->
 def test_a_single_instant_is_itself_and_has_no_rate() -> None:
     assert smoothed(1.0, 7.0) == 7.0 and rate_of(1.0, 7.0) == 0.0
     assert rate_of([0.0, 1.0], [3.0, 4.0]).tolist() == [0.0, 0.0]
+
+
+STATES, STEPS = st.floats(-1.0, 1.0), st.floats(-4.0, 4.0)
+
+
+@given(STATES, STEPS, st.floats(0.0, 3.0))
+def test_presliding_in_two_steps_is_one(state: float, moved: float, exponent: float) -> None:
+    halfway = turned_round(state, 0.5 * moved, exponent)
+    once = turned_round(state, moved, exponent)
+    assert turned_round(halfway, 0.5 * moved, exponent) == pytest.approx(once, abs=1e-9)
+    assert -1.0 <= once <= 1.0
+
+
+@given(STATES, STEPS)
+def test_presliding_has_a_spring_and_an_exponential_as_limits(state: float, moved: float) -> None:
+    spring = min(max(state + moved, -1.0), 1.0)
+    assert turned_round(state, moved, 0.0) == pytest.approx(spring, abs=1e-12)
+    slowly = np.sign(moved) + (state - np.sign(moved)) * np.exp(-abs(moved))
+    assert turned_round(state, moved, 1.0) == pytest.approx(slowly, abs=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [0.3, 0.7, 1.5, 2.5])
+def test_presliding_solves_its_equation(exponent: float) -> None:
+    """Against steps of Euler's method along a path there and back."""
+    travel = 3e-4
+    path = 1e-3 * np.sin(np.linspace(0.0, 7.0, 200_001))
+    moved, s = np.diff(path, prepend=path[:1]) / travel, 1.0
+    stepped = []
+    for x in moved.tolist():
+        s += x * max(1.0 - s * np.sign(x), 0.0) ** exponent
+        stepped.append(s)
+    assert np.allclose(presliding(path, travel, exponent), stepped, atol=2e-4)

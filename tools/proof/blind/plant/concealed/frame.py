@@ -173,8 +173,8 @@ class StickingAxis(Effect, ABC):
         return cls(min(cls.most, 0.15 * facts.weight), float(rng.uniform(1e-4, 4e-4)))
 
     @abstractmethod
-    def follow(self, state: float, moved: float) -> float:
-        """h after a step of z, given over δ."""
+    def held(self, steps: Array) -> Array:
+        """h (n,) after steps of z (n,), given over δ."""
 
     def pressed(self, scene: Scene) -> Array | float:
         """By how much the guides hold more than F (n,)."""
@@ -187,13 +187,8 @@ class StickingAxis(Effect, ABC):
         if not scene.sinkage.size:
             return weight - self.strength * (weight > 0.0)
 
-        held, state = [], 1.0
         steps = np.diff(scene.sinkage, prepend=scene.sinkage[0]) / self.breakaway
-        for moved in steps.tolist():
-            state = self.follow(state, moved)
-            held.append(state)
-
-        back = self.strength * np.array(held) * self.pressed(scene)
+        back = self.strength * self.held(steps) * self.pressed(scene)
         return np.asarray(np.maximum(weight - back * (weight > 0.0), 0.0))
 
     def coinciding(self) -> dict[str, float]:
@@ -201,15 +196,20 @@ class StickingAxis(Effect, ABC):
 
 
 @dataclass(frozen=True)
-class SpringAxis(StickingAxis):
-    """A spring of stiffness F/δ that slips at ±F.
+class SpringsAxis(StickingAxis):
+    """Five springs side by side, each of which slips at F/5, the stiffest after δ/4, the softest
+    after 3 δ.
 
-    Source: elasto-plastic (Prandtl) element; Al-Bender, Lampaert, Swevers (2005), IEEE Trans.
-    Automatic Control 50, 1883-1887, its single-element case.
+    Source: generalised Maxwell slip; Al-Bender, Lampaert, Swevers (2005), IEEE Trans. Automatic
+    Control 50, 1883-1887.
     """
 
-    def follow(self, state: float, moved: float) -> float:
-        return min(max(state + moved, -1.0), 1.0)
+    def held(self, steps: Array) -> Array:
+        softness, springs, held = np.geomspace(0.25, 3.0, 5), np.ones(5), []
+        for moved in steps.tolist():
+            springs = np.clip(springs + moved / softness, -1.0, 1.0)
+            held.append(springs.mean())
+        return np.array(held)
 
 
 @dataclass(frozen=True)
@@ -224,9 +224,13 @@ class HystereticAxis(StickingAxis):
         """0.8 + |DP|/W (n,), dimensionless; the ratio counts up to 1, with W at least 1 N."""
         return 0.8 + np.clip(np.abs(scene.pull) / np.maximum(scene.motion.weight, 1.0), 0.0, 1.0)
 
-    def follow(self, state: float, moved: float) -> float:
-        onward = 1.0 - state * state if state * moved > 0.0 else 1.0
-        return min(max(state + moved * onward, -1.0), 1.0)
+    def held(self, steps: Array) -> Array:
+        state, held = 1.0, []
+        for moved in steps.tolist():
+            onward = 1.0 - state * state if state * moved > 0.0 else 1.0
+            state = min(max(state + moved * onward, -1.0), 1.0)
+            held.append(state)
+        return np.array(held)
 
 
 @dataclass(frozen=True)
@@ -277,7 +281,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     RollingBed,
     JointedFrame,
     RollingContacts,
-    SpringAxis,
+    SpringsAxis,
     HystereticAxis,
     LeaningWall,
     RoughWall,

@@ -10,11 +10,12 @@ along the bed, as another formula for it would have it. Beside h each channel ha
 own, since another formula shares the effect out among the channels in another way. What an effect
 of the soil does may follow slip and load over an arc of rolling, and build up where each run
 begins: soil has to move first. Another law of shear does as much at another shear displacement, so
-it may act as a change of slip too. A ripple may also have other harmonics. No wall, rail, pulley or
-bed is the same all along, so what is not of the drive may also vary with the place, in waves of any
-length down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how
-a zero creeps, or how it is set before each run: it may follow any smooth function, of up to twice
-the size of our formula. What the parameters of the model's effects can do is taken out of all this,
+it may act as a change of slip too. No law says what profile a rim, a hub or a tooth has, so a
+ripple may also have other harmonics, of up to twice its size. No wall, rail, pulley or bed is the
+same all along, so what is not of the drive may also vary with the place, in waves of any length
+down to a twelfth of the way, with a size of its own, which is mostly nought. No law says how a zero
+creeps, or how it is set before each run: it may follow any smooth function, of up to twice the
+size of our formula. What the parameters of the model's effects can do is taken out of all this,
 so that a strength is what its effect does on the whole. ρ is how far published forms differ; its
 prior is over 0 to 40 %. Our own form may be the best one to name an effect by, but the soil is
 never told as if it were exact: where the soil can absorb most of an effect, another form of it
@@ -69,8 +70,12 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
                 columns = _beside(noise, varied, fitted)
                 freedoms.append(freedom(effect.name, columns, noise, _place_sizes()))
 
-            harmonics = _harmonics(stack, fitted, number)
-            every = np.column_stack((functions, harmonics, _by_channel(stack, added)))
+            for harmonics in _harmonics(stack, fitted, number):
+                columns = added[:, None] * harmonics / np.sqrt(harmonics.shape[1])
+                columns = _beside(noise, columns, fitted)
+                freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
+
+            every = np.column_stack((functions, _by_channel(stack, added)))
             columns = added[:, None] * every / np.sqrt(every.shape[1])
             if effect.stage in OF_SOIL:
                 columns = np.column_stack((columns, _following(stack, added)))
@@ -187,14 +192,13 @@ def _by_channel(stack: Stack, added: Array) -> Array:
     return np.column_stack(marks).astype(float)
 
 
-def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Array:
-    """The first two harmonics of a ripple's order (N, 4): times the ripple they give another shape.
-    Else (N, 0).
-    """
+def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Iterator[Array]:
+    """The first harmonics of a ripple's order (N, m): times it they give another profile."""
     effect = build(fitted.effects, fitted.free, fitted.x)[number]
     if effect.fingerprint.covariate != "wheel_angle":
-        return np.zeros((stack.size, 0))
+        return
     name = order_of(type(effect))
     phase = stack.covariate("wheel_angle") * (getattr(effect, name) if name else 1.0)
-    waves = [np.sqrt(2.0) * wave(k * phase) for k in (1.0, 2.0) for wave in (np.cos, np.sin)]
-    return np.column_stack(waves)
+    orders = range(1, TUNING.fit.harmonics + 1)
+    waves = [np.sqrt(2.0) * wave(k * phase) for k in orders for wave in (np.cos, np.sin)]
+    yield np.column_stack(waves)

@@ -47,6 +47,7 @@ class Fit:
     free_zero_prior: tuple[float, ...] = tuned(
         (0.25, 0.25, 0.25, 0.25), "prior", "probability of each of the sizes", "judgement"
     )
+    harmonics: int = tuned(4, "-", "of a ripple that its profile may have besides", "judgement")
     following_arcs: tuple[float, ...] = tuned(
         (0.3, 1.0, 3.0), "rad", "of rolling over which an effect follows: the contact and more"
     )

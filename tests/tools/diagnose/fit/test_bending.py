@@ -192,3 +192,35 @@ def test_a_wall_that_is_not_straight_is_a_wall() -> None:
     found = diagnosed(plan(seconds=30.0), (_WavyWall(0.12),))
     assert found.verdict == "explained"
     assert [h.effect for h in found.hypotheses if h.accepted] == ["side_wall_rubbing"]
+
+
+def test_no_law_says_what_profile_a_hub_has() -> None:
+    """Its third harmonic, as large as the first, is a combination of the columns with another of
+    its profiles; what goes on evenly has no harmonics.
+    """
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, free = problem.stack, free_of((EFFECTS["hub_runout"],))
+    x = np.array([1.0 if f.parameter.name == "lift_cos" else 0.0 for f in free])
+    start = np.zeros(len(stack.rig.constants)), x
+    fitted = problem.descend((EFFECTS["hub_runout"],), free, *start, rounds=0)
+    profiles = [
+        f
+        for f in bending_freedoms(stack, problem.noise, fitted)
+        if f.columns.shape[1] == 2 * TUNING.fit.harmonics
+    ]
+    assert [f.sizes.values[-1] for f in profiles] == [2.0]
+
+    added = fitted.predicted - stack.predict(start[0], ())
+    third = np.abs(added).max() * np.cos(3.0 * stack.covariate("wheel_angle")) * (added != 0.0)
+    columns = np.column_stack((profiles[0].columns, fitted.raw[:, len(start[0]) :]))
+    left = third - columns @ np.linalg.lstsq(columns, third, rcond=None)[0]
+    assert np.linalg.norm(left) < 0.15 * np.linalg.norm(third)
+
+
+def test_a_steady_effect_has_no_profile() -> None:
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    stack, free = problem.stack, free_of((EFFECTS["bulldozing"],))
+    start = np.zeros(len(stack.rig.constants)), np.ones(len(free))
+    fitted = problem.descend((EFFECTS["bulldozing"],), free, *start, rounds=0)
+    freedoms = bending_freedoms(stack, problem.noise, fitted)
+    assert all(f.sizes.values[-1] < 2.0 for f in freedoms)

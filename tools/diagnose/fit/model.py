@@ -110,14 +110,16 @@ class Model:
 
     def parameters(self) -> tuple[Array, Array]:
         """Mean and standard deviation (p,) of the effects' parameters in expected sizes, averaged
-        likewise.
+        likewise; of one that is held at its bound that of the fit, as if it were not held.
         """
-        first = len(self.fitted.u)
-        wanted = np.arange(first, first + len(self.fitted.x))
+        first, count = len(self.fitted.u), len(self.fitted.x)
+        wanted = np.arange(first, first + count)
+        sigma = self.fitted.sigma[wanted]
         if self.marginal is None:
-            return self.fitted.x, self.fitted.sigma[wanted]
+            return self.fitted.x, sigma
         mean, covariance = self.marginal.moments(self.chosen, wanted)
-        return mean, np.sqrt(np.diag(covariance))
+        held = self.fitted.held[wanted]
+        return mean, np.where(held, sigma, np.sqrt(np.diag(covariance)))
 
 
 def fit_model(

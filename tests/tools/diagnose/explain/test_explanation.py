@@ -11,6 +11,7 @@ import pytest
 from gritd.estimator.effects.stribeck_friction import StribeckFriction
 from gritd.tools.diagnose.explain.explanation import _remaining, _summary, parameters
 from gritd.tools.diagnose.explain.result import Remainder
+from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Free
 
 
@@ -79,3 +80,18 @@ def test_a_strength_is_as_uncertain_as_its_form_makes_it() -> None:
     assert (told["excess"].value, told["excess"].sigma) == pytest.approx((2.0, 0.5))
     assert exact["excess"].sigma == pytest.approx(0.3)
     assert told["speed"] == exact["speed"]
+
+
+def test_a_parameter_at_its_bound_is_not_known_exactly() -> None:
+    fitted: Any = SimpleNamespace(
+        u=np.zeros(1),
+        x=np.array([0.0, 1.0]),
+        sigma=np.array([1.0, 0.4, 0.3]),
+        held=np.array([False, True, False]),
+    )
+    marginal: Any = SimpleNamespace(
+        moments=lambda chosen, wanted: (np.array([0.0, 1.1]), np.diag([0.0, 0.04]))
+    )
+    mean, sigma = Model(fitted, marginal=marginal).parameters()
+    assert mean.tolist() == [0.0, 1.1]
+    assert sigma.tolist() == pytest.approx([0.4, 0.2])

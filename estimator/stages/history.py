@@ -70,7 +70,8 @@ def followed(target: Scalar, share: Array, run: Scalar = 0.0) -> Array:
 def turned_round(state: float, moved: float, exponent: float) -> float:
     """s, −1 … 1, after a step x, given over δ, of ds/dx = sign(dx) (1 − s sign(dx))^i: Dahl (1968).
 
-    With u = 1 − s sign(dx), u^(1−i) falls by (1 − i) |x|; for i = 1 ln u falls by |x|.
+    With u = 1 − s sign(dx), u^(1−i) falls by (1 − i) |x|; for i = 1 ln u falls by |x|. NaN where
+    the step or the state is not known.
     """
     sign, rest = (1.0 if moved > 0.0 else -1.0), 1.0 - exponent
     left = 1.0 - state * sign
@@ -80,7 +81,7 @@ def turned_round(state: float, moved: float, exponent: float) -> float:
     fall = abs(moved) * left**-rest
     if rest * fall >= 1.0:  # it slips
         return sign
-    log_left = -fall if abs(rest * fall) < LINEAR else log1p(-rest * fall) / rest
+    log_left = log1p(-rest * fall) / rest if abs(rest * fall) >= LINEAR else -fall
     return sign * (1.0 - left * exp(log_left))
 
 

@@ -51,3 +51,13 @@ def test_presliding_solves_its_equation(exponent: float) -> None:
         s += x * max(1.0 - s * np.sign(x), 0.0) ** exponent
         stepped.append(s)
     assert np.allclose(presliding(path, travel, exponent), stepped, atol=2e-4)
+
+
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, 2.0])
+def test_presliding_of_what_is_not_known_or_endless(exponent: float) -> None:
+    """A prediction that runs away must not end a diagnosis."""
+    assert np.isnan(turned_round(0.3, np.nan, exponent))
+    assert np.isnan(turned_round(np.nan, 0.1, exponent))
+    assert turned_round(1.0, -np.inf, exponent) == -1.0
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(presliding(np.array([0.0, np.inf, np.inf]), 1e-4, exponent)[-1])

@@ -46,7 +46,7 @@ class Calibration:
         return np.asarray(evidence / self.temperature + odds)
 
 
-def of(referred: bool) -> str:
+def table_of(referred: bool) -> str:
     """The table for campaigns beside a reference, or for campaigns alone."""
     return "pairs" if referred else "alone"
 
@@ -54,6 +54,6 @@ def of(referred: bool) -> str:
 @cache
 def learnt(candidates: int = 1, referred: bool = False) -> Calibration:
     """What calibration.json holds, for so many listed effects; referred: beside a reference."""
-    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))[of(referred)]
+    table: Mapping[str, float] = json.loads(TABLE.read_text(encoding="utf-8"))[table_of(referred)]
     names = [n for n in Calibration.__dataclass_fields__ if n != "candidates"]
     return Calibration(**{name: float(table[name]) for name in names}, candidates=candidates)

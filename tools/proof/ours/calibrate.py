@@ -26,7 +26,7 @@ from scipy.special import expit, logsumexp
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.verdict.calibration import Calibration, of
+from gritd.tools.diagnose.verdict.calibration import Calibration, table_of
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
 
@@ -135,9 +135,8 @@ def _batch(folder: Path, pairs: bool) -> list[Case]:
         sealed = folder / "answers" / f"{result.parent.name}.json"
         answers = json.loads(sealed.read_text(encoding="utf-8"))["answers"]
         diagnosis = json.loads(result.read_text(encoding="utf-8"))
-        if diagnosis["explanations"] and bool(answers.get("bed")) == pairs:
-            if not pairs and not answers["effects"]:
-                continue
+        wanted = bool(answers.get("bed")) == pairs and (pairs or answers["effects"])
+        if diagnosis["explanations"] and wanted:
             unlisted = not set(answers["effects"]) & EFFECTS.keys()
             held = () if pairs else HELD[answers.get("world", PAPER)]
             count = diagnosis["candidates"]
@@ -170,7 +169,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table |= {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}
     print(json.dumps(table, indent=1))
     if arguments.out is not None:
-        _keep(arguments.out, of(arguments.pairs), table)
+        _keep(arguments.out, table_of(arguments.pairs), table)
     return 0
 
 

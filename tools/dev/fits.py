@@ -37,6 +37,7 @@ from gritd.estimator.config import configuration as config
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.command import CommandError, Parser
+from gritd.tools.cli.guard import guarded
 from gritd.tools.cli.progress import Progress
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Ground, Problem
@@ -342,4 +343,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(guarded(main))

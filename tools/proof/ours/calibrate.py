@@ -26,6 +26,8 @@ from scipy.special import expit, logsumexp
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.command import CommandError
+from gritd.tools.cli.guard import guarded
 from gritd.tools.diagnose.verdict.calibration import Calibration, table_of
 from gritd.tools.proof.blind.groups import alike
 from gritd.tools.proof.blind.plant.worlds import HELD, PAPER
@@ -164,6 +166,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
 
     cases = [case for path in arguments.paths for case in read(path, arguments.pairs)]
+    if not cases:
+        where = ", ".join(map(str, arguments.paths))
+        raise CommandError(f"{where}: found no trial that raised an alarm; expected some")
     by, mean_log_truth = learn(cases)
     table = {name: value for name, value in asdict(by).items() if name != "candidates"}
     table |= {"cases": len(cases), "score": mean_log_truth, "note": arguments.note}
@@ -174,4 +179,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(guarded(main))

@@ -15,6 +15,7 @@ from scipy.stats import norm
 
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect
+from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.fit.allowance import Allowance
 from gritd.tools.diagnose.fit.bending import bending_sizes
 from gritd.tools.diagnose.fit.evidence import strength_sizes
@@ -198,6 +199,10 @@ def test_a_table_is_learnt_beside_the_other(tmp_path: Path) -> None:
     assert main([str(tmp_path), "--pairs", "--out", str(out)]) == 0
     both = json.loads(out.read_text())
     assert both.keys() == {"alone", "pairs"} and both["alone"] == alone["alone"]
+
+    with pytest.raises(CommandError, match="no trial that raised an alarm"):
+        main([str(tmp_path / "answers"), "--out", str(out)])
+    assert json.loads(out.read_text()) == both
 
 
 def test_the_evidence_of_a_fit_is_the_integral() -> None:

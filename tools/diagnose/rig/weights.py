@@ -4,6 +4,7 @@ them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,15 +16,27 @@ from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
 MEASURED_NOTE = (
-    "Weights are taken from the measured load in runs that do not state theirs or that change"
-    " them: friction of the load axis cannot show there."
+    "Some run does not state its load or changes it, so weights are taken from the measured load:"
+    " friction of the load axis cannot show. It can where every run states one load."
 )
 
 
 class Weights(NamedTuple):
-    values: Array  # (n,) [N]
+    values: Array  # (n,) [N] what the wheel is driven with
+    sets: Array  # (n,) [N] the same while the same weights hang on the axle
     known: bool  # stated, so that the measured load can be compared with them
     load: Array | None = None  # (n,) [N] as it was measured, where they are taken from it
+    sigma: Array | float = 0.0  # (n,) [N] of the values, by the noise of the sensor
+
+
+def weights_in(signals: Sequence[Signals], settings: Settings) -> list[Weights]:
+    """Those of all runs: as they are stated, or as they are measured. Where friction of the axis
+    cannot show in one run, it must not act in the others.
+    """
+    every = [weights_of(one, settings) for one in signals]
+    if all(one.known for one in every):
+        return every
+    return [_measured(one, settings) or w for one, w in zip(signals, every, strict=True)]
 
 
 def weights_of(signals: Signals, settings: Settings) -> Weights:
@@ -37,15 +50,11 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
     stated = settings.load.nominal.value if nominal is None else nominal
     constant = np.full(signals.time.size, float(stated))
 
-    measured = signals.analogue.get("load")
-    if (
-        measured is None
-        or settings.wrench is None
-        or settings.wrench.load.offset.sigma > TUNING.rig.unknown_offset
-    ):
-        return Weights(constant, True)
+    measured = _measured(signals, settings)
+    if measured is None or measured.load is None or settings.wrench is None:
+        return Weights(constant, constant, True)
 
-    load = _bridged(measured)
+    load = measured.load
     near, lifted = (
         np.abs(load - stated) <= TUNING.rig.close_load * stated + TUNING.rig.close_force,
         load <= TUNING.rig.raised * stated,
@@ -60,9 +69,22 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
         and np.mean(near | lifted) >= 1.0 - TUNING.rig.passing
         and np.mean(near) > np.mean(lifted)
     ):
-        return Weights(np.where(load > TUNING.rig.carried * stated, constant, 0.0), True)
+        hung = np.where(load > TUNING.rig.carried * stated, constant, 0.0)
+        return Weights(hung, hung, True)
 
-    return Weights(levels(signals.time, load), False, load)
+    return measured
+
+
+def _measured(signals: Signals, settings: Settings) -> Weights | None:
+    """Those that the force sensor tells; none without a sensor of known zero."""
+    measured, wrench = signals.analogue.get("load"), settings.wrench
+    if measured is None or wrench is None:
+        return None
+    if wrench.load.offset.sigma > TUNING.rig.unknown_offset:
+        return None
+    load = _bridged(measured)
+    values, sigma = felt(signals.time, load)
+    return Weights(values, levels(signals.time, load), False, load, sigma)
 
 
 def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
@@ -71,24 +93,48 @@ def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
     return float(np.sqrt(nominal.sigma**2 + gain**2 + sensor.offset.sigma**2))
 
 
-def levels(time: Array, load: Array) -> Array:
-    """The measured load (n,) [N]: its mean over each stretch on which it is level, else as it was
-    measured.
-    """
-    step = float(np.median(np.diff(time)))
-    half = max(round(0.5 * TUNING.rig.hold / step), 1)
-    padded = np.pad(load, half, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
-    slack = TUNING.rig.load_level * np.abs(load) + TUNING.rig.load_noise * _noise(load)
+def felt(time: Array, load: Array) -> tuple[Array, Array]:
+    """What the wheel feels (n,) [N] of a measured load (n,), and its standard deviation (n,) [N].
 
-    level = np.ptp(windows, axis=1) <= slack
-    local = windows.mean(axis=1)
+    Of each value it is the mean over the longest moment whose mean is, within the noise, that of
+    every shorter one (intersection of confidence intervals: Goldenshluger, Nemirovski 1997, Math.
+    Methods Statist. 6, 135-170). By what the mean over half of it differs, it may be bent. The
+    sensor sits beside the wheel, so friction of the axis is in it.
+    """
+    noise, count = _noise(load), np.arange(_half(time) + 1)
+    means = np.array([_moments(load, half).mean(axis=1) for half in range(count.size)])
+    within = TUNING.rig.load_moment * noise / np.sqrt(2.0 * count + 1.0)[:, None]
+    low = np.maximum.accumulate(means - within, axis=0)
+    high = np.minimum.accumulate(means + within, axis=0)
+    longest, at = np.sum(low <= high, axis=0) - 1, np.arange(load.size)
+    mean, shorter = means[longest, at], means[longest // 2, at]
+    bent = _moments(np.abs(mean - shorter), _half(time)).max(axis=1)
+    return mean, np.hypot(noise / np.sqrt(2.0 * longest + 1.0), bent)
+
+
+def levels(time: Array, load: Array) -> Array:
+    """The weights (n,) [N] behind a measured load (n,): its mean over each stretch on which it is
+    level, else as it was measured.
+    """
+    near = _moments(load, _half(time))
+    slack = TUNING.rig.load_level * np.abs(load) + TUNING.rig.load_noise * _noise(load)
+    level, local = np.ptp(near, axis=1) <= slack, near.mean(axis=1)
     out = np.where(level, local, load)
 
     for stretch in np.split(np.arange(load.size), np.flatnonzero(np.diff(level.astype(int))) + 1):
         if level[stretch[0]] and np.ptp(local[stretch]) <= slack[stretch].mean():
             out[stretch] = load[stretch].mean()
     return out
+
+
+def _half(time: Array) -> int:
+    """Values (n,) on each side of one that belong to its moment."""
+    return max(round(0.5 * TUNING.rig.hold / float(np.median(np.diff(time)))), 1)
+
+
+def _moments(load: Array, half: int) -> Array:
+    """The values about each of a load (n, 2 half + 1)."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(load, half, mode="edge"), 2 * half + 1)
 
 
 def _noise(values: Array) -> float:

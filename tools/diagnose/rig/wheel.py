@@ -46,7 +46,7 @@ from gritd.tools.diagnose.rig.stated_noise import noise_of_readings
 from gritd.tools.diagnose.rig.states import after_reversal
 from gritd.tools.diagnose.rig.unrest import unrest_in
 from gritd.tools.diagnose.rig.weight_sets import weight_sets
-from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_of
+from gritd.tools.diagnose.rig.weights import MEASURED_NOTE, Weights, weights_in
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 
@@ -107,7 +107,7 @@ class WheelRig:
         self.new = [number >= reference for number in range(len(signals))]
         self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
 
-        self._weights = weights = [weights_of(s, settings) for s in signals]
+        self._weights = weights = weights_in(signals, settings)
         stated = all(w.known for w in weights)
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
@@ -196,11 +196,17 @@ class WheelRig:
     @cached_property
     def motion_sigma(self) -> Sequence[Mapping[str, Array]]:
         """By the encoders' counts (n,): slip is uncertain by what a carriage would make of it that
-        is off by as much.
+        is off by as much. By the noise of a measured load.
         """
-        return [
+        told = [
             {channel: np.abs(change) * doubt for channel, change in by_speed.items()}
             for by_speed, doubt in zip(self._by_carriage, self._doubt, strict=True)
+        ]
+        if all(one.known for one in self._weights):
+            return told
+        return [
+            {c: np.hypot(values, by_load[c] * _relative_noise(one)) for c, values in run.items()}
+            for run, by_load, one in zip(told, self._by_load, self._weights, strict=True)
         ]
 
     @cached_property
@@ -213,7 +219,7 @@ class WheelRig:
         speeds = unrest_in(self._driven.motions, self._by_carriage)
         if all(one.known for one in self._weights):
             return speeds
-        return [*speeds, *load_errors_in(self._weights, self._by("weights"))]
+        return [*speeds, *load_errors_in(self._weights, self._by_load)]
 
     @cached_property
     def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
@@ -226,6 +232,11 @@ class WheelRig:
     def _by_carriage(self) -> list[dict[str, Array]]:
         """Per run, change of every channel (n,) by ln of the carriage's speed."""
         return self._by("carriage_scale")
+
+    @cached_property
+    def _by_load(self) -> list[dict[str, Array]]:
+        """Per run, change of every channel (n,) by ln of the load."""
+        return self._by("weights")
 
     def _by(self, name: str) -> list[dict[str, Array]]:
         """Per run, change of every channel (n,) by a relative constant."""
@@ -340,7 +351,13 @@ def _driven(
     ]
 
     steps = [float(np.median(np.diff(s.time))) for s in signals]
-    return Driven(motions, steps, new, weight_sets([np.asarray(m.load) for m in motions]))
+    return Driven(motions, steps, new, weight_sets([w.sets for w in weights]))
+
+
+def _relative_noise(weights: Weights) -> Array:
+    """Of measured weights (n,); nothing where the wheel is lifted."""
+    carried = weights.values > TUNING.rig.raised * weights.values.max()
+    return np.where(carried, weights.sigma / np.where(carried, weights.values, 1.0), 0.0)
 
 
 def _left_out(known: Collection[str], weights_stated: bool) -> set[str]:

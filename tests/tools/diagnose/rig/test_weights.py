@@ -12,7 +12,7 @@ import pytest
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
-from gritd.tools.diagnose.rig.weights import weights_of
+from gritd.tools.diagnose.rig.weights import felt, weights_in, weights_of
 
 SETTINGS = config.load(packaged()).settings
 NOMINAL = SETTINGS.load.nominal.value
@@ -46,3 +46,25 @@ def test_a_lifted_wheel_is_no_contradiction() -> None:
     lifted.analogue["load"][:50] = 0.0
     weights = weights_of(lifted, SETTINGS)
     assert weights.known and weights.values[10] == 0.0 and weights.values[-1] == NOMINAL
+
+
+def test_where_one_run_tells_no_weights_the_sensor_tells_those_of_all() -> None:
+    told = weights_in([run(NOMINAL, NOMINAL), run(0.7 * NOMINAL, None)], SETTINGS)
+    assert [one.known for one in told] == [False, False]
+    assert told[0].load is not None
+
+
+def test_stated_weights_stay_where_all_runs_state_theirs() -> None:
+    told = weights_in([run(NOMINAL, NOMINAL), run(0.7 * NOMINAL, 0.7 * NOMINAL)], SETTINGS)
+    assert all(one.known for one in told)
+
+
+def test_what_the_wheel_feels_follows_a_friction_that_turns_round() -> None:
+    """A load that steps by twice the friction, within what may pass for one set of weights."""
+    true = np.where(TIME < 10.0, 59.0, 61.0)
+    load = true + np.random.default_rng(2).normal(0.0, 0.1, TIME.size)
+    values, sigma = felt(TIME, load)
+    far = np.abs(TIME - 10.0) > 1.0
+    assert np.sqrt(np.mean((values - true)[far] ** 2)) < 0.05  # of noise of 0.1
+    assert np.abs(values - true).max() < 0.5
+    assert np.mean(np.abs(values - true) < 3.0 * sigma) > 0.97

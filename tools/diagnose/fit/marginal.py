@@ -117,6 +117,15 @@ class Marginal:
             self.__dict__.pop(large, None)
         return chosen, average
 
+    def gain(self, chosen: Chosen) -> float:
+        """What the evidence counts beyond where the fit stands [nats], for given sizes: of the step
+        of constants and effect parameters to the optimum by linear algebra.
+        """
+        told = np.flatnonzero(~self._held[: int(self._ends[0])])
+        mean, covariance = self._posterior(chosen, told)
+        step = mean - self._centre[told]
+        return float(0.5 * step @ np.linalg.solve(covariance, step))
+
     def constants(self, chosen: Chosen, count: int) -> tuple[Array, Array]:
         """Mean (count,) and covariance (count, count) of the first unknowns, averaged over the
         sizes about the likeliest ones.

@@ -131,11 +131,13 @@ def fit_model(
     sizes: Chosen,
     bends: Bends = NO_BENDS,
 ) -> Model:
-    """Fit and sizes in turns, until the sizes stay, a few rounds at most.
+    """Fit and sizes in turns, until the sizes stay and linear algebra has little to add, a few
+    rounds at most.
 
     Every fit has the freedoms of its effects too, as far as they are known when it begins. Without
     the other forms that these need, it would strain the constants, to where linear algebra tells
-    nothing.
+    nothing. The other forms are made anew where the first fits ended, and then stay: of two effects
+    that are nearly one, each could take the other's part from round to round.
 
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
@@ -143,13 +145,16 @@ def fit_model(
     """
     every, sizes = (*forms, *bends.freedoms), (*sizes, *bends.sizes)
     fitted = problem.with_freedoms(every, _values(every, sizes)).descend(effects, free, *start)
-    for left in reversed(range(TUNING.fit.size_rounds)):
-        known, every = every, (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
+    for number in range(TUNING.fit.size_rounds):
+        known = every
+        if number < TUNING.fit.bent_anew:
+            every = (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
 
+        near = marginal.gain(of_fit) < TUNING.fit.last_step
         sizes, evidence = marginal.likeliest(of_fit)
-        if sizes == of_fit or not left:
+        if (near and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
             break
         fitted = problem.with_freedoms(every, _values(every, sizes)).refit(fitted)
 

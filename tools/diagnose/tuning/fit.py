@@ -131,8 +131,10 @@ class Fit:
     slight_size: float = tuned(1e-3, "-", "weight of sizes below which they do not count")
     size_sweeps: int = tuned(4, "sweeps", "over the freedoms, each to its likeliest size")
     size_rounds: int = tuned(
-        4, "rounds", "of fit and sizes in turn", "nearly always two are enough"
+        5, "rounds", "of fit and sizes in turn", "nearly always two are enough"
     )
+    bent_anew: int = tuned(2, "rounds", "in which other forms are made anew where the fit stands")
+    last_step: float = tuned(0.3, "nats", "that the evidence may count beyond where a fit stands")
 
     # --- problem.py ---
     step: float = tuned(2e-3, "-", "of a prior σ or an expected size, for differences")

@@ -15,16 +15,21 @@ from gritd.estimator.terramechanics.soil import Soil
 class SlipSinkage(Effect):
     """A slipping wheel digs soil out from under itself and sinks deeper.
 
-    n = n₀ + n₁ |i|, in Eqs. (3) and (4);   z + d i/(1 − i)
+    n = n₀ + n₁ |i|,   K (1 + s [(1 + |i|)/(1 − |i|/2) − 1])⁻ⁿ,   z + d i/(1 − i)
 
-    The first changes the contact. The second is a layer that slip carries away from under the
-    wheel: the rut is deeper, the contact is the same.
+    The first two change the contact, Eqs. (3) and (4). The last is a layer that slip carries away
+    from under the wheel: the rut is deeper, the contact is the same.
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in
-    i; i/(1 − i) is attributed to Reece (1965).
+    i; Lyasko (2010), J. Terramechanics 47, 21-31, whose s is 1; i/(1 − i) is attributed to Reece
+    (1965).
     """
 
     growth: float = strength(
-        "rise of the exponent with slip, n₁", "", typical=0.2, low=-0.5, high=2.5
+        "rise of the exponent with slip, n₁", "", typical=0.2, low=0.0, high=2.5
+    )
+
+    deepening: float = strength(
+        "growth of the sinkage with slip, 1 in Lyasko's law, s", "", typical=0.3, low=0.0, high=4.0
     )
 
     digging: float = strength(
@@ -36,7 +41,13 @@ class SlipSinkage(Effect):
     confusable_with = told_apart(grousers="smooth_wheel", stress_peak_shift="penetration")
 
     def soil(self, soil: Soil, situation: Situation) -> Soil:
-        return replace(soil, exponent=soil.exponent + self.growth * np.abs(situation.slip))
+        slip = np.minimum(np.abs(situation.slip), 1.0)
+        deeper = 1.0 + self.deepening * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
+        return replace(
+            soil,
+            exponent=soil.exponent + self.growth * np.abs(situation.slip),
+            modulus=soil.modulus * deeper ** (-soil.exponent),
+        )
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         dug = self.digging * dug_by_slip(situation.slip)

@@ -28,8 +28,8 @@ class Cousin(Effect):
 
 
 @dataclass(frozen=True)
-class ReeceSlipSinkage(Cousin):
-    """Sinkage grows as h i/(1 − i), a form attributed to Reece (1965)."""
+class SweptSlipSinkage(Cousin):
+    """Sinkage grows as −h ln(1 − i): every part of the rim that passes takes a layer with it."""
 
     size: float = _size(3e-3)
     stage = "wheel"
@@ -37,7 +37,7 @@ class ReeceSlipSinkage(Cousin):
 
     def wheel(self, reaction: Reaction, situation: Situation) -> Reaction:
         slip = np.clip(situation.slip, 0.0, 0.8)
-        return replace(reaction, sinkage=reaction.sinkage + self.size * slip / (1.0 - slip))
+        return replace(reaction, sinkage=reaction.sinkage - self.size * np.log(1.0 - slip))
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class LevellingPeakShift(Cousin):
 
 
 COUSINS: tuple[type[Cousin], ...] = (
-    ReeceSlipSinkage, LorentzStribeck, PowerViscous, PowerRateShear, LinearDrying, LogMultipass,
+    SweptSlipSinkage, LorentzStribeck, PowerViscous, PowerRateShear, LinearDrying, LogMultipass,
     PlainBulldozing, QuadraticHeating, HumpedShear, SlippingRearContact, StiffeningFrame,
     SaturatingRateSinkage, LevellingPeakShift,
 )  # fmt: skip

@@ -139,36 +139,48 @@ class RootRate(Effect):
 
 
 @dataclass(frozen=True)
-class LyaskoSlipSinkage(Effect):
-    """Sinkage times 1 + s [(1 + i)/(1 − i/2) − 1].
+class CurvedSlipSinkage(Effect):
+    """n = n₀ + s (a i + (1 − a) i²): slip-sinkage that bends with slip.
 
-    Source: Lyasko (2010), J. Terramechanics 47, 21-31, where s = 1.
+    Source: the power law of Ding et al. (2011), J. Terramechanics 48, 27-45, carried to second
+    order; the share of the orders was chosen here.
     """
 
-    name, most = "slip_sinkage", 0.8
+    share: float = 0.5  # a
+
+    name, most = "slip_sinkage", 0.25
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, float(rng.uniform(0.0, 1.5)))
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
         slip = np.clip(scene.slip, 0.0, 1.0)
-        deeper = 1.0 + self.strength * ((1.0 + slip) / (1.0 - 0.5 * slip) - 1.0)
-        return replace(ground, modulus=ground.modulus * deeper ** (-np.asarray(ground.exponent)))
+        more = self.strength * (self.share * slip + (1.0 - self.share) * slip**2)
+        return replace(ground, exponent=ground.exponent + more)
 
 
 @dataclass(frozen=True)
-class ReeceSlipSinkage(Effect):
-    """Sinkage of the axle z + h i/(1 − i), i up to 0.8: slip carries a layer h away from under it.
+class SweptSlipSinkage(Effect):
+    """Sinkage of the axle z − h ln(1 − i) (W/W₀)^½, i up to 0.8: each part of the rim that passes
+    takes a layer with it, a thicker one under a heavier wheel.
 
-    The forces stay: the rut is deeper, the contact is the same. Source: attributed to Reece (1965).
+    The forces stay: the rut is deeper, the contact is the same. Source: chosen here.
     """
+
+    weight: float = 60.0  # W₀ [N]
 
     name, most = "slip_sinkage", 0.006
 
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
+        return cls(cls.most, facts.weight)
+
     def forces(self, scene: Scene) -> Scene:
         slip = np.clip(scene.slip, 0.0, 0.8)
-        dug = self.strength * slip / (1.0 - slip) * scene.moving * (scene.sinkage > 0.0)
+        heavy = np.sqrt(np.maximum(scene.motion.weight, 0.0) / self.weight)
+        dug = -self.strength * np.log(1.0 - slip) * heavy * scene.moving * (scene.sinkage > 0.0)
         return replace(scene, sinkage=scene.sinkage + dug)
-
-    def coinciding(self) -> dict[str, float]:
-        return {"digging": self.strength}
 
 
 @dataclass(frozen=True)
@@ -227,8 +239,8 @@ EFFECTS: tuple[type[Effect], ...] = (
     LogarithmOfPasses,
     LogarithmicRate,
     RootRate,
-    LyaskoSlipSinkage,
-    ReeceSlipSinkage,
+    CurvedSlipSinkage,
+    SweptSlipSinkage,
     FlankedPatch,
     RoundPatch,
 )

@@ -12,6 +12,7 @@ import numpy as np
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.candidates import steady_states
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -83,6 +84,8 @@ def _measured(signals: Signals, settings: Settings) -> Weights | None:
     if wrench.load.offset.sigma > TUNING.rig.unknown_offset:
         return None
     load = _bridged(measured)
+    if steady_states(signals):  # one after the other, they have nothing in common
+        return Weights(load, load, False, load)
     values, sigma = felt(signals.time, load)
     return Weights(values, levels(signals.time, load), False, load, sigma)
 

@@ -22,7 +22,12 @@ TIME = np.arange(0.0, 20.0, 0.1)
 def run(measured: float, stated: float | None) -> Any:
     load = measured + np.random.default_rng(1).normal(0.0, 0.1, TIME.size)
     return SimpleNamespace(
-        time=TIME, analogue={"load": load}, info=SimpleNamespace(nominal_load=stated)
+        time=TIME,
+        analogue={"load": load},
+        info=SimpleNamespace(nominal_load=stated, steady_states=False),
+        wheel_speed=np.append(0.0, np.full(TIME.size - 1, 0.2)),
+        carriage_rate=np.full(TIME.size, 0.2),
+        wheel_angle=0.2 * TIME,
     )
 
 
@@ -68,3 +73,10 @@ def test_what_the_wheel_feels_follows_a_friction_that_turns_round() -> None:
     assert np.sqrt(np.mean((values - true)[far] ** 2)) < 0.05  # of noise of 0.1
     assert np.abs(values - true).max() < 0.5
     assert np.mean(np.abs(values - true) < 3.0 * sigma) > 0.97
+
+
+def test_the_loads_of_a_table_of_steady_states_are_those_of_its_rows() -> None:
+    table = run(NOMINAL, None)
+    table.info.steady_states = True
+    table.analogue["load"] = np.random.default_rng(3).uniform(20.0, 120.0, TIME.size)
+    assert weights_of(table, SETTINGS).values == pytest.approx(table.analogue["load"])

@@ -16,7 +16,10 @@ def quantities(name: str) -> dict[str, Quantity] | None:
     """How each parameter of an effect is read; None for no such effect."""
     if name not in EFFECTS:
         return None
-    return {p.name: Quantity(p.unit, low=p.low, high=p.high) for p in EFFECTS[name].parameters()}
+    return {
+        p.name: Quantity(p.unit, low=p.low if p.stated is None else p.stated, high=p.high)
+        for p in EFFECTS[name].parameters()
+    }
 
 
 def configured(effects: Iterable[ConfiguredEffect]) -> tuple[Effect, ...]:

@@ -51,6 +51,8 @@ class Parameter:
     centre: prior mean (a strength's is its off value); sigma: prior standard deviation, the size to
     be expected.
     scan:   the fit has many local optima along it, so walk a grid before descending.
+    stated: the least that a configuration may state, where that is less than can be found: older
+            recordings hold their configuration.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Parameter:
     low: float
     high: float
     scan: bool = False
+    stated: float | None = None
 
     @property
     def off(self) -> float:
@@ -69,12 +72,19 @@ class Parameter:
 
 
 def strength(
-    meaning: str, unit: str, *, typical: float, low: float, high: float, off: float = 0.0
+    meaning: str,
+    unit: str,
+    *,
+    typical: float,
+    low: float,
+    high: float,
+    off: float = 0.0,
+    stated: float | None = None,
 ) -> Any:
     """A field whose off value switches the effect off; `typical` is the size to be expected where
     it is at work.
     """
-    return _field(off, meaning, unit, "strength", typical, low, high)
+    return _field(off, meaning, unit, "strength", typical, low, high, False, stated)
 
 
 def shape(
@@ -241,8 +251,9 @@ def _parameter(
     low: float,
     high: float,
     scan: bool = False,
+    stated: float | None = None,
 ) -> Parameter:
-    return Parameter(name, meaning, unit, role, float(centre), sigma, low, high, scan)
+    return Parameter(name, meaning, unit, role, float(centre), sigma, low, high, scan, stated)
 
 
 RATE_REFERENCE = 0.02  # [m/s] speed at which the soil's parameters were found

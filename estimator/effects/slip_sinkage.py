@@ -15,17 +15,18 @@ from gritd.estimator.terramechanics.soil import Soil
 class SlipSinkage(Effect):
     """A slipping wheel digs soil out from under itself and sinks deeper.
 
-    n = n₀ + n₁ |i|,   K (1 + s [(1 + |i|)/(1 − |i|/2) − 1])⁻ⁿ,   z + d i/(1 − i)
+    n = n₀ + n₁ |i|,   K (1 + s [(1 + |i|)/(1 − |i|/2) − 1])^−n₀,   z + d i/(1 − i)
 
-    The first two change the contact, Eqs. (3) and (4). The last is a layer that slip carries away
-    from under the wheel: the rut is deeper, the contact is the same.
+    The first two change the contact, Eqs. (3) and (4); |i| counts up to 1 in the second. The last
+    is a layer that slip carries away from under the wheel: the rut is deeper, the contact is the
+    same.
     Source: Ding, Gao, Deng, Nagatani, Yoshida (2011), J. Terramechanics 48, 27-45, first order in
     i; Lyasko (2010), J. Terramechanics 47, 21-31, whose s is 1; i/(1 − i) is attributed to Reece
     (1965).
     """
 
     growth: float = strength(
-        "rise of the exponent with slip, n₁", "", typical=0.2, low=0.0, high=2.5
+        "rise of the exponent with slip, n₁", "", typical=0.2, low=0.0, high=2.5, stated=-0.5
     )
 
     deepening: float = strength(

@@ -147,7 +147,7 @@ def fit_model(
     fitted = problem.with_freedoms(every, _values(every, sizes)).descend(effects, free, *start)
     for number in range(TUNING.fit.size_rounds):
         known = every
-        if number < TUNING.fit.bent_anew:
+        if number < TUNING.fit.bent_anew or _unbent(fitted, every):
             every = (*forms, *bending_freedoms(problem.stack, problem.noise, fitted))
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
@@ -162,6 +162,13 @@ def fit_model(
     of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
     bent = tuple(_values(every[len(forms) :], of_bends))
     return Model(fitted, names, evidence, of_forms, bent, marginal, of_fit)
+
+
+def _unbent(fitted: Fitted, freedoms: Sequence[Freedom]) -> bool:
+    """Whether an effect has left its bound since the other forms were made, and has none."""
+    own = zip(fitted.free, fitted.x, strict=True)
+    acting = {f.name for f, x in own if f.parameter.role == "strength" and x != 0.0}
+    return not acting <= {freedom.name for freedom in freedoms}
 
 
 def _handed_on(known: Sequence[Freedom], sizes: Chosen, every: Sequence[Freedom]) -> Chosen:

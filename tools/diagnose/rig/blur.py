@@ -33,17 +33,18 @@ def blur_of(stack: Stack, predicted: Array) -> Array:
     )
 
 
-def blur_of_reversal(stack: Stack, after: Sequence[Bools]) -> Array:
-    """Error (N,) of the loss of the drive [N·m] after a reversal, which falls inside an interval: a
-    part of the axle's torque is open. after: per run, values (n,) after a reversal.
+def blur_of_reversal(stack: Stack, predicted: Array, after: Sequence[Bools]) -> Array:
+    """Error (N,) of channel torque [N·m] after a reversal: that falls inside an interval, and soil
+    takes the axle's torque up over some way. A part of that is open. after: per run, values (n,)
+    after a reversal.
     """
-    told = []
-    for run, marks in zip(stack.rig.runs, after, strict=True):
-        nothing = {channel: np.zeros(marks.size) for channel in stack.rig.channels}
-        axle = np.nan_to_num(np.abs(run.measured["axle_torque"]))
-        told.append(nothing | {"torque": np.where(marks, TUNING.rig.taken_up * axle, 0.0)})
-
-    return stack.joined(told)
+    rig = stack.rig
+    marked = stack.joined([dict.fromkeys(rig.channels, at.astype(float)) for at in after]) > 0.0
+    axle = np.abs(predicted)
+    if "axle_torque" in rig.channels:
+        read = [np.nan_to_num(np.abs(run.measured["axle_torque"])) for run in rig.runs]
+        axle = stack.joined([dict.fromkeys(rig.channels, values) for values in read])
+    return np.where(marked & stack.of("torque"), TUNING.rig.taken_up * axle, 0.0)
 
 
 def _nearby(values: Array) -> Array:

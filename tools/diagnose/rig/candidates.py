@@ -9,6 +9,7 @@ import numpy as np
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -39,15 +40,19 @@ def steady_states(signals: Signals) -> bool:
     if signals.info.steady_states:
         return True
 
-    known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
-    stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
     return not any(
         np.ptp(signals.wheel_angle[at]) >= TURN
         or _changes(signals.wheel_speed[at])
         or _changes(signals.carriage_rate[at])
-        for at in stretches
-        if at.size
+        for at in unbroken(signals)
     )
+
+
+def unbroken(signals: Signals) -> list[Index]:
+    """The stretches between silences, of a table its rows: which values (n,) each has."""
+    known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
+    stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    return [at for at in stretches if at.size]
 
 
 def _changes(speed: Array) -> bool:

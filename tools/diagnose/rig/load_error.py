@@ -1,10 +1,10 @@
 """What of a measured load may be error and not load.
 
-Where no run states its weights, the force sensor tells them, with noise. A prediction that is
-driven by a measured load has that noise in it, and what was measured does not follow it (errors in
-variables: Fuller 1987, Measurement Error Models, ch. 1). Three things are left to every fit: how
-much of the load's quick changes are noise, how much of its slow ones, and by how much the mean of
-each run is off.
+Where some run does not state its weights, the force sensor tells them, with noise. A prediction
+that is driven by a measured load has that noise in it, and what was measured does not follow it
+(errors in variables: Fuller 1987, Measurement Error Models, ch. 1). Three things are left to every
+fit: how much of the load's quick changes are noise, how much of its slow ones, and by how much the
+mean of each run is off.
 """
 
 from __future__ import annotations

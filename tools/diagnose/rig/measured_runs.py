@@ -51,8 +51,9 @@ def measured_run(
 
     driving, resting, lifted = states(motion, settings)
     still = {"torque": driving | resting | lifted}
-    if idle is not None:
+    if not tabled:
         still["torque"] |= turned_back(motion, settings)
+    if idle is not None:
         still["axle_torque"] = driving | idle
     known = np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate)
     known[: TUNING.rig.slope_edge] = known[-TUNING.rig.slope_edge :] = False

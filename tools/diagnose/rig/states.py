@@ -52,8 +52,7 @@ def states(motion: Motion, settings: Settings) -> tuple[Bools, Bools, Bools]:
 
 
 def turned_back(motion: Motion, settings: Settings) -> Bools:
-    """Where the wheel turns the other way than before, settled or not (n,): what the drive loses
-    between two torques that are both measured needs no steady state of the soil, and play shows
+    """Where the wheel turns the other way than before, settled or not (n,): play of the drive shows
     there alone.
     """
     way = _way(settings.wheel.radius * np.asarray(motion.wheel_speed))

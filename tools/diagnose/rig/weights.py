@@ -12,7 +12,7 @@ import numpy as np
 from gritd.estimator.config.settings import Calibration, Settings, Uncertain
 from gritd.estimator.offline.windows import NORMAL
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.rig.candidates import steady_states
+from gritd.tools.diagnose.rig.candidates import steady_states, unbroken
 from gritd.tools.diagnose.rig.signals import Signals
 from gritd.tools.diagnose.tuning import TUNING
 
@@ -31,8 +31,8 @@ class Weights(NamedTuple):
 
 
 def weights_in(signals: Sequence[Signals], settings: Settings) -> list[Weights]:
-    """Those of all runs: as they are stated, or as they are measured. Where friction of the axis
-    cannot show in one run, it must not act in the others.
+    """Those of all runs: as they are stated, or as they are measured where they were. Where
+    friction of the axis cannot show in one run, it must not act in the others.
     """
     every = [weights_of(one, settings) for one in signals]
     if all(one.known for one in every):
@@ -77,15 +77,21 @@ def weights_of(signals: Signals, settings: Settings) -> Weights:
 
 
 def _measured(signals: Signals, settings: Settings) -> Weights | None:
-    """Those that the force sensor tells; none without a sensor of known zero."""
+    """Those that the force sensor tells; none without a sensor of known zero, or where it was
+    silent for most of the run.
+    """
     measured, wrench = signals.analogue.get("load"), settings.wrench
     if measured is None or wrench is None:
         return None
     if wrench.load.offset.sigma > TUNING.rig.unknown_offset:
         return None
+    if np.mean(np.isfinite(measured)) < TUNING.rig.load_known:
+        return None
+
     load = _bridged(measured)
     if steady_states(signals):  # one after the other, they have nothing in common
-        return Weights(load, load, False, load)
+        values, sigma = _of_rows(signals, load)
+        return Weights(values, values, False, load, sigma)
     values, sigma = felt(signals.time, load)
     return Weights(values, levels(signals.time, load), False, load, sigma)
 
@@ -96,6 +102,17 @@ def _sigma(nominal: Uncertain, sensor: Calibration) -> float:
     return float(np.sqrt(nominal.sigma**2 + gain**2 + sensor.offset.sigma**2))
 
 
+def _of_rows(signals: Signals, load: Array) -> tuple[Array, Array]:
+    """The mean load of each row of a table, and what it scatters by, at its values (n,): see
+    `felt`.
+    """
+    values, sigma = load.copy(), np.zeros(load.size)
+    for row in unbroken(signals):
+        values[row] = load[row].mean()
+        sigma[row] = load[row].std()
+    return values, sigma
+
+
 def felt(time: Array, load: Array) -> tuple[Array, Array]:
     """What the wheel feels (n,) [N] of a measured load (n,), and its standard deviation (n,) [N].
 
@@ -103,16 +120,23 @@ def felt(time: Array, load: Array) -> tuple[Array, Array]:
     every shorter one (intersection of confidence intervals: Goldenshluger, Nemirovski 1997, Math.
     Methods Statist. 6, 135-170). By what the mean over half of it differs, it may be bent. The
     sensor sits beside the wheel, so friction of the axis is in it.
+
+    The error of a mean over m values is shared by about m values. As the error of one reading in
+    each of them it tells as much of what they have in common, and that is what is told.
     """
     noise, count = _noise(load), np.arange(_half(time) + 1)
     means = np.array([_moments(load, half).mean(axis=1) for half in range(count.size)])
-    within = TUNING.rig.load_moment * noise / np.sqrt(2.0 * count + 1.0)[:, None]
+    sigma = noise / np.sqrt(2.0 * count + 1.0)
+    within = TUNING.rig.load_moment * sigma[:, None]
     low = np.maximum.accumulate(means - within, axis=0)
     high = np.minimum.accumulate(means + within, axis=0)
     longest, at = np.sum(low <= high, axis=0) - 1, np.arange(load.size)
+
     mean, shorter = means[longest, at], means[longest // 2, at]
-    bent = _moments(np.abs(mean - shorter), _half(time)).max(axis=1)
-    return mean, np.hypot(noise / np.sqrt(2.0 * longest + 1.0), bent)
+    apart = np.abs(mean - shorter)
+    chance = TUNING.rig.load_moment * np.sqrt(sigma[longest // 2] ** 2 - sigma[longest] ** 2)
+    bent = _moments(np.where(apart > chance, apart, 0.0), _half(time)).max(axis=1)
+    return mean, np.hypot(noise, bent)
 
 
 def levels(time: Array, load: Array) -> Array:
@@ -141,7 +165,12 @@ def _moments(load: Array, half: int) -> Array:
 
 
 def _noise(values: Array) -> float:
-    return float(NORMAL * np.median(np.abs(np.diff(values))) / np.sqrt(2.0))
+    """Standard deviation of the noise, by the differences of neighbours; at least that of a
+    rounding to the smallest step.
+    """
+    steps = np.abs(np.diff(values))
+    rounding = float(steps[steps > 0.0].min() / np.sqrt(12.0)) if np.any(steps) else 0.0
+    return max(float(NORMAL * np.median(steps) / np.sqrt(2.0)), rounding)
 
 
 def _bridged(values: Array) -> Array:

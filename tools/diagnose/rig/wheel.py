@@ -58,6 +58,7 @@ Bed = Literal["same", "prepared"]
 LAW_PREFIX = {
     "torque": "torque", "axle_torque": "torque", "drawbar_pull": "pull", "sinkage": "depth",
 }  # fmt: skip
+AXIS_FRICTION = "load_axis_friction"
 LAW_CHANNEL = {"torque": "torque", "pull": "drawbar_pull", "depth": "sinkage"}
 LAW_PREFIX_OF_LOSS = {c: prefix for c, prefix in LAW_PREFIX.items() if c != "torque"}
 LOSS_NOTE = (
@@ -101,14 +102,16 @@ class WheelRig:
             WheelRig, signals, settings, reference, bed, read_off, lines, latencies
         )
         self._alone = partial(_reference_alone, signals[:reference], settings, read_off, lines)
-        self.baseline = configured(settings.effects)
+        self._weights = weights = weights_in(signals, settings)
+        stated = all(w.known for w in weights)
         known = [effect.name for effect in settings.effects]
+        settings = replace(settings, effects=_acting(settings.effects, stated))
+        had = _acting(had, stated)
+
+        self.baseline = configured(settings.effects)
         self.settings, self.lines, self.latencies = settings, lines, latencies
         self.new = [number >= reference for number in range(len(signals))]
         self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
-
-        self._weights = weights = weights_in(signals, settings)
-        stated = all(w.known for w in weights)
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
 
@@ -252,10 +255,10 @@ class WheelRig:
         back inside an interval.
         """
         blur = blur_of(stack, predicted)
-        if not self.loss_of_drive:
+        if self._tabled or "torque" not in self.channels:
             return blur
         after = [after_reversal(motion, self.settings) for motion in self._driven.motions]
-        return np.hypot(blur, blur_of_reversal(stack, after))
+        return np.hypot(blur, blur_of_reversal(stack, predicted, after))
 
     # ---- what is said ----------------------------------------------------------------------------
 
@@ -363,5 +366,13 @@ def _relative_noise(weights: Weights) -> Array:
 def _left_out(known: Collection[str], weights_stated: bool) -> set[str]:
     """Effects that are no candidates."""
     names = {*LEFT_OUT, *known}
-    # the measured load that drives the balance holds its friction already
-    return names if weights_stated else names | {"load_axis_friction"}
+    return names if weights_stated else names | {AXIS_FRICTION}
+
+
+def _acting(
+    effects: Sequence[ConfiguredEffect], weights_stated: bool
+) -> tuple[ConfiguredEffect, ...]:
+    """Those of some effects that act: a measured load that drives the balance holds the friction of
+    its axis already.
+    """
+    return tuple(e for e in effects if weights_stated or e.name != AXIS_FRICTION)

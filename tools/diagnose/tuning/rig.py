@@ -165,6 +165,7 @@ class Rig:
     )
     load_level: float = tuned(0.03, "-", "relative change of measured load that is other weights")
     load_noise: float = tuned(6.0, "σ", "of the load cell, added to what is other weights")
+    load_known: float = tuned(0.5, "share", "of a run's loads that must have been measured")
     load_moment: float = tuned(2.0, "σ", "of a mean load: within it means over two moments agree")
     hold: float = tuned(1.0, "s", "weights stay for at least this long")
 

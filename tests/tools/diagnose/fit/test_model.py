@@ -64,3 +64,19 @@ def test_a_fit_stands_where_its_evidence_is_told() -> None:
     assert model.bends[-1] > 0.0
     assert np.abs(mean - model.fitted.u)[of_soil].max() < 1.0
     assert model.evidence > -1200.0  # -1250 without its freedoms
+
+
+def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() -> None:
+    """Each could take the other's part from round to round, if other forms were always made anew:
+    the evidence would count a step that leads nowhere.
+    """
+    both = (EFFECTS["side_slip"], EFFECTS["pulley_slip"])
+    acting = (make("side_slip", {"angle": 0.3}),)
+    rig = WheelRig(record(plan(seconds=12.0), acting), settings())
+    base = fit_base(rig, np.random.default_rng(0))
+    forms = form_freedoms(base.problem.stack, base.problem.noise)
+
+    begins, sizes = (base.fitted.u, np.array([0.5, 2.0])), tuple(0 for _ in forms)
+    model = fit_model(base.problem, forms, both, free_of(both), begins, sizes)
+    assert model.marginal is not None
+    assert model.marginal.gain(model.chosen) < 0.5

@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.tools.cli.command import CommandError
 from gritd.tools.diagnose.rig.adapter import _check_drives
 from gritd.tools.diagnose.rig.signals import Signals
@@ -59,3 +60,31 @@ def test_weights_that_only_the_sensor_tells_are_a_note_once() -> None:
     runs = [replace(s, info=replace(s.info, nominal_load=None)) for s in record(plan(), ())]
     rig = WheelRig(runs, settings())
     assert rig.caveats.count(MEASURED_NOTE) == 1 and "load" not in rig.channels
+
+
+def test_a_measured_load_holds_the_friction_of_its_axis_already() -> None:
+    """A configuration that states the friction changes nothing where the load is measured."""
+    runs = [replace(s, info=replace(s.info, nominal_load=None)) for s in record(plan(), ())]
+    plain = settings()
+    friction = ConfiguredEffect("load_axis_friction", {"friction": Uncertain(3.0, 0.5)})
+    sticky = WheelRig(runs, replace(plain, effects=(friction,)))
+    rig = WheelRig(runs, plain)
+    u = np.zeros(len(rig.constants))
+    assert len(sticky.constants) == len(rig.constants)
+    assert "load_axis_friction" not in sticky.effects
+    for one, other in zip(sticky.predict(u, ()), rig.predict(u, ()), strict=True):
+        assert np.array_equal(one["sinkage"], other["sinkage"])
+
+
+def test_the_noise_of_a_measured_load_is_noise_of_what_follows_it() -> None:
+    runs = record(plan(), ())
+    stated, measured = (
+        WheelRig([replace(s, info=replace(s.info, nominal_load=w)) for s, w in each], settings())
+        for each in (
+            [(s, s.info.nominal_load) for s in runs],
+            [(s, None) for s in runs],
+        )
+    )
+    for one, other in zip(stated.motion_sigma, measured.motion_sigma, strict=True):
+        assert np.all(other["sinkage"] >= one["sinkage"])
+        assert np.mean(other["sinkage"]) > 1.5 * np.mean(one["sinkage"])

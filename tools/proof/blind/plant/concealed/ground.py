@@ -140,19 +140,19 @@ class RootRate(Effect):
 
 @dataclass(frozen=True)
 class CurvedSlipSinkage(Effect):
-    """n = n₀ + s (a i + (1 − a) i²): slip-sinkage that bends with slip.
+    """n = n₀ + s (a i + (1 − a) i²), a up to a half: slip-sinkage that bends with slip.
 
     Source: the power law of Ding et al. (2011), J. Terramechanics 48, 27-45, carried to second
     order; the share of the orders was chosen here.
     """
 
-    share: float = 0.5  # a
+    share: float = 0.25  # a
 
     name, most = "slip_sinkage", 0.25
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, facts: Facts) -> Self:
-        return cls(cls.most, float(rng.uniform(0.0, 1.5)))
+        return cls(cls.most, float(rng.uniform(0.0, 0.5)))
 
     def soil(self, ground: Ground, scene: Scene) -> Ground:
         slip = np.clip(scene.slip, 0.0, 1.0)

@@ -41,8 +41,7 @@ def weights_in(signals: Sequence[Signals], settings: Settings) -> list[Weights]:
 
 
 def weights_of(signals: Signals, settings: Settings) -> Weights:
-    """Stated weights where the measured load does not contradict them, else the levels of the
-    measured load.
+    """Stated weights where the measured load does not contradict them, else the measured ones.
 
     A run that states nothing has the configuration's weights, if the measured load is theirs within
     the uncertainties.

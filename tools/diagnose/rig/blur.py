@@ -40,10 +40,11 @@ def blur_of_reversal(stack: Stack, predicted: Array, after: Sequence[Bools]) -> 
     """
     rig = stack.rig
     marked = stack.joined([dict.fromkeys(rig.channels, at.astype(float)) for at in after]) > 0.0
-    axle = np.abs(predicted)
+    known = np.full(predicted.size, np.nan)
     if "axle_torque" in rig.channels:
-        read = [np.nan_to_num(np.abs(run.measured["axle_torque"])) for run in rig.runs]
-        axle = stack.joined([dict.fromkeys(rig.channels, values) for values in read])
+        read = [np.abs(run.measured["axle_torque"]) for run in rig.runs]
+        known = stack.joined([dict.fromkeys(rig.channels, values) for values in read])
+    axle = np.where(np.isfinite(known), known, np.abs(predicted))
     return np.where(marked & stack.of("torque"), TUNING.rig.taken_up * axle, 0.0)
 
 

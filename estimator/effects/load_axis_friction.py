@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gritd.estimator.effects.base import Effect, Fingerprint, shape, strength, told_apart
-from gritd.estimator.stages.history import presliding, smoothed, turned_round
+from gritd.estimator.stages.history import presliding, run_by_run, smoothed, turned_round
 from gritd.estimator.stages.situation import Recall, Situation
-from gritd.estimator.terramechanics.soil import Scalar
+from gritd.estimator.terramechanics.soil import Array, Scalar
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,6 @@ class LoadAxisFriction(Effect):
     )
     confusable_with = told_apart(sensor_latency="load_step", frame_compliance="load_step")
     needs_sinkage = True
-    by_run = True
     at_start = (1.0,)
 
     def load(self, load: Scalar, situation: Situation) -> Scalar:
@@ -60,5 +59,7 @@ class LoadAxisFriction(Effect):
         """s, −1 after rising … 1 after sinking."""
         if self.name in situation.memory:
             return situation.memory[self.name][0]
-        path = np.atleast_1d(smoothed(situation.time, situation.sinkage))
-        return presliding(path, self.travel, self.exponent)
+        return run_by_run(self._turning, situation.run, situation.time, situation.sinkage)
+
+    def _turning(self, time: Array, sinkage: Array) -> Array:
+        return presliding(smoothed(time, sinkage), self.travel, self.exponent)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from gritd.estimator.effects.base import Effect, Fingerprint, strength, told_apart
-from gritd.estimator.stages.history import delayed
+from gritd.estimator.stages.history import delayed, run_by_run
 from gritd.estimator.stages.situation import Sensed, Situation
 from gritd.estimator.terramechanics.soil import Scalar
 
@@ -27,26 +29,33 @@ class SensorLatency(Effect):
     )
 
     stage = "sensor"
-    by_run = True
     fingerprint = Fingerprint(
         "load", "rate", "pulses in proportion to how fast the channel itself changes"
     )
     confusable_with = told_apart(wheel_inertia="load_step", load_axis_friction="load_step")
 
     def sensors(self, sensed: Sensed, situation: Situation) -> Sensed:
-        return self._shifted(sensed, situation.time, 1.0)
+        return self._shifted(sensed, situation, 1.0)
 
     def correct(self, sensed: Sensed, situation: Situation) -> Sensed:
-        return self._shifted(sensed, situation.time, -1.0)
+        return self._shifted(sensed, situation, -1.0)
 
-    def _shifted(self, sensed: Sensed, time: Scalar, sign: float) -> Sensed:
+    def _shifted(self, sensed: Sensed, situation: Situation, sign: float) -> Sensed:
         delays = {"sinkage": self.sinkage, "current": self.current}
         return replace(
             sensed,
             **{
-                channel.name: delayed(
-                    time, getattr(sensed, channel.name), sign * delays.get(channel.name, self.force)
+                channel.name: _lagging(
+                    getattr(sensed, channel.name),
+                    situation,
+                    sign * delays.get(channel.name, self.force),
                 )
                 for channel in fields(sensed)
             },
         )
+
+
+def _lagging(value: Scalar, situation: Situation, delay: float) -> Scalar:
+    if delay == 0.0 or np.ndim(value) == 0:
+        return value
+    return run_by_run(lambda t, v: delayed(t, v, delay), situation.run, situation.time, value)

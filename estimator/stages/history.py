@@ -4,6 +4,7 @@ of time.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import accumulate
 from math import exp, log1p
 
@@ -44,13 +45,12 @@ def rate_of(time: Scalar, value: Scalar, span: float = SMOOTHING) -> Array:
     return rate
 
 
-def delayed(time: Scalar, value: Scalar, delay: float) -> Scalar:
+def delayed(time: Scalar, value: Scalar, delay: float) -> Array:
     """The value (n,) `delay` [s] earlier, linear between samples, held before the first and after
     the last.
     """
-    if delay == 0.0 or np.ndim(value) == 0:
-        return value
-    return np.interp(np.asarray(time) - delay, time, value)
+    earlier: Array = np.interp(np.asarray(time) - delay, time, value)
+    return earlier
 
 
 def relaxed(time: Scalar, drive: Scalar, duration: float, run: Scalar = 0.0) -> Array:
@@ -90,6 +90,19 @@ def presliding(path: Array, travel: float, exponent: float, start: float = 1.0) 
     moved = (np.diff(path, prepend=path[:1]) / travel).tolist()
     turned = accumulate(moved, lambda s, x: turned_round(s, x, exponent), initial=start)
     return np.fromiter(turned, dtype=float)[1:]
+
+
+def run_by_run(of: Callable[..., Array], run: Scalar, *along: Scalar) -> Array:
+    """What `of` makes of the values (n,) of each run by itself, one run after the other (n,).
+
+    run: the number of the run at each sample, or one number.
+    """
+    values = [np.atleast_1d(np.asarray(a, dtype=float)) for a in along]
+    begins = np.flatnonzero(run_begins(run, values[0].size))
+    if begins.size < 2:
+        return of(*values)
+    parts = zip(*(np.split(v, begins[1:]) for v in values), strict=True)
+    return np.concatenate([of(*part) for part in parts])
 
 
 def run_begins(run: Scalar, count: int) -> Bools:

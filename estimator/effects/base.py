@@ -142,6 +142,8 @@ class Effect:
     filter_only: ClassVar[bool] = False
     # looks along time, so a campaign's runs go through the forward model one by one
     by_run: ClassVar[bool] = False
+    # begins anew in every run: what a campaign shows of it, the next one does too
+    every_run: ClassVar[bool] = False
     # the load stage needs a predicted sinkage: the balance is solved twice
     needs_sinkage: ClassVar[bool] = False
     # covariates over which no law says how a zero changes: there it may follow any smooth function

@@ -31,6 +31,7 @@ class MotorHeating(Effect):
     )
 
     stage = "drivetrain"
+    every_run = True
     fingerprint = Fingerprint(
         "torque", "heat", "current creeps up over a run while measured axle torque stays"
     )

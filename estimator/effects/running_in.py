@@ -58,6 +58,7 @@ class RunningIn(Effect):
     )
 
     stage = "wheel"
+    every_run = True
     fingerprint = Fingerprint(
         "sinkage",
         "position",

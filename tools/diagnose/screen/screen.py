@@ -49,6 +49,8 @@ class Screen:
     nulls:  (draws,) the largest surprise of all candidates.
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
+    asked:  [nats] that must be left of it: a likelihood ratio that is chance as rarely as an alarm is
+        false, if nothing is given.
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     counts: the share of evidence that counts beside a reference, or a discrepancy that was learnt:
         it was driven elsewhere too.
@@ -64,6 +66,7 @@ class Screen:
     nulls: Array
     chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
+    asked: float = TUNING.screen.sure
     habit: Mapping[Candidate, float] = field(default_factory=dict)
     apart: Collection[Candidate] = ()
     ripple: float = 1.0
@@ -99,6 +102,11 @@ class Screen:
         others = (value for of, value in self.habit.items() if of not in self.apart)
         return TUNING.screen.habit * max(others, default=0.0)
 
+    def seen(self, of: Candidate, evidence: float) -> bool:
+        """Whether a candidate of so much evidence would be an alarm."""
+        counted = self.counts * evidence
+        return self.surprise(of, counted) > self.threshold and counted > self.asked
+
     def surprise(self, of: Candidate, evidence: float | None = None) -> float:
         """How far evidence (that of the recordings if not given) lies beyond what noise shows for
         this candidate, and beyond what the reference shows of it.
@@ -108,14 +116,17 @@ class Screen:
         return (evidence - start) / reach - TUNING.screen.habit * self.habit.get(of, 0.0)
 
     def beside_reference(
-        self, evidence: Mapping[Candidate, float], apart: Collection[Candidate] = ()
+        self,
+        evidence: Mapping[Candidate, float],
+        apart: Collection[Candidate] = (),
+        asked: float = TUNING.screen.beside_reference,
     ) -> Screen:
         """The same where single runs of a reference campaign show some evidence of the candidates
-        [nats]; apart: those whose habit says nothing of others.
+        [nats]; apart: those whose habit says nothing of others; asked: [nats] that must be left.
         """
         usual = {of: self.usual[of] for of in evidence if of in self.usual}
         habit = {of: max((evidence[of] - s) / r, 0.0) for of, (s, r) in usual.items()}
-        return replace(self, habit=habit, apart=apart)
+        return replace(self, habit=habit, apart=apart, asked=asked)
 
     @property
     def largest(self) -> tuple[Candidate, float]:
@@ -131,7 +142,7 @@ class Screen:
         at full rate has a chance of its own.
         """
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
-        lacking = max(self._sure - max(self.open, 0.0), self.of_reference - self.largest[1])
+        lacking = max(self.asked - max(self.open, 0.0), self.of_reference - self.largest[1])
         beyond = min(TUNING.screen.level * float(np.exp(lacking)), 1.0)
         return min(max(counted, beyond), self.ripple)
 
@@ -146,12 +157,7 @@ class Screen:
     @property
     def on_grid(self) -> bool:
         """Whether something stands out on the grid."""
-        return self.largest[1] > self.threshold and self.open > self._sure
-
-    @property
-    def _sure(self) -> float:
-        """Evidence that must be left [nats]: of the noise's colour, or beside a reference."""
-        return TUNING.screen.beside_reference if self.habit else TUNING.screen.sure
+        return self.largest[1] > self.threshold and self.open > self.asked
 
     @property
     def alarmed(self) -> bool:

@@ -22,6 +22,8 @@ from gritd.tools.diagnose.fit.projection import Surrogates
 from gritd.tools.diagnose.fit.shape import Candidate, Shape
 from gritd.tools.diagnose.fit.signatures import shape_grid, signature, some_of
 from gritd.tools.diagnose.noise.colour import surrogates, whiten
+from gritd.tools.diagnose.rig.interface import HAD
+from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.screen.covered import covered_share
 from gritd.tools.diagnose.screen.habit import habits
 from gritd.tools.diagnose.screen.open_colour import OpenNoise
@@ -110,7 +112,8 @@ def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
         return screen
     counts = max(held.covered, TUNING.screen.least_covered)
     left = counts * _open_form(screening, bare, screen)
-    return replace(screen, open=min(screen.open, left), counts=counts)
+    most = max(screen.asked, asked(screening.problem.stack))
+    return replace(screen, open=min(screen.open, left), counts=counts, asked=most)
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:
@@ -163,7 +166,16 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     rest = beside.of_rows(~stack.new)
     shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
     ripples = {name for name, effect in stack.rig.effects.items() if order_of(effect)}
-    return screen.beside_reference({**shapes, **usual}, ripples)
+    return screen.beside_reference({**shapes, **usual}, ripples, asked(stack))
+
+
+def asked(stack: Stack) -> float:
+    """Evidence that must be left beside what the rig does anyway [nats]."""
+    shown = {c.name.partition(".")[0] for c in stack.rig.constants if c.kind == HAD}
+    had = [effect for name, effect in stack.rig.effects.items() if name in shown]
+    kinds = [*had, *(type(effect) for effect in stack.rig.baseline)]
+    passing = any(effect.in_steady_states() is None for effect in kinds)
+    return TUNING.screen.beside_transients if passing else TUNING.screen.beside_reference
 
 
 def chance_of(

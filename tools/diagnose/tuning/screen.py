@@ -31,6 +31,14 @@ class Screen:
         "likelihood ratio that is left with the sizes of what the rig does anyway open",
         "judgement: these sizes are learnt from both campaigns, and favour nothing new",
     )
+    beside_transients: float = tuned(
+        30.0,
+        "nats",
+        "the same where the reference shows an effect of the way, of time or heat by itself: where slip "
+        "changes otherwise, other forms of it leave more",
+        "27 opened pairs with nothing new and a lag of the contact: 4 to 37 nats were left in six, 30 "
+        "and more in one; in none of 28 others",
+    )
     tail: float = tuned(
         0.1,
         "probability",

@@ -7,8 +7,9 @@ line leaves of them becomes a large discrepancy of form, which hides what is new
 is first searched as any campaign is, and the effects found act in both campaigns, with parameters
 that both tell.
 
-An effect that goes with time, heat, place or run may be another one a day later, and a ripple has
-another phase in each run: those stay with the freedoms of fit/shared.py.
+An effect that goes with time, heat, place or run may be another one a day later, but for one that
+begins anew in every run, and a ripple has another phase in each run: those stay with the freedoms
+of fit/shared.py.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
+from gritd.estimator.effects.base import Effect
 from gritd.tools.diagnose.fit.functions import BEYOND_FORM
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Rig
@@ -34,8 +36,12 @@ def had_anyway(rig: Rig, decision: Decision) -> tuple[ConfiguredEffect, ...]:
     """
     model = decision.best
     sure = [name for name in model.names if not decision.groups[name]]
-    lasting = [n for n in sure if rig.effects[n].fingerprint.covariate not in PASSING]
+    lasting = [n for n in sure if _lasts(rig.effects[n])]
     return tuple(ConfiguredEffect(name, dict(_parameters(model, name))) for name in lasting)
+
+
+def _lasts(effect: type[Effect]) -> bool:
+    return effect.every_run or effect.fingerprint.covariate not in PASSING
 
 
 def _parameters(model: Model, name: str) -> Iterator[tuple[str, Uncertain]]:

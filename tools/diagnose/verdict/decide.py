@@ -219,6 +219,6 @@ def power(search: Search, screen: Screen) -> float:
         if isinstance(name, str):
             a, _ = projection.project(whiten(search.problem.noise, likeliest.columns))
             gain = 0.5 * np.trace(a) - 0.5 * np.log1p(np.maximum(np.diag(a), 0.0)).sum()
-            seen.append(screen.surprise(name, screen.counts * float(gain)) > screen.threshold)
+            seen.append(screen.seen(name, float(gain)))
 
     return sum(seen) / max(len(search.problem.stack.rig.effects), 1)

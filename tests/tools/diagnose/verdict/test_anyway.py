@@ -24,6 +24,7 @@ from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
 LAG = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.06})
+BEGINNING = make("running_in", {"pull": 0.3, "shallow": 0.3, "torque": 0.3, "length": 0.06})
 RIPPLE = make("gear_ripple", {"ripple_cos": 0.2, "order": 23.0})
 HAD = ConfiguredEffect(
     "contact_relaxation",
@@ -91,6 +92,17 @@ def test_a_lag_lasts_if_nothing_could_stand_in_its_place() -> None:
 
     unsure = replace(decision, groups={"contact_relaxation": ("sensor_latency",)})
     assert had_anyway(rig, unsure) == ()
+
+
+def test_what_begins_anew_in_every_run_lasts() -> None:
+    rig, decision = decided(BEGINNING)
+    assert [effect.name for effect in had_anyway(rig, decision)] == ["running_in"]
+
+
+def test_what_goes_with_the_day_does_not() -> None:
+    rig, decision = decided(make("drying_cohesion", {"change": 0.6, "duration": 100.0}))
+    assert decision.best.names == ("drying_cohesion",)
+    assert had_anyway(rig, replace(decision, groups={"drying_cohesion": ()})) == ()
 
 
 def test_a_ripple_has_another_phase_in_each_run() -> None:

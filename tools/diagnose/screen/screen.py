@@ -49,8 +49,8 @@ class Screen:
     nulls:  (draws,) the largest surprise of all candidates.
     chance: of as much evidence by noise alone.
     open:   [nats] the evidence that is left with the noise's colour open (open_colour.py).
-    asked:  [nats] that must be left of it: a likelihood ratio that is chance as rarely as an alarm is
-        false, if nothing is given.
+    asked:  [nats] that must be left of it; if nothing is given, a likelihood ratio that is chance
+        as rarely as an alarm is false.
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     counts: the share of evidence that counts beside a reference, or a discrepancy that was learnt:
         it was driven elsewhere too.

@@ -34,10 +34,10 @@ class Screen:
     beside_transients: float = tuned(
         30.0,
         "nats",
-        "the same where the reference shows an effect of the way, of time or heat by itself: where slip "
-        "changes otherwise, other forms of it leave more",
-        "27 opened pairs with nothing new and a lag of the contact: 4 to 37 nats were left in six, 30 "
-        "and more in one; in none of 28 others",
+        "the same where the reference shows an effect of the way, of time or heat by itself: where "
+        "slip changes otherwise, other forms of it leave more",
+        "28 opened pairs with nothing new and such a reference: 4 to 29 nats were left in five, 37 "
+        "in one; 27 with another reference had no alarm",
     )
     tail: float = tuned(
         0.1,

@@ -19,14 +19,16 @@ class ContactRelaxation(Effect):
     """Forces and sinkage follow a change of slip or load over a length of travel, because the wheel
     has to move on to new soil first.
 
-    y = y∞ + a (ȳ − y∞),   λ dȳ/ds = y∞ − ȳ,   ds = ½ (r |dψ| + |dx|)
+    y = y∞ + a (ȳ − y∞),   λ dȳ/ds = y∞ − ȳ,   ds = p r |dψ| + (1 − p) |dx|;   q λ for the sinkage
 
     y∞ is T, DP or z at the slip and load of the moment, the run's first value where it begins: a
     wheel that starts from rest builds its torque up. At rest z stays where it is; in the air
     nothing lags. On line the forces are those of a slip and a load that lag in the same way.
     Source: first-order relaxation of a rolling contact, Pacejka (2012), Tire and Vehicle Dynamics,
-    3rd ed., chapter 7; the soil under the rim is renewed over the contact length r sin θ₁. That rim
-    and axle count alike for the path was chosen here.
+    3rd ed., chapter 7; the soil under the rim is renewed over the contact length r sin θ₁. Two
+    things were chosen here. The path may be the rim's, which shears the soil, or the axle's, which
+    brings new soil under it. The sinkage has a length of its own: the rim shears new soil after one
+    contact, and a rut is dug over more.
     """
 
     forces: float = strength(
@@ -36,6 +38,12 @@ class ContactRelaxation(Effect):
         "share of a change of z that lags, a", "", typical=1.0, low=0.0, high=1.5
     )
     length: float = shape("relaxation length, λ", "m", mean=0.03, sigma=0.02, low=0.002, high=0.15)
+    deeper: float = shape(
+        "relaxation length of the sinkage over λ, q", "", mean=1.0, sigma=0.39, low=0.2, high=5.0
+    )
+    rim: float = shape(
+        "share of the rim's way in the path, p", "", mean=0.5, sigma=0.19, low=0.0, high=1.0
+    )
 
     stage = "wheel"
     fingerprint = Fingerprint(
@@ -58,10 +66,11 @@ class ContactRelaxation(Effect):
         forces = self.forces * np.abs(situation.direction)
         return replace(
             reaction,
-            torque=reaction.torque + forces * self._behind(situation.torque, situation),
+            torque=reaction.torque + forces * self._behind(situation.torque, situation, 1.0),
             drawbar_pull=reaction.drawbar_pull
-            + forces * self._behind(situation.drawbar_pull, situation),
-            sinkage=reaction.sinkage + self.sinkage * self._behind(situation.sinkage, situation),
+            + forces * self._behind(situation.drawbar_pull, situation, 1.0),
+            sinkage=reaction.sinkage
+            + self.sinkage * self._behind(situation.sinkage, situation, self.deeper),
         )
 
     def answered(self, slip: Scalar, load: Scalar, situation: Situation) -> tuple[Scalar, Scalar]:
@@ -80,20 +89,23 @@ class ContactRelaxation(Effect):
         mobilised = -np.expm1(-_mobilising(situation) * situation.slip)
         now = float(mobilised), float(situation.carried)
         rim = situation.radius * np.abs(situation.wheel_speed)
-        moved = 0.5 * (rim + np.abs(situation.carriage_speed)) * step
+        moved = self._path(rim, np.abs(situation.carriage_speed)) * step
         if not memory or situation.carried <= 0.0:
             return now
         share = float(-np.expm1(-moved / self.length))
         return tuple(m + share * (n - m) for m, n in zip(memory, now, strict=True))
 
-    def _behind(self, steady: Scalar, situation: Situation) -> Scalar:
-        """ȳ − y∞."""
+    def _path(self, rim: Scalar, axle: Scalar) -> Scalar:
+        """ds of the ways of rim and axle."""
+        return self.rim * rim + (1.0 - self.rim) * axle
+
+    def _behind(self, steady: Scalar, situation: Situation, times: float) -> Scalar:
+        """ȳ − y∞ over so many λ."""
         if np.ndim(steady) == 0:
             return 0.0
-        moved = 0.5 * (
-            situation.radius * _steps(situation.wheel_angle) + _steps(situation.position)
-        )
-        share = np.where(situation.carried > 0.0, -np.expm1(-moved / self.length), 1.0)
+        rim = situation.radius * _steps(situation.wheel_angle)
+        moved = self._path(rim, _steps(situation.position))
+        share = np.where(situation.carried > 0.0, -np.expm1(-moved / (times * self.length)), 1.0)
         return followed(steady, share, situation.run) - steady
 
 

@@ -40,10 +40,10 @@ def stepped(before: float, after: float, n: int = 1000) -> Array:
     return np.where(np.arange(n) < n // 4, before, after)
 
 
-def path(motion: Motion) -> Array:
-    """Mean of the ways of rim and axle since the quarter [m]."""
+def path(motion: Motion, share: float = 0.5) -> Array:
+    """Mean of the ways of rim (its share) and axle since the quarter [m]."""
     rim = WHEEL.radius * np.asarray(motion.wheel_angle)
-    mean = 0.5 * (rim + np.asarray(motion.carriage_position))
+    mean = share * rim + (1.0 - share) * np.asarray(motion.carriage_position)
     return mean - mean[np.size(mean) // 4 - 1]
 
 
@@ -59,6 +59,22 @@ def test_a_step_is_followed_over_the_relaxation_length_at_any_speed(
 
     np.testing.assert_allclose(found[:250], plain[:250], rtol=1e-12)
     expected = plain[-1] + (plain[0] - plain[-1]) * np.exp(-path(motion) / 0.03)
+    np.testing.assert_allclose(found[250:], expected[250:], rtol=1e-9)
+
+
+@pytest.mark.parametrize("rim", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("channel", "times"), [("drawbar_pull", 1.0), ("sinkage", 1.8)])
+def test_sinkage_has_a_length_of_its_own_and_the_path_is_that_of_rim_or_axle(
+    channel: str, times: float, rim: float
+) -> None:
+    motion = driven(stepped(60.0, 60.0), stepped(0.1, 0.6), np.full(1000, 0.2))
+    plain = getattr(simulate_arrays(WHEEL, SOIL, motion), channel)
+    shapes = {"length": 0.03, "deeper": 1.8, "rim": rim}
+    lagging = make("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, **shapes})
+    found = getattr(simulate_arrays(WHEEL, SOIL, motion, (lagging,)), channel)
+
+    way = path(motion, rim) / (0.03 * times)
+    expected = plain[-1] + (plain[0] - plain[-1]) * np.exp(-way)
     np.testing.assert_allclose(found[250:], expected[250:], rtol=1e-9)
 
 

@@ -14,6 +14,9 @@ from gritd.tools.proof.blind.plant.memory import lagged
 from gritd.tools.proof.blind.plant.quadrature import Array
 from gritd.tools.proof.blind.plant.scene import Felt, Scene
 
+USUAL = 0.5  # sin θ₁ at which a relaxation has its stated length
+SHALLOW, DEEP = 0.05, 0.5 * np.pi  # θ₁ [rad] within which it goes with the contact
+
 
 @dataclass(frozen=True)
 class BottomPeak(Effect):
@@ -29,12 +32,14 @@ class BottomPeak(Effect):
 
 @dataclass(frozen=True)
 class Relaxation(Effect):
-    """Torque and pull follow over `strength` [m] of travel, the sinkage over as much and more."""
+    """Torque and pull follow over the length of the contact, `strength` [m] at an entry angle of
+    30° and more where the wheel is deeper; the sinkage over as much and more.
+    """
 
     deeper: float = 1.5  # length of the sinkage over that of the forces
 
     def forces(self, scene: Scene) -> Scene:
-        way = steps_of(scene)
+        way = steps_of(scene) * USUAL / np.sin(np.clip(scene.theta_1, SHALLOW, DEEP))
         late = relaxed(scene, lambda values: lagged(values, way, self.strength))
         slow = relaxed(scene, lambda values: lagged(values, way, self.strength * self.deeper))
         return replace(late, sinkage=slow.sinkage)

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.estimator.stages.history import presliding, rate_of, smoothed, turned_round
+from gritd.estimator.stages.history import (
+    presliding,
+    rate_of,
+    run_by_run,
+    smoothed,
+    turned_round,
+)
 
 
 def test_a_straight_line_is_not_bent_by_smoothing_and_its_rate_is_its_slope() -> None:
@@ -61,3 +67,13 @@ def test_presliding_of_what_is_not_known_or_endless(exponent: float) -> None:
     assert turned_round(1.0, -np.inf, exponent) == -1.0
     with np.errstate(invalid="ignore"):
         assert np.isnan(presliding(np.array([0.0, np.inf, np.inf]), 1e-4, exponent)[-1])
+
+
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=5), st.integers(0, 2**32 - 1))
+def test_each_run_is_taken_by_itself(counts: list[int], seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=sum(counts))
+    run = np.repeat(np.arange(len(counts), dtype=float), counts)
+    apart = np.split(values, np.cumsum(counts)[:-1])
+    expected = np.concatenate([np.cumsum(part) for part in apart])
+    np.testing.assert_array_equal(run_by_run(np.cumsum, run, values), expected)
+    np.testing.assert_array_equal(run_by_run(np.cumsum, 3.0, values), np.cumsum(values))

@@ -21,6 +21,7 @@ from gritd.estimator.stages.history import rate_of
 from gritd.estimator.stages.situation import Motion
 from gritd.estimator.terramechanics import linear
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.cli.command import Parser
 from gritd.tools.testbed.fingerprints import SOIL, TORQUE_CONSTANT, WHEEL, channels, typical_value
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -54,7 +55,9 @@ SHADES = ("#5c6672", "#e8a33d", "#c2410c")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the page and the pictures, of all effects or of those named."""
-    names = list(sys.argv[1:] if argv is None else argv) or list(EFFECTS)
+    parser = Parser(prog="python -m gritd.tools.dev.effect_figures", description=main.__doc__)
+    parser.add_argument("effects", nargs="*", choices=[[], *EFFECTS], metavar="EFFECT")
+    names = parser.parse_args(argv).effects or list(EFFECTS)
     (DOCS / "effects").mkdir(parents=True, exist_ok=True)
     for name in names:
         draw(EFFECTS[name], DOCS / "effects" / f"{name}.png")

@@ -18,6 +18,8 @@ def covered(stack: Stack) -> Bools:
     source = stack.rig.forms[0]
     pairs = list(zip(source.conditions, source.weight, stack.rig.new, strict=True))
     known = np.vstack([c[w != 0.0] for c, w, new in pairs if not new])
+    if not known.size:  # next to its new load the reference carried nothing
+        return np.zeros(stack.size, bool)
     features = features_of(known, TUNING.screen.coverage_points, TUNING.screen.coverage_left)
 
     inside = []

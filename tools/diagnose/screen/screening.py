@@ -92,7 +92,8 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
         screen = _screen_beside_reference(screening, model)
         counts = max(_covered(screening), TUNING.screen.least_covered)
         open_ = counts * _open_form(screening, model, screen)
-        return replace(screen, open=open_, ripple=_ripple(problem), counts=counts)
+        ripple = _ripple(problem) ** counts  # as evidence, it counts by the covered share
+        return replace(screen, open=open_, ripple=ripple, counts=counts)
     searched = _averages(screening, model, jobs)
     projection = model.fitted.projection(drawn)
     kept = screening.functions

@@ -7,32 +7,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gritd.tools.cli.wording import fixed, shown, spaced, spelled
-from gritd.tools.diagnose.explain.wording import described
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.shape import Shape
 from gritd.tools.diagnose.noise.colour import Noise
 from gritd.tools.diagnose.rig.interface import Rig
-from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.tuning import TUNING
 
 
 def doubts(rig: Rig, model: Model, noise: Noise) -> tuple[str, ...]:
     """One sentence each, of the fit of the accepted model in the noise that was found."""
     return (*_strained(rig, model), *_bounded(rig, model), *_unfinished(model), *_loud(rig, noise))
-
-
-def held_back(screen: Screen) -> tuple[str, ...]:
-    """What would be an alarm if the rig had no transients of its own, in a sentence."""
-    first, surprise = screen.largest
-    few, many = TUNING.screen.beside_reference, TUNING.screen.beside_transients
-    if surprise <= screen.threshold or not few < screen.open <= many or screen.asked < many:
-        return ()
-    what = described(first) if isinstance(first, Shape) else first
-    return (
-        f"No alarm, but {what} stands out with {fixed(screen.open, 0)} nats. This rig has"
-        f" transients of its own. Other forms of these leave up to {fixed(many, 0)} nats where slip"
-        " or load change otherwise.",
-    )
 
 
 def strains(rig: Rig, model: Model) -> list[tuple[str, float]]:

@@ -10,7 +10,7 @@ from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import EXPERIMENTS
 from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
-from gritd.tools.diagnose.explain.doubts import doubts, held_back, strains
+from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
 from gritd.tools.diagnose.explain.law import find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
@@ -71,7 +71,7 @@ def explain(
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=proposed,
-        caveats=(*_caveats(problem, accepted, whole, redo), *held_back(search.first)),
+        caveats=_caveats(problem, accepted, whole, redo),
         share=decision.share,
         remaining=left,
         remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),

@@ -171,12 +171,14 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
 
 
 def asked(stack: Stack) -> float:
-    """Evidence that must be left beside what the rig does anyway [nats]."""
+    """Evidence that must be left beside what the rig does anyway [nats]: where that has transients,
+    whose law is never quite the rig's, as much as of campaigns alone.
+    """
     shown = {c.name.partition(".")[0] for c in stack.rig.constants if c.kind == HAD}
     had = [effect for name, effect in stack.rig.effects.items() if name in shown]
     kinds = [*had, *(type(effect) for effect in stack.rig.baseline)]
     passing = any(effect.in_steady_states() is None for effect in kinds)
-    return TUNING.screen.beside_transients if passing else TUNING.screen.beside_reference
+    return TUNING.screen.sure if passing else TUNING.screen.beside_reference
 
 
 def chance_of(

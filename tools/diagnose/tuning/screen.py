@@ -31,14 +31,6 @@ class Screen:
         "likelihood ratio that is left with the sizes of what the rig does anyway open",
         "judgement: these sizes are learnt from both campaigns, and favour nothing new",
     )
-    beside_transients: float = tuned(
-        30.0,
-        "nats",
-        "the same where the reference shows an effect of the way, of time or heat by itself: where "
-        "slip changes otherwise, other forms of it leave more",
-        "28 opened pairs with nothing new and such a reference: 4 to 29 nats were left in five, 37 "
-        "in one; 27 with another reference had no alarm",
-    )
     tail: float = tuned(
         0.1,
         "probability",

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gritd.tools.diagnose.explain.doubts import doubts, held_back
-from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.explain.doubts import doubts
 
 
 def _parameter(name: str, role: str) -> SimpleNamespace:
@@ -56,16 +53,3 @@ def test_noise_far_above_what_is_stated_is_told(sigma: float, told: int) -> None
 
 def _model(fitted: Any) -> Any:
     return SimpleNamespace(fitted=fitted)
-
-
-@pytest.mark.parametrize(("left", "told"), [(1.0, 0), (20.0, 1), (40.0, 0)])
-def test_what_stands_out_beside_transients_is_told_where_it_is_no_alarm(
-    left: float, told: int
-) -> None:
-    nulls = np.random.default_rng(1).exponential(1.0, 300)
-    screen = Screen({"rim_friction": 60.0}, {"rim_friction": (0.0, 1.0)}, {}, {}, nulls, open=left)
-    beside = replace(screen, asked=TUNING.screen.beside_transients)
-    sentences = held_back(beside)
-    assert len(sentences) == told
-    assert all("rim_friction stands out with 20 nats" in s for s in sentences)
-    assert not held_back(replace(screen, asked=TUNING.screen.beside_reference))

@@ -70,13 +70,13 @@ def test_a_reference_with_transients_asks_for_more() -> None:
             ("contact_relaxation", {"forces": 1.0, "sinkage": 1.0, "length": 0.03}),
         )
     )
-    few, many = TUNING.screen.beside_reference, TUNING.screen.beside_transients
+    few, many = TUNING.screen.beside_reference, TUNING.screen.sure
     assert [asked(Stack(one)) for one in (rig, steady, lagging)] == [few, few, many]
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_an_effect_is_seen_if_it_would_be_an_alarm(share: float) -> None:
     screen = _screen(0.0, habit=0.0, left=np.inf)
-    most = max(screen.threshold, TUNING.screen.beside_transients)
-    screen = replace(screen, asked=TUNING.screen.beside_transients, counts=0.5)
+    most = max(screen.threshold, TUNING.screen.sure)
+    screen = replace(screen, asked=TUNING.screen.sure, counts=0.5)
     assert screen.seen("loss", share * most / 0.5) == (share > 1.0)

@@ -56,8 +56,10 @@ SHADES = ("#5c6672", "#e8a33d", "#c2410c")
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the page and the pictures, of all effects or of those named."""
     parser = Parser(prog="python -m gritd.tools.dev.effect_figures", description=main.__doc__)
-    parser.add_argument("effects", nargs="*", choices=[[], *EFFECTS], metavar="EFFECT")
+    parser.add_argument("effects", nargs="*", metavar="EFFECT")
     names = parser.parse_args(argv).effects or list(EFFECTS)
+    if unknown := [name for name in names if name not in EFFECTS]:
+        parser.error(f"found {unknown[0]!r}; expected one of {', '.join(EFFECTS)}")
     (DOCS / "effects").mkdir(parents=True, exist_ok=True)
     for name in names:
         draw(EFFECTS[name], DOCS / "effects" / f"{name}.png")

@@ -70,7 +70,7 @@ def test_the_reference_tells_what_its_single_runs_show() -> None:
     base = fit_base(rig_of(HABITS, (NEW,)), np.random.default_rng(0))
     screen = screen_of_base(prepare_screening(base, _rng()))
     loud = max(screen.evidence, key=lambda of: screen.evidence[of])
-    raised = screen.beside_reference({loud: screen.evidence[loud]})
+    raised = screen.beside_reference({loud: screen.evidence[loud]}, screen.asked)
     assert raised.surprise(loud) < 0.0 < screen.surprise(loud)
 
 

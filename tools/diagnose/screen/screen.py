@@ -66,7 +66,7 @@ class Screen:
     nulls: Array
     chance: dict[Candidate, float] = field(default_factory=dict)
     open: float = np.inf
-    asked: float = TUNING.screen.sure
+    asked: float = field(default_factory=lambda: TUNING.screen.sure)
     habit: Mapping[Candidate, float] = field(default_factory=dict)
     apart: Collection[Candidate] = ()
     ripple: float = 1.0
@@ -118,11 +118,11 @@ class Screen:
     def beside_reference(
         self,
         evidence: Mapping[Candidate, float],
+        asked: float,
         apart: Collection[Candidate] = (),
-        asked: float = TUNING.screen.beside_reference,
     ) -> Screen:
         """The same where single runs of a reference campaign show some evidence of the candidates
-        [nats]; apart: those whose habit says nothing of others; asked: [nats] that must be left.
+        [nats]; asked: [nats] that must be left; apart: those whose habit says nothing of others.
         """
         usual = {of: self.usual[of] for of in evidence if of in self.usual}
         habit = {of: max((evidence[of] - s) / r, 0.0) for of, (s, r) in usual.items()}

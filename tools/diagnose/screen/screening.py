@@ -167,7 +167,7 @@ def _screen_beside_reference(screening: Screening, model: Model) -> Screen:
     rest = beside.of_rows(~stack.new)
     shapes: dict[Candidate, float] = {f.shape: float(f.average(rest)[0]) for f in of_reference}
     ripples = {name for name, effect in stack.rig.effects.items() if order_of(effect)}
-    return screen.beside_reference({**shapes, **usual}, ripples, asked(stack))
+    return screen.beside_reference({**shapes, **usual}, asked(stack), ripples)
 
 
 def asked(stack: Stack) -> float:

@@ -115,9 +115,11 @@ def optimised(problem: Problem, model: Model, start: Array) -> float:
 
 def counted(problem: Problem, model: Model) -> float:
     """The objective [nats] of a model's optimum as its evidence counts it: by the slopes of where
-    the descent ended, what stands at a bound held.
+    the descent ended, what stands at a bound held; where it did not converge, as it stands.
     """
     fitted = model.fitted
+    if not fitted.converged:
+        return fitted.nats
     ground = problem.ground(fitted.effects, fitted.free)
     here = ground.moved(fitted, ground.tried(fitted.centre)[0])
     free = np.flatnonzero(~fitted.held)

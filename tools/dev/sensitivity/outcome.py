@@ -94,7 +94,7 @@ def decided(rig: Rig, handed: Handed = lambda *_: None) -> Outcome:
     handed(search)
 
     decision = decide(search)
-    tan_phi = averaged_soil(rig, decision).get("tan_phi")
+    tan_phi = averaged_soil(search.problem, decision).get("tan_phi")
     return Outcome(
         decision.verdict,
         tuple(sorted(decision.best.names)),

@@ -54,7 +54,7 @@ def explain(
 
     with meanwhile(jobs, lambda: _located(search, accepted, before)) as located:
         hypotheses = _hypotheses(search, decision, folds)
-        soil = soil_of(rig, base.fitted, decision)
+        soil = soil_of(problem, base.fitted, decision)
         proposed = next_experiment(search, decision)
         learnt = learnt_form(problem, accepted, soil.after) if soil is not None else None
         location = located()

@@ -17,7 +17,7 @@ def with_reference(diagnosis: Diagnosis, rig: Rig, verdict: str | None) -> Diagn
     effects: dict[str, dict[str, Quantity]] = {}
     for constant in rig.constants:
         if constant.kind == HAD:
-            effect, _, parameter = constant.name.partition(".")
+            effect, parameter = constant.parameter
             effects.setdefault(effect, {})[parameter] = diagnosis.nuisance[constant.name]
 
     covered = coverage(Stack(rig))

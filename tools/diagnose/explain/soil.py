@@ -11,23 +11,25 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.reconciled import reconciled
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit
+from gritd.tools.diagnose.fit.bending import had_freedoms
 from gritd.tools.diagnose.fit.model import Model
-from gritd.tools.diagnose.fit.problem import Fitted
+from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Constant, Rig
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.verdict.decision import Decision
 
 
-def soil_of(rig: Rig, before: Fitted, decision: Decision) -> SoilFit | None:
+def soil_of(problem: Problem, before: Fitted, decision: Decision) -> SoilFit | None:
     """Prior, fit of the exact model, average over the explanations, and strain; None without
     soil.
     """
+    rig = problem.stack.rig
     soil = [k for k in rig.constants if k.soil]
     if not soil:
         return None
     strain = {k.name: float(u) for k, u in zip(rig.constants, before.u, strict=True) if k.soil}
     prior = {k.name: Quantity(k.value, k.sigma, k.unit) for k in soil}
-    return SoilFit(prior, constants_of(rig, before, True), averaged_soil(rig, decision), strain)
+    return SoilFit(prior, constants_of(rig, before, True), averaged_soil(problem, decision), strain)
 
 
 def constants_of(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
@@ -37,17 +39,18 @@ def constants_of(rig: Rig, fitted: Fitted, soil: bool) -> dict[str, Quantity]:
     return {k.name: _told(rig, k, fitted.u, spread) for k in rig.constants if k.soil == soil}
 
 
-def averaged_soil(rig: Rig, decision: Decision) -> dict[str, Quantity]:
+def averaged_soil(problem: Problem, decision: Decision) -> dict[str, Quantity]:
     """The soil, averaged over all explanations by their probabilities: which of them is true is
     part of what is not known.
     """
+    rig = problem.stack.rig
     every = [
         (w.model, w.probability)
         for w in decision.weighed
         if w.probability > TUNING.explain.slight_explanation
     ]
 
-    told = [(_soil_of(rig, model), share) for model, share in every or [(decision.best, 1.0)]]
+    told = [(_soil_of(problem, model), share) for model, share in every or [(decision.best, 1.0)]]
     total = sum(share for _, share in told)
 
     out = {}
@@ -74,9 +77,13 @@ def _beside_prior(known: Constant, fitted: Quantity) -> Quantity:
     return replace(fitted, sigma=max(fitted.sigma, known.spread(strain, abs(strain) / reach)))
 
 
-def _soil_of(rig: Rig, model: Model) -> dict[str, Quantity]:
-    """The soil of one explanation. What stands at its bound is not known better than before."""
-    mean, spread = model.constants()
+def _soil_of(problem: Problem, model: Model) -> dict[str, Quantity]:
+    """The soil of one explanation. What stands at its bound is not known better than before. What
+    the reference shows by itself may have another form than ours, as any effect.
+    """
+    rig = problem.stack.rig
+    had = had_freedoms(problem.stack, problem.noise, model.fitted)
+    mean, spread = model.constants(had)
     told = {}
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):
         if constant.soil:

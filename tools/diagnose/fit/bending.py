@@ -24,10 +24,12 @@ changes the soil and hardly the fit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.base import Effect, order_of
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.terramechanics.soil import Array
@@ -36,6 +38,7 @@ from gritd.tools.diagnose.fit.freedom import Freedom, Sizes, freedom
 from gritd.tools.diagnose.fit.functions import along, along_place, shares
 from gritd.tools.diagnose.fit.problem import Fitted, build
 from gritd.tools.diagnose.noise.colour import Noise, whiten
+from gritd.tools.diagnose.rig.interface import HAD, Index
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SQUARE
@@ -53,26 +56,67 @@ def bending_sizes() -> Sizes:
 
 def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
     """Of each effect of a fit that changes anything: its other forms, and of a zero any at all."""
+    numbered = enumerate(fitted.acting)
+    acting = [_Acting(effect, _added(stack, fitted, number)) for number, effect in numbered]
+    own = np.arange(len(fitted.u), len(fitted.centre))
+    return _forms_of(stack, noise, fitted, acting, own)
+
+
+def had_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedom, ...]:
+    """The same of each effect that the reference shows by itself, in both campaigns."""
+    constants = stack.rig.constants
+    own = [number for number, constant in enumerate(constants) if constant.kind == HAD]
+    names = dict.fromkeys(constants[number].parameter[0] for number in own)
+    acting = [_had(stack, fitted, name) for name in names]
+    return _forms_of(stack, noise, fitted, acting, np.array(own, dtype=np.intp))
+
+
+@dataclass(frozen=True, eq=False)
+class _Acting:
+    """An effect, and what it adds to the prediction (N,)."""
+
+    effect: Effect
+    added: Array
+
+
+def _had(stack: Stack, fitted: Fitted, name: str) -> _Acting:
+    """An effect of the reference, whose strengths are constants of the rig."""
+    strengths = {p.name for p in EFFECTS[name].parameters() if p.role == "strength"}
+    values, without = {}, fitted.u.copy()
+    for number, constant in enumerate(stack.rig.constants):
+        effect, parameter = constant.parameter
+        if constant.kind == HAD and effect == name:
+            values[parameter] = constant.of(float(fitted.u[number]))
+            if parameter in strengths:
+                without[number] = constant.strain(0.0)
+
+    added = fitted.predicted - stack.predict(without, fitted.acting)
+    return _Acting(make(name, values), _finite(added))
+
+
+def _forms_of(
+    stack: Stack, noise: Noise, fitted: Fitted, acting: Sequence[_Acting], own: Index
+) -> tuple[Freedom, ...]:
+    """Other forms of effects. own: which of the fit's unknowns are their parameters."""
     freedoms = []
     functions = shares(stack, np.ones(stack.size, bool))
     places = along_place(stack)
 
-    for number, effect in enumerate(fitted.acting):
-        added = _added(stack, fitted, number)
+    for effect, added in ((one.effect, one.added) for one in acting):
         if np.any(added):
             # first, as the narrower: other forms can imitate them
             for zeros in _free_zeros(stack, noise, effect, added):
-                columns = _beside(noise, zeros, fitted)
+                columns = _beside(noise, zeros, fitted, own)
                 freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
 
             if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
                 varied = added[:, None] * places / np.sqrt(places.shape[1])
-                columns = _beside(noise, varied, fitted)
+                columns = _beside(noise, varied, fitted, own)
                 freedoms.append(freedom(effect.name, columns, noise, _place_sizes()))
 
-            for harmonics in _harmonics(stack, fitted, number):
+            for harmonics in _harmonics(stack, effect):
                 columns = added[:, None] * harmonics / np.sqrt(harmonics.shape[1])
-                columns = _beside(noise, columns, fitted)
+                columns = _beside(noise, columns, fitted, own)
                 freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
 
             every = np.column_stack((functions, _by_channel(stack, added)))
@@ -85,7 +129,7 @@ def bending_freedoms(stack: Stack, noise: Noise, fitted: Fitted) -> tuple[Freedo
                     (columns, displaced[:, None] * functions / np.sqrt(functions.shape[1]))
                 )
 
-            columns = _beside(noise, columns, fitted)
+            columns = _beside(noise, columns, fitted, own)
             least = 0 if effect.stage in EXACT else 1
             freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
 
@@ -113,7 +157,10 @@ def _added(stack: Stack, fitted: Fitted, number: int) -> Array:
     """Prediction with an effect less that without it (N,); 0 where the others alone run away."""
     acting = build(fitted.effects, fitted.free, fitted.x)
     others = tuple(e for i, e in enumerate(acting) if i != number)
-    added = fitted.predicted - stack.predict(fitted.u, others)
+    return _finite(fitted.predicted - stack.predict(fitted.u, others))
+
+
+def _finite(added: Array) -> Array:
     return added if np.isfinite(added).all() else np.zeros_like(added)
 
 
@@ -175,13 +222,11 @@ def _where_most(stack: Stack, noise: Noise, added: Array) -> Array:
     return np.where(stack.of(max(shown, key=lambda c: shown[c])), added, 0.0)
 
 
-def _beside(noise: Noise, columns: Array, fitted: Fitted) -> Array:
-    """Columns (N, m) without what the parameters of a fit's effects can do."""
-    first = len(fitted.u)
+def _beside(noise: Noise, columns: Array, fitted: Fitted, own: Index) -> Array:
+    """Columns (N, m) without what the effects' parameters, unknowns `own` of a fit, can do."""
     whitened = whiten(noise, columns)
-
-    share = np.linalg.lstsq(fitted.own[:, first:], whitened, rcond=TUNING.fit.dependent)[0]
-    return np.asarray(columns - fitted.raw[:, first:] @ share)
+    share = np.linalg.lstsq(fitted.own[:, own], whitened, rcond=TUNING.fit.dependent)[0]
+    return np.asarray(columns - fitted.raw[:, own] @ share)
 
 
 def _by_channel(stack: Stack, added: Array) -> Array:
@@ -192,9 +237,8 @@ def _by_channel(stack: Stack, added: Array) -> Array:
     return np.column_stack(marks).astype(float)
 
 
-def _harmonics(stack: Stack, fitted: Fitted, number: int) -> Iterator[Array]:
+def _harmonics(stack: Stack, effect: Effect) -> Iterator[Array]:
     """The first harmonics of a ripple's order (N, m): times it they give another profile."""
-    effect = build(fitted.effects, fitted.free, fitted.x)[number]
     if effect.fingerprint.covariate != "wheel_angle":
         return
     name = order_of(type(effect))

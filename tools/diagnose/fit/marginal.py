@@ -90,6 +90,10 @@ class Marginal:
         self._known: dict[Chosen, float] = {}
         self._filled: list[set[Chosen]] = [set() for _ in self.freedoms]
 
+    def beside(self, freedoms: Sequence[Freedom]) -> Marginal:
+        """The same fit with further freedoms."""
+        return Marginal(self._fitted, self._fixed, (*self.freedoms, *freedoms))
+
     def log_evidence(self, chosen: Chosen) -> float:
         """For given sizes, their prior counted."""
         if chosen not in self._known:

@@ -99,14 +99,17 @@ class Model:
         own = [number for number, freedom in every if freedom.name == name]
         return self.marginal.size_of(self.chosen, own[-1]) if own else 0.0
 
-    def constants(self) -> tuple[Array, Array]:
+    def constants(self, further: Sequence[Freedom] = ()) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of
         all freedoms: how far the forms may be off is part of what is not known of the soil.
+
+        further: freedoms that the fit had not.
         """
         count = len(self.fitted.u)
         if self.marginal is None:
             return self.fitted.u, self.fitted.covariance()[:count, :count]
-        return self.marginal.constants(self.chosen, count)
+        marginal = self.marginal.beside(further) if further else self.marginal
+        return marginal.constants((*self.chosen, *(0 for _ in further)), count)
 
     def parameters(self) -> tuple[Array, Array]:
         """Mean and standard deviation (p,) of the effects' parameters in expected sizes, averaged
@@ -161,7 +164,15 @@ def fit_model(
     names = tuple(effect.name for effect in fitted.acting)
     of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
     bent = tuple(_values(every[len(forms) :], of_bends))
-    return Model(fitted, names, evidence, of_forms, bent, marginal, of_fit)
+    reached = evidence - _beyond(fitted, marginal, of_fit)
+    return Model(fitted, names, reached, of_forms, bent, marginal, of_fit)
+
+
+def _beyond(fitted: Fitted, marginal: Marginal, sizes: Chosen) -> float:
+    """What linear algebra counts beyond where a fit stands [nats]: of one that did not converge its
+    slopes tell of no place that it could reach.
+    """
+    return 0.0 if fitted.converged else marginal.gain(sizes)
 
 
 def _unbent(fitted: Fitted, freedoms: Sequence[Freedom]) -> bool:

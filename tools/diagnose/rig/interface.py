@@ -53,6 +53,12 @@ class Constant:
     channel: str = ""
     kind: str = ""
 
+    @property
+    def parameter(self) -> tuple[str, str]:
+        """Effect and parameter, where the constant is one of an effect that the rig has."""
+        effect, _, parameter = self.name.partition(".")
+        return effect, parameter
+
     def of(self, u: float) -> float:
         if self.log:
             return float(self.value * np.exp(u * self.sigma / self.value))

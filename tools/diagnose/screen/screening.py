@@ -174,7 +174,7 @@ def asked(stack: Stack) -> float:
     """Evidence that must be left beside what the rig does anyway [nats]: where that has transients,
     whose law is never quite the rig's, as much as of campaigns alone.
     """
-    shown = {c.name.partition(".")[0] for c in stack.rig.constants if c.kind == HAD}
+    shown = {c.parameter[0] for c in stack.rig.constants if c.kind == HAD}
     had = [effect for name, effect in stack.rig.effects.items() if name in shown]
     kinds = [*had, *(type(effect) for effect in stack.rig.baseline)]
     passing = any(effect.in_steady_states() is None for effect in kinds)

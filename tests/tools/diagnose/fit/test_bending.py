@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.history import followed, run_begins
 from gritd.estimator.stages.situation import Reaction, Situation
-from gritd.tools.diagnose.fit.bending import _following, bending_freedoms
-from gritd.tools.diagnose.fit.problem import free_of
+from gritd.tools.diagnose.fit.bending import _following, bending_freedoms, had_freedoms
+from gritd.tools.diagnose.fit.problem import Problem, free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.stack import Stack
 from gritd.tools.diagnose.rig.wheel import WheelRig
@@ -224,3 +225,32 @@ def test_a_steady_effect_has_no_profile() -> None:
     fitted = problem.descend((EFFECTS["bulldozing"],), free, *start, rounds=0)
     freedoms = bending_freedoms(stack, problem.noise, fitted)
     assert all(f.sizes.values[-1] < 2.0 for f in freedoms)
+
+
+def test_what_a_reference_shows_has_the_other_forms_of_the_same_effect_that_is_new() -> None:
+    effect = EFFECTS["bulldozing"]
+    free = free_of((effect,))
+    plain = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    constants = np.zeros(len(plain.stack.rig.constants))
+    as_new = plain.descend((effect,), free, constants, np.ones(len(free)), rounds=0)
+
+    shown = {f.parameter.name: Uncertain(f.value(1.0), f.parameter.sigma) for f in free}
+    rig = plain.stack.rig.having((ConfiguredEffect("bulldozing", shown),))
+    had = Problem(Stack(rig), plain.noise, plain.fixed[0].columns)
+    as_had = had.descend((), (), np.zeros(len(rig.constants)), np.zeros(0), rounds=0)
+    np.testing.assert_allclose(as_had.predicted, as_new.predicted, rtol=1e-6, atol=1e-6)
+
+    ours = bending_freedoms(plain.stack, plain.noise, as_new)
+    theirs = had_freedoms(had.stack, had.noise, as_had)
+    assert [f.name for f in theirs] == [f.name for f in ours]
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.sizes == other.sizes and one.least == other.least
+        scale = np.linalg.norm(one.columns)
+        np.testing.assert_allclose(other.columns, one.columns, atol=1e-4 * scale)
+
+
+def test_a_rig_without_a_reference_has_none_of_it() -> None:
+    problem = fit_base(_stack().rig, np.random.default_rng(0)).problem
+    none = np.zeros(len(problem.stack.rig.constants))
+    fitted = problem.descend((), (), none, np.zeros(0), rounds=0)
+    assert had_freedoms(problem.stack, problem.noise, fitted) == ()

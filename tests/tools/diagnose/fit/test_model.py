@@ -14,6 +14,7 @@ from gritd.tools.diagnose.fit.model import fit_model
 from gritd.tools.diagnose.fit.problem import free_of
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.diagnose.tuning import replaced
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -80,3 +81,23 @@ def test_two_effects_that_are_nearly_one_stand_where_their_evidence_is_told() ->
     model = fit_model(base.problem, forms, both, free_of(both), begins, sizes)
     assert model.marginal is not None
     assert model.marginal.gain(model.chosen) < 0.5
+
+
+@pytest.mark.parametrize("rounds", [1, 2, 30])
+def test_the_evidence_counts_no_more_than_the_fit_reached(rounds: int) -> None:
+    """What the slopes promise beyond a fit that did not converge is not counted."""
+    base = shifted()
+    begins, free = (base.fitted.u, np.array([-1.0, 0.0])), free_of((PEAK,))
+    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    sizes = tuple(0 for _ in forms)
+
+    with replaced("fit", rounds=rounds, size_rounds=1):
+        model = fit_model(base.problem, forms, (PEAK,), free, begins, sizes)
+    assert model.marginal is not None
+    extrapolated = model.marginal.log_evidence(model.chosen)
+    if model.fitted.converged:
+        assert model.evidence > extrapolated
+    else:
+        told = model.evidence + model.marginal.gain(model.chosen)
+        assert told > extrapolated > model.evidence
+    assert model.fitted.converged == (rounds == 30)

@@ -8,9 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
+from gritd.estimator.effects import make
 from gritd.tools.diagnose.explain.result import Quantity
-from gritd.tools.diagnose.explain.soil import _beside_prior, _told
+from gritd.tools.diagnose.explain.soil import _beside_prior, _soil_of, _told
+from gritd.tools.diagnose.fit.discrepancy import form_freedoms
+from gritd.tools.diagnose.fit.model import sized_model
+from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Constant
+from gritd.tools.diagnose.rig.wheel import WheelRig
+from gritd.tools.proof.ours.cases import record
+from tests.tools.diagnose.campaigns import plan, settings
 
 C = Constant("c", 1000.0, 200.0, "Pa", soil=True, log=True)
 
@@ -50,3 +58,23 @@ def test_one_bed_has_one_soil() -> None:
     told = _told(_rig(C, Constant("zero", 0.0, 0.1)), C, np.array([0.5, 3.0]), np.diag([0.09, 1.0]))
     assert told.value == pytest.approx(1000.0 * np.exp(0.1))
     assert told.sigma == pytest.approx(told.value * 0.2 * 0.3)
+
+
+def test_what_the_reference_shows_is_no_exact_form() -> None:
+    """Of two rigs that do the same, c is less certain where an effect of the reference does it:
+    another form of it may move the soil and hardly the fit.
+    """
+    shown = ConfiguredEffect("bulldozing", {"share": Uncertain(1.0, 1.0)})
+    runs = record(plan(seconds=24.0), (make("bulldozing", {"share": 1.0}),))
+    rig = WheelRig(runs, settings()).having((shown,))
+    base = fit_base(rig, np.random.default_rng(0))
+    forms = form_freedoms(base.problem.stack, base.problem.noise)
+    none = tuple(0 for _ in forms)
+    model = sized_model(base.problem, forms, (base.fitted.u, np.zeros(0)), none)
+
+    mean, spread = model.constants()
+    for known in (k for k in rig.constants if k.name in ("c", "tan_phi")):
+        exact = _told(rig, known, mean, spread)
+        told = _soil_of(base.problem, model)[known.name]
+        assert told.sigma > 1.1 * exact.sigma
+        assert abs(told.value - exact.value) < 2.0 * told.sigma

@@ -10,9 +10,9 @@ FILE keeps what was compared, a line of JSON for each campaign: a campaign that 
 compared again. Of each search the bare model and the models within reach of the best one decide.
 Each is given to scipy's trust region reflective least squares (Branch, Coleman and Li 1999, SIAM
 J. Sci. Comput. 21, 1-23) with the same bounds and priors, from where our descent ended and from K
-points about it. The other forms of the effects are made anew where a descent ends, and the evidence
-takes the last step by linear algebra (fit/marginal.py). So a fit is off by what the best of these
-reaches beyond the optimum that the evidence counts, or misses of it [nats].
+points about it, with the other forms of the effects that the evidence counts. A fit is off by what
+the best of these reaches beyond the objective that the evidence counts, which is that where our
+descent ended (fit/model.py) [nats].
 """
 
 from __future__ import annotations
@@ -60,9 +60,8 @@ FAR = 1e6  # a residual where the model runs away
 
 @dataclass(frozen=True)
 class Compared:
-    """One fit. nats: its objective at the optimum that its evidence counts; gain: what the best
-    full optimisation gains beyond it, from where our descent ended and from points about it;
-    negative where the linear algebra counts more than there is.
+    """One fit. nats: its objective where our descent ended, which its evidence counts; gain: what
+    the full optimisation gains beyond it, from there and from points about it.
     """
 
     case: str
@@ -113,18 +112,12 @@ def optimised(problem: Problem, model: Model, start: Array) -> float:
     return float(optimum.cost)
 
 
-def counted(problem: Problem, model: Model) -> float:
-    """The objective [nats] of a model's optimum as its evidence counts it: by the slopes of where
-    the descent ended, what stands at a bound held; where it did not converge, as it stands.
+def standing(problem: Problem, model: Model) -> float:
+    """The objective [nats] where a model's fit stands, beside the other forms that its evidence
+    counts.
     """
     fitted = model.fitted
-    if not fitted.converged:
-        return fitted.nats
-    ground = problem.ground(fitted.effects, fitted.free)
-    here = ground.moved(fitted, ground.tried(fitted.centre)[0])
-    free = np.flatnonzero(~fitted.held)
-    pull = here.gradient[free]
-    return here.nats - float(0.5 * pull @ np.linalg.solve(here.curvature[np.ix_(free, free)], pull))
+    return problem.ground(fitted.effects, fitted.free).tried(fitted.centre)[1]
 
 
 def _residuals(ground: Ground, problem: Problem, centre: Array) -> Array:
@@ -151,7 +144,7 @@ def compared(case: str, search: Search, starts: int, rng: np.random.Generator) -
 
     for model in deciding(search):
         problem, here = problem_of(search, model), model.fitted.centre
-        ours = counted(problem, model)
+        ours = standing(problem, model)
         near = optimised(problem, model, here)
         moved = [here + SPREAD * rng.standard_normal(here.size) for _ in range(starts)]
         elsewhere = min((optimised(problem, model, m) for m in moved), default=near)

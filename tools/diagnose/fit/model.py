@@ -145,6 +145,9 @@ def fit_model(
     problem: without freedoms; forms: those of the model's form; start: constants (q,) and effect
     parameters (p,); sizes: of the forms, where the search begins; bends: of the first effects, from
     a model that holds them.
+
+    The evidence counts the objective where the fit stands. Slopes that promise more than it could
+    reach, at a kink or a bound, do not count.
     """
     every, sizes = (*forms, *bends.freedoms), (*sizes, *bends.sizes)
     fitted = problem.with_freedoms(every, _values(every, sizes)).descend(effects, free, *start)
@@ -155,8 +158,9 @@ def fit_model(
         of_fit = _handed_on(known, sizes, every)
         marginal = Marginal(fitted, problem.fixed, every)
 
-        near = marginal.gain(of_fit) < TUNING.fit.last_step
+        beyond = marginal.gain(of_fit)
         sizes, evidence = marginal.likeliest(of_fit)
+        near = beyond < TUNING.fit.last_step
         if (near and sizes == of_fit) or number + 1 == TUNING.fit.size_rounds:
             break
         fitted = problem.with_freedoms(every, _values(every, sizes)).refit(fitted)
@@ -164,15 +168,7 @@ def fit_model(
     names = tuple(effect.name for effect in fitted.acting)
     of_forms, of_bends = of_fit[: len(forms)], of_fit[len(forms) :]
     bent = tuple(_values(every[len(forms) :], of_bends))
-    reached = evidence - _beyond(fitted, marginal, of_fit)
-    return Model(fitted, names, reached, of_forms, bent, marginal, of_fit)
-
-
-def _beyond(fitted: Fitted, marginal: Marginal, sizes: Chosen) -> float:
-    """What linear algebra counts beyond where a fit stands [nats]: of one that did not converge its
-    slopes tell of no place that it could reach.
-    """
-    return 0.0 if fitted.converged else marginal.gain(sizes)
+    return Model(fitted, names, evidence - beyond, of_forms, bent, marginal, of_fit)
 
 
 def _unbent(fitted: Fitted, freedoms: Sequence[Freedom]) -> bool:
@@ -202,7 +198,8 @@ def sized_model(
     """
     fitted = problem.with_freedoms(forms, _values(forms, sizes)).descend((), (), *start)
     marginal = Marginal(fitted, problem.fixed, forms)
-    return Model(fitted, (), marginal.log_evidence(sizes), sizes, (), marginal, sizes)
+    evidence = marginal.log_evidence(sizes) - marginal.gain(sizes)
+    return Model(fitted, (), evidence, sizes, (), marginal, sizes)
 
 
 def plain_model(problem: Problem, fitted: Fitted) -> Model:

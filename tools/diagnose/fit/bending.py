@@ -98,42 +98,45 @@ def _forms_of(
     stack: Stack, noise: Noise, fitted: Fitted, acting: Sequence[_Acting], own: Index
 ) -> tuple[Freedom, ...]:
     """Other forms of effects. own: which of the fit's unknowns are their parameters."""
-    freedoms = []
-    functions = shares(stack, np.ones(stack.size, bool))
-    places = along_place(stack)
+    functions, places = shares(stack, np.ones(stack.size, bool)), along_place(stack)
+    return tuple(
+        freedom(one.effect.name, _beside(noise, columns, fitted, own), noise, sizes, least)
+        for one in acting
+        if np.any(one.added)
+        for columns, sizes, least in _other_forms(stack, noise, fitted, one, functions, places)
+    )
 
-    for effect, added in ((one.effect, one.added) for one in acting):
-        if np.any(added):
-            # first, as the narrower: other forms can imitate them
-            for zeros in _free_zeros(stack, noise, effect, added):
-                columns = _beside(noise, zeros, fitted, own)
-                freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
 
-            if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
-                varied = added[:, None] * places / np.sqrt(places.shape[1])
-                columns = _beside(noise, varied, fitted, own)
-                freedoms.append(freedom(effect.name, columns, noise, _place_sizes()))
+def _other_forms(
+    stack: Stack, noise: Noise, fitted: Fitted, one: _Acting, functions: Array, places: Array
+) -> Iterator[tuple[Array, Sizes, int]]:
+    """Of one effect, columns (N, m) with their sizes and the smallest of these that counts for the
+    uncertainty of the constants; the narrower first, since other forms can imitate them.
 
-            for harmonics in _harmonics(stack, effect):
-                columns = added[:, None] * harmonics / np.sqrt(harmonics.shape[1])
-                columns = _beside(noise, columns, fitted, own)
-                freedoms.append(freedom(effect.name, columns, noise, _free_zero_sizes()))
+    functions (N, f): of the conditions; places (N, p): along the bed.
+    """
+    effect, added = one.effect, one.added
+    for zeros in _free_zeros(stack, noise, effect, added):
+        yield zeros, _free_zero_sizes(), 0
+    if effect.stage not in NOWHERE and not effect.free_along and places.shape[1]:
+        yield _share(added, places), _place_sizes(), 0
+    for harmonics in _harmonics(stack, effect):
+        yield _share(added, harmonics), _free_zero_sizes(), 0
 
-            every = np.column_stack((functions, _by_channel(stack, added)))
-            columns = added[:, None] * every / np.sqrt(every.shape[1])
-            if effect.stage in OF_SOIL:
-                columns = np.column_stack((columns, _following(stack, added)))
-            if effect.stage == OF_SHEAR:
-                displaced = _displaced(stack, noise, fitted, added)
-                columns = np.column_stack(
-                    (columns, displaced[:, None] * functions / np.sqrt(functions.shape[1]))
-                )
+    columns = _share(added, np.column_stack((functions, _by_channel(stack, added))))
+    if effect.stage in OF_SOIL:
+        columns = np.column_stack((columns, _following(stack, added)))
+    if effect.stage == OF_SHEAR:
+        displaced = _displaced(stack, noise, fitted, added)
+        columns = np.column_stack((columns, _share(displaced, functions)))
+    yield columns, bending_sizes(), 0 if effect.stage in EXACT else 1
 
-            columns = _beside(noise, columns, fitted, own)
-            least = 0 if effect.stage in EXACT else 1
-            freedoms.append(freedom(effect.name, columns, noise, bending_sizes(), least))
 
-    return tuple(freedoms)
+def _share(added: Array, functions: Array) -> Array:
+    """Columns (N, m) of an effect that adds so much (N,), times functions (N, m), together of
+    size 1.
+    """
+    return added[:, None] * functions / np.sqrt(functions.shape[1])
 
 
 def varied_along_place(stack: Stack, effect: type[Effect], made: Signature) -> list[Array]:

@@ -82,7 +82,8 @@ def _soil_of(problem: Problem, model: Model) -> dict[str, Quantity]:
     the reference shows by itself may have another form than ours, as any effect.
     """
     rig = problem.stack.rig
-    had = had_freedoms(problem.stack, problem.noise, model.fitted)
+    with rig.aside():
+        had = had_freedoms(problem.stack, problem.noise, model.fitted)
     mean, spread = model.constants(had)
     told = {}
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):

@@ -98,6 +98,8 @@ def _forms_of(
     stack: Stack, noise: Noise, fitted: Fitted, acting: Sequence[_Acting], own: Index
 ) -> tuple[Freedom, ...]:
     """Other forms of effects. own: which of the fit's unknowns are their parameters."""
+    if not acting:
+        return ()
     functions, places = shares(stack, np.ones(stack.size, bool)), along_place(stack)
     return tuple(
         freedom(one.effect.name, _beside(noise, columns, fitted, own), noise, sizes, least)

@@ -2,11 +2,11 @@
 
 What is written is all that the recordings show beyond the equations and the accepted effects at the
 configured calibration: the discrepancy of form, how far the form of an effect differs from the
-library's, and what the fit moved calibration constants by (a torque constant that is 1 % off looks
-like a δ of 1 %). Few directions hold most of what stays uncertain of it, in all
-channels together; the rest is one number a channel. The soil that is written may be an average over
-several explanations. The mean of δ is then the one that belongs to that soil: their sum, which the
-recordings show, stays what it is.
+library's (of one that the reference shows too), and what the fit moved calibration constants by (a
+torque constant that is 1 % off looks like a δ of 1 %). Few directions hold most of what stays
+uncertain of it, in all channels together; the rest is one number a channel. The soil that is
+written may be an average over several explanations. The mean of δ is then the one that belongs to
+that soil: their sum, which the recordings show, stays what it is.
 
 Not written: what goes with the wheel's angle, whose zero no recording keeps, and the discrepancy of
 a drive whose both sides are measured.
@@ -27,7 +27,7 @@ from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.diagnose.explain.soil import linear
 from gritd.tools.diagnose.fit.discrepancy import conditions_at, joined
-from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.model import Model, with_forms_had
 from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.rig.interface import HAD, Bools, FormSource, Rig
 from gritd.tools.diagnose.rig.stack import Stack
@@ -52,12 +52,13 @@ class _Source:
 
 def learnt_form(problem: Problem, model: Model, soil: Mapping[str, Quantity]) -> LearntForm | None:
     """δ of a model, for a soil that is written beside it; None for a rig or model without one."""
-    stack, marginal = problem.stack, model.marginal
+    stack = problem.stack
     sources = [s for s in stack.rig.forms if not s.drive]
     usual = sources[0].usual if sources else None
-    if marginal is None or usual is None:
+    if model.marginal is None or usual is None:
         return None
 
+    model = with_forms_had(problem, model)
     unknowns = _Unknowns(problem, model, sources, soil)
     points = np.round(_points(stack, sources), TUNING.explain.learnt_places - 2)
     parts = {s.name: _source(problem, model, s, points, unknowns) for s in sources}

@@ -11,8 +11,7 @@ import numpy as np
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.explain.reconciled import reconciled
 from gritd.tools.diagnose.explain.result import Quantity, SoilFit
-from gritd.tools.diagnose.fit.bending import had_freedoms
-from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.fit.model import Model, with_forms_had
 from gritd.tools.diagnose.fit.problem import Fitted, Problem
 from gritd.tools.diagnose.rig.interface import Constant, Rig
 from gritd.tools.diagnose.tuning import TUNING
@@ -78,13 +77,9 @@ def _beside_prior(known: Constant, fitted: Quantity) -> Quantity:
 
 
 def _soil_of(problem: Problem, model: Model) -> dict[str, Quantity]:
-    """The soil of one explanation. What stands at its bound is not known better than before. What
-    the reference shows by itself may have another form than ours, as any effect.
-    """
+    """The soil of one explanation. What stands at its bound is not known better than before."""
     rig = problem.stack.rig
-    with rig.aside():
-        had = had_freedoms(problem.stack, problem.noise, model.fitted)
-    mean, spread = model.constants(had)
+    mean, spread = with_forms_had(problem, model).constants()
     told = {}
     for constant, held in zip(rig.constants, model.fitted.held, strict=False):
         if constant.soil:

@@ -138,7 +138,7 @@ def _share(added: Array, functions: Array) -> Array:
     """Columns (N, m) of an effect that adds so much (N,), times functions (N, m), together of
     size 1.
     """
-    return added[:, None] * functions / np.sqrt(functions.shape[1])
+    return np.asarray(added[:, None] * functions / np.sqrt(functions.shape[1]))
 
 
 def varied_along_place(stack: Stack, effect: type[Effect], made: Signature) -> list[Array]:

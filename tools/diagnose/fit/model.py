@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
-from gritd.tools.diagnose.fit.bending import bending_freedoms
+from gritd.tools.diagnose.fit.bending import bending_freedoms, had_freedoms
 from gritd.tools.diagnose.fit.freedom import Freedom
 from gritd.tools.diagnose.fit.marginal import Chosen, Marginal
 from gritd.tools.diagnose.fit.problem import Fitted, Free, Maker, Problem
@@ -99,17 +99,14 @@ class Model:
         own = [number for number, freedom in every if freedom.name == name]
         return self.marginal.size_of(self.chosen, own[-1]) if own else 0.0
 
-    def constants(self, further: Sequence[Freedom] = ()) -> tuple[Array, Array]:
+    def constants(self) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of
         all freedoms: how far the forms may be off is part of what is not known of the soil.
-
-        further: freedoms that the fit had not.
         """
         count = len(self.fitted.u)
         if self.marginal is None:
             return self.fitted.u, self.fitted.covariance()[:count, :count]
-        marginal = self.marginal.beside(further) if further else self.marginal
-        return marginal.constants((*self.chosen, *(0 for _ in further)), count)
+        return self.marginal.constants(self.chosen, count)
 
     def parameters(self) -> tuple[Array, Array]:
         """Mean and standard deviation (p,) of the effects' parameters in expected sizes, averaged
@@ -188,6 +185,18 @@ def _places(freedoms: Sequence[Freedom]) -> list[tuple[str, int]]:
     """The name of each freedom, and how many of that name stand before it."""
     names = [f.name for f in freedoms]
     return [(name, names[:number].count(name)) for number, name in enumerate(names)]
+
+
+def with_forms_had(problem: Problem, model: Model) -> Model:
+    """The same fit where what the reference shows by itself may have other forms than ours, as the
+    model's effects have: for what is told of soil and form. A search has none of it.
+    """
+    if model.marginal is None:
+        return model
+    with problem.stack.rig.aside():
+        had = had_freedoms(problem.stack, problem.noise, model.fitted)
+    chosen = (*model.chosen, *(0 for _ in had))
+    return replace(model, marginal=model.marginal.beside(had), chosen=chosen) if had else model
 
 
 def sized_model(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,10 +11,14 @@ import pytest
 
 from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.effects import make
+from gritd.estimator.model.learnt import LearntForm
+from gritd.tools.diagnose.explain import learnt
+from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.result import Quantity
 from gritd.tools.diagnose.explain.soil import _beside_prior, _soil_of, _told
 from gritd.tools.diagnose.fit.discrepancy import form_freedoms
-from gritd.tools.diagnose.fit.model import sized_model
+from gritd.tools.diagnose.fit.model import Model, sized_model
+from gritd.tools.diagnose.fit.problem import Problem
 from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.interface import Constant
 from gritd.tools.diagnose.rig.wheel import WheelRig
@@ -60,21 +65,46 @@ def test_one_bed_has_one_soil() -> None:
     assert told.sigma == pytest.approx(told.value * 0.2 * 0.3)
 
 
-def test_what_the_reference_shows_is_no_exact_form() -> None:
-    """Of two rigs that do the same, c is less certain where an effect of the reference does it:
-    another form of it may move the soil and hardly the fit.
-    """
+@cache
+def _fitted() -> tuple[Problem, Model]:
+    """A rig whose reference showed that it pushes soil."""
     shown = ConfiguredEffect("bulldozing", {"share": Uncertain(1.0, 1.0)})
     runs = record(plan(seconds=24.0), (make("bulldozing", {"share": 1.0}),))
     rig = WheelRig(runs, settings()).having((shown,))
     base = fit_base(rig, np.random.default_rng(0))
     forms = form_freedoms(base.problem.stack, base.problem.noise)
     none = tuple(0 for _ in forms)
-    model = sized_model(base.problem, forms, (base.fitted.u, np.zeros(0)), none)
+    return base.problem, sized_model(base.problem, forms, (base.fitted.u, np.zeros(0)), none)
 
-    mean, spread = model.constants()
+
+def test_what_the_reference_shows_is_no_exact_form() -> None:
+    """c and tan φ are less certain than by our form of it: another one may move the soil and hardly
+    the fit.
+    """
+    problem, model = _fitted()
+    rig, (mean, spread) = problem.stack.rig, model.constants()
     for known in (k for k in rig.constants if k.name in ("c", "tan_phi")):
         exact = _told(rig, known, mean, spread)
-        told = _soil_of(base.problem, model)[known.name]
+        told = _soil_of(problem, model)[known.name]
         assert told.sigma > 1.1 * exact.sigma
         assert abs(told.value - exact.value) < 2.0 * told.sigma
+
+
+def test_what_is_written_beside_the_soil_has_its_other_forms_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else the on-line filter would take our form as exact, and be too sure of the soil again."""
+    problem, model = _fitted()
+    soil = _soil_of(problem, model)
+    told = learnt_form(problem, model, soil)
+    monkeypatch.setattr(learnt, "with_forms_had", lambda _, model: model)
+    exact = learnt_form(problem, model, soil)
+    assert told is not None and exact is not None
+    assert _open(told) > 1.5 * _open(exact)
+
+
+def _open(form: LearntForm) -> float:
+    """What δ leaves open of the drawbar pull [N²], added up over its features."""
+    channel = form.drawbar_pull
+    assert channel is not None
+    return channel.size**2 * float(np.sum(np.square(channel.spread)) + channel.rest**2)

@@ -9,7 +9,7 @@ them on drawn values.
 from __future__ import annotations
 
 try:
-    from gritd.estimator.compiled.algebra import dot, update, variance
+    from gritd.estimator.compiled.algebra import dot, mixed, update, variance
     from gritd.estimator.compiled.closed import Closed
     from gritd.estimator.compiled.record import evidence
 except ImportError:  # no compiler where gritd was installed
@@ -17,4 +17,4 @@ except ImportError:  # no compiler where gritd was installed
 else:
     BUILT = True
 
-__all__ = ["BUILT", "Closed", "dot", "evidence", "update", "variance"]
+__all__ = ["BUILT", "Closed", "dot", "evidence", "mixed", "update", "variance"]

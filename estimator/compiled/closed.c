@@ -13,7 +13,8 @@
 #include "complex_numbers.h"
 
 #define INTEGRALS 8               /* A1, A2, B1, B2, B3, C1, C2, C3 */
-#define PARTS 3                   /* the shift, its derivative by ln k, by n */
+#define PARTS 7                   /* of the shift: see filter/shift.py */
+#define FARTHEST 1.0              /* as in shift.py */
 #define COLUMNS (PARTS * INTEGRALS)
 #define POWERS 14                 /* of the polynomials in theta_1 and in slip */
 #define SMALLEST 0.1              /* as in scalar.py */
@@ -28,6 +29,8 @@ typedef struct {
     double radius, width, c1, c2, ln_k;
     double low[2], high[2];       /* range of theta_1 and of slip */
     int shifted;
+    double theta_1, slip;         /* where `point` was taken last */
+    double point[3][COLUMNS];
     double table[POWERS][POWERS][COLUMNS];
     PyObject *quantity;           /* the named tuple of a result */
 } Closed;
@@ -130,46 +133,61 @@ static void polynomials(double x, double low, double high, double first[POWERS],
     for (int n = 0; n < POWERS; n++) slopes[n] = slope * (n * second[n]);
 }
 
-/* out: the first `columns` of the table at a point: values, derivatives by theta_1 and by slip. */
-static void tabulated(const Closed *self, double theta_1, double slip, int columns,
-                      double out[3][COLUMNS]) {
+/* self->point: the table at a point: values, derivatives by theta_1 and by slip. */
+static void tabulated(Closed *self, double theta_1, double slip) {
+    if (theta_1 == self->theta_1 && slip == self->slip) return;
     double rows[POWERS], by_rows[POWERS], across[POWERS], by_across[POWERS];
     polynomials(theta_1, self->low[0], self->high[0], rows, by_rows);
     polynomials(slip, self->low[1], self->high[1], across, by_across);
 
     for (int b = 0; b < POWERS; b++) {
         double value[COLUMNS], by_theta_1[COLUMNS];
-        for (int q = 0; q < columns; q++) {
+        for (int q = 0; q < COLUMNS; q++) {
             value[q] = rows[0] * self->table[0][b][q];
             by_theta_1[q] = by_rows[0] * self->table[0][b][q];
         }
         for (int a = 1; a < POWERS; a++)
-            for (int q = 0; q < columns; q++) {
+            for (int q = 0; q < COLUMNS; q++) {
                 value[q] += rows[a] * self->table[a][b][q];
                 by_theta_1[q] += by_rows[a] * self->table[a][b][q];
             }
-        for (int q = 0; q < columns; q++) {
+        for (int q = 0; q < COLUMNS; q++) {
             const double parts[3] = {across[b] * value[q], across[b] * by_theta_1[q],
                                      by_across[b] * value[q]};
-            for (int p = 0; p < 3; p++) out[p][q] = b ? out[p][q] + parts[p] : parts[p];
+            for (int p = 0; p < 3; p++) self->point[p][q] = b ? self->point[p][q] + parts[p] : parts[p];
         }
     }
+    self->theta_1 = theta_1;
+    self->slip = slip;
 }
 
-/* value, by theta_1, by slip of the shift at k, and its derivative by ln k: each of eight
-   integrals. */
-static void shift_at(const Closed *self, double k, double theta_1, double slip,
-                     double exponent_error, double out[4][INTEGRALS]) {
-    double point[3][COLUMNS];
-    const double ln_k = log(k) - self->ln_k;
-    tabulated(self, theta_1, slip, exponent_error != 0.0 ? COLUMNS : 2 * INTEGRALS, point);
+/* What is added to the configured n, c1 and c2. */
+typedef struct { double exponent, c1, c2; } form;
+
+/* The shift at k: value, by theta_1, by slip, by ln k, by n and by the place of the peak, each of
+   eight integrals. */
+static void shift_at(Closed *self, double k, double theta_1, double slip, form e,
+                     double out[6][INTEGRALS]) {
+    const double far = log(k) - self->ln_k, peak = e.c1 + e.c2 * slip;
+    const double low = far > -FARTHEST ? far : -FARTHEST;
+    const double ln_k = low < FARTHEST ? low : FARTHEST;
+    tabulated(self, theta_1, slip);
     for (int q = 0; q < INTEGRALS; q++) {
         for (int p = 0; p < 3; p++) {
-            out[p][q] = point[p][q] + ln_k * point[p][INTEGRALS + q];
-            if (exponent_error != 0.0)
-                out[p][q] = out[p][q] + exponent_error * point[p][2 * INTEGRALS + q];
+            const double *t = self->point[p] + q;
+            const double by_n = t[3 * INTEGRALS] + ln_k * t[4 * INTEGRALS];
+            const double by_peak = t[5 * INTEGRALS] + ln_k * t[6 * INTEGRALS];
+            out[p][q] = t[0] + ln_k * (t[INTEGRALS] + ln_k * t[2 * INTEGRALS]) +
+                        e.exponent * by_n + peak * by_peak;
+            if (p == 0) {
+                out[3][q] = t[INTEGRALS] + (2.0 * ln_k) * t[2 * INTEGRALS] +
+                            e.exponent * t[4 * INTEGRALS] + peak * t[6 * INTEGRALS];
+                if (ln_k != far) out[3][q] = 0.0 * out[3][q];
+                out[4][q] = by_n;
+                out[5][q] = by_peak;
+            }
         }
-        out[3][q] = point[0][INTEGRALS + q];
+        out[2][q] = out[2][q] + e.c2 * out[5][q];
     }
 }
 
@@ -194,10 +212,12 @@ static int delicate(double theta_1, double f, double slip, double lam) {
              lam < 1.0 - NEAREST);
 }
 
-static PyObject *quantity(const Closed *self, double value, const double gradient[6]) {
-    PyObject *items = PyTuple_New(7), *arguments, *made;
+#define GRADIENT 8
+
+static PyObject *quantity(const Closed *self, double value, const double gradient[GRADIENT]) {
+    PyObject *items = PyTuple_New(1 + GRADIENT), *arguments, *made;
     if (items == NULL) return NULL;
-    for (int n = 0; n < 7; n++) {
+    for (int n = 0; n <= GRADIENT; n++) {
         PyObject *item = PyFloat_FromDouble(n ? gradient[n - 1] : value);
         if (item == NULL) { Py_DECREF(items); return NULL; }
         PyTuple_SET_ITEM(items, n, item);
@@ -223,24 +243,25 @@ static int numbers(PyObject *const *arguments, Py_ssize_t given, Py_ssize_t want
 }
 
 PyDoc_STRVAR(predict_doc,
-"predict(c, tan_phi, k, theta_1, slip, load, exponent_error)\n--\n\n"
+"predict(c, tan_phi, k, theta_1, slip, load, exponent, c1, c2)\n--\n\n"
 "T, DP and resistance with gradients, each a Quantity; None where the general form is to answer.");
 
 static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_t given) {
-    const Closed *self = (Closed *)object;
-    double in[7], shift[4][INTEGRALS], gradients[3][6];
-    if (!numbers(arguments, given, 7, in)) return NULL;
+    Closed *self = (Closed *)object;
+    double in[9], shift[6][INTEGRALS], gradients[3][GRADIENT];
+    if (!numbers(arguments, given, 9, in)) return NULL;
     const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3], slip = in[4], load = in[5];
+    const form e = {in[6], in[7], in[8]};
 
-    const double lam = self->c1 + self->c2 * slip;
+    const double c1 = self->c1 + e.c1, c2 = self->c2 + e.c2, lam = c1 + c2 * slip;
     const double half = sin(0.5 * theta_1), scale = self->radius / k, rise = half * half;
     const double f = scale * (slip + (1.0 - slip) * rise); /* Eq. (19) */
-    if (!isfinite(c + tan_phi + load + in[6]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
+    if (!isfinite(c + tan_phi + load + in[6] + in[7] + in[8]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
 
     integrals x, by_theta, by_f;
     all_integrals(theta_1, f * theta_1, lam, &x, &by_theta, &by_f);
     if (self->shifted) {
-        shift_at(self, k, theta_1, slip, in[6], shift);
+        shift_at(self, k, theta_1, slip, e, shift);
         x = added(x, shift[0], 1.0);
         by_theta = added(by_theta, shift[1], theta_1);
     }
@@ -252,21 +273,23 @@ static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_
 
     const integrals nothing = {0.0, 0.0, {0.0, 0.0}, {0.0, 0.0}, {0.0, 0.0}};
     const change none = {0.0, 0.0, 0.0, 0.0};
-    change columns[7] = {
+    change columns[9] = {
         {arm * theta_1 * x.a1, area * theta_1 * x.one.re, 0.0, area * theta_1 * x.one.im},
         {arm * s * x.a2, area * s * x.hat.re, 0.0, area * s * x.hat.im},
         forces(&at, by_f),
         forces(&at, (integrals){x.a1 + by_theta.a1, by_theta.a2, by_theta.bare,
                                 plus(x.one, by_theta.one), by_theta.hat}),
-        self->c2 != 0.0 ? forces(&at, by_ratio(theta_1, f * theta_1, lam)) : none,
+        forces(&at, by_ratio(theta_1, f * theta_1, lam)),
+        self->shifted ? forces(&at, added(nothing, shift[2], 1.0)) : none,
         self->shifted ? forces(&at, added(nothing, shift[3], 1.0)) : none,
-        self->shifted ? forces(&at, added(nothing, shift[2], 1.0)) : none};
+        self->shifted ? forces(&at, added(nothing, shift[4], 1.0)) : none,
+        self->shifted ? forces(&at, added(nothing, shift[5], 1.0)) : none};
 
     /* s gives way to each of them so that W stays the same */
     const double ds = -1.0 / (area * carry);
     const double torque_s = arm * tan_phi * x.a2 * ds, drag_s = area * x.bare.im * ds;
     const double pull_s = area * tan_phi * x.hat.re * ds - drag_s;
-    for (int n = 0; n < 7; n++) {
+    for (int n = 0; n < 9; n++) {
         columns[n].torque = columns[n].torque + torque_s * columns[n].load;
         columns[n].pull = columns[n].pull + pull_s * columns[n].load;
         columns[n].drag = columns[n].drag + drag_s * columns[n].load;
@@ -276,15 +299,17 @@ static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_
     const double f_slip = scale * (1.0 - rise) / f;
     const double by_w[3] = {torque_s, pull_s, drag_s};
     for (int q = 0; q < 3; q++) {
-        double by[7];
-        for (int n = 0; n < 7; n++)
+        double by[9];
+        for (int n = 0; n < 9; n++)
             by[n] = q == 0 ? columns[n].torque : q == 1 ? columns[n].pull : columns[n].drag;
         gradients[q][0] = by[0];
         gradients[q][1] = by[1];
-        gradients[q][2] = by[5] - by[2];
+        gradients[q][2] = by[6] - by[2];
         gradients[q][3] = by[3] / theta_1 + f_theta_1 * by[2];
-        gradients[q][4] = by[6] + f_slip * by[2] + self->c2 * by[4];
+        gradients[q][4] = by[5] + f_slip * by[2] + c2 * by[4];
         gradients[q][5] = -by_w[q];
+        gradients[q][6] = by[7];
+        gradients[q][7] = by[4] + by[8];
     }
     const change now = forces(&at, x);
     PyObject *torque = quantity(self, now.torque, gradients[0]);
@@ -298,24 +323,25 @@ static PyObject *predict(PyObject *object, PyObject *const *arguments, Py_ssize_
 }
 
 PyDoc_STRVAR(load_doc,
-"load(c, tan_phi, k, theta_1, slip, sigma_m, exponent_error)\n--\n\n"
+"load(c, tan_phi, k, theta_1, slip, sigma_m, exponent, c1, c2)\n--\n\n"
 "W [N] by Eq. (21) for a given peak stress; None where the general form is to answer.");
 
 static PyObject *load_of(PyObject *object, PyObject *const *arguments, Py_ssize_t given) {
-    const Closed *self = (Closed *)object;
-    double in[7], shift[4][INTEGRALS];
-    if (!numbers(arguments, given, 7, in)) return NULL;
+    Closed *self = (Closed *)object;
+    double in[9], shift[6][INTEGRALS];
+    if (!numbers(arguments, given, 9, in)) return NULL;
+    const form e = {in[6], in[7], in[8]};
     const double c = in[0], tan_phi = in[1], k = in[2], theta_1 = in[3];
     const double slip = in[4], sigma_m = in[5];
 
-    const double lam = self->c1 + self->c2 * slip, half = sin(0.5 * theta_1);
+    const double lam = (self->c1 + e.c1) + (self->c2 + e.c2) * slip, half = sin(0.5 * theta_1);
     const double f = self->radius / k * (slip + (1.0 - slip) * (half * half)); /* Eq. (19) */
-    if (!isfinite(c + tan_phi + sigma_m + in[6]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
+    if (!isfinite(c + tan_phi + sigma_m + in[6] + in[7] + in[8]) || delicate(theta_1, f, slip, lam)) Py_RETURN_NONE;
 
     integrals x, by_theta_1, by_f;
     all_integrals(theta_1, f * theta_1, lam, &x, &by_theta_1, &by_f);
     if (self->shifted) {
-        shift_at(self, k, theta_1, slip, in[6], shift);
+        shift_at(self, k, theta_1, slip, e, shift);
         x = added(x, shift[0], 1.0);
     }
     const double supported = sigma_m * (x.bare.re + tan_phi * x.hat.im) + c * x.one.im;
@@ -352,6 +378,7 @@ static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
             return -1;
         }
     }
+    self->theta_1 = self->slip = NAN; /* equals nothing */
     Py_INCREF(type);
     Py_XSETREF(self->quantity, type);
     return 0;

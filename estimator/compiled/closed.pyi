@@ -10,7 +10,7 @@ class Closed:
         ln_k: float,  # at which the table was made
         theta_1: Range,  # of the table [rad]
         slip: Range,
-        table: object,  # contiguous (14, 14, 24) float64, or None for no shift
+        table: object,  # contiguous (14, 14, 56) float64, or None for no shift
         /,
     ) -> None: ...
     def predict(
@@ -21,7 +21,9 @@ class Closed:
         theta_1: float,
         slip: float,
         load: float,
-        exponent_error: float,
+        exponent: float,
+        c1: float,
+        c2: float,
         /,
     ) -> tuple[Quantity, Quantity, Quantity] | None: ...
     def load(
@@ -32,6 +34,8 @@ class Closed:
         theta_1: float,
         slip: float,
         sigma_m: float,
-        exponent_error: float,
+        exponent: float,
+        c1: float,
+        c2: float,
         /,
     ) -> float | None: ...

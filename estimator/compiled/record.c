@@ -8,22 +8,22 @@
 #define COMPONENTS 2
 #define TINY 1e-9                 /* as in evidence.py */
 
-/* A record of s stretches with q nuisances; d = 3 + q normals are the prior. */
+/* A record of s stretches of a vector (d,); d normals are the prior. */
 typedef struct {
-    Py_ssize_t s, q, d;
-    double *A;                    /* (s, 2, d) H and G of unit noise */
+    Py_ssize_t s, d;
+    double *A;                    /* (s, 2, d) H of unit noise */
     double *y;                    /* (s, 2) */
     double *F;                    /* (s, 2, d) of the normals */
     double *root, *gram, *factor; /* (d, d) */
-    double *best, *sigma, *scale; /* (d,) */
+    double *best, *sigma, *scale, *x; /* (d,) */
     double *shared, *V;           /* (d, 3) sums from a stretch to the last */
-    double x[STATES], spread[STATES];
+    double spread[STATES];
     double *block;                /* that all of these lie in */
 } record;
 
 static int room(record *r) {
     const Py_ssize_t d = r->d, rows = COMPONENTS * r->s;
-    const Py_ssize_t size = rows * (2 * d + 1) + 3 * d * d + 3 * d + 2 * d * STATES;
+    const Py_ssize_t size = rows * (2 * d + 1) + 3 * d * d + 4 * d + 2 * d * STATES;
     double *next = r->block = PyMem_Calloc((size_t)size, sizeof(double));
     if (next == NULL) { PyErr_NoMemory(); return 0; }
     r->A = next; next += rows * d;
@@ -35,6 +35,7 @@ static int room(record *r) {
     r->best = next; next += d;
     r->sigma = next; next += d;
     r->scale = next; next += d;
+    r->x = next; next += d;
     r->shared = next; next += d * STATES;
     r->V = next;
     return 1;
@@ -42,14 +43,14 @@ static int room(record *r) {
 
 /* --- what is given --- */
 
-/* One line with unit noise: rows of H and G side by side, and y. */
+/* One line with unit noise: rows of H, and y. */
 static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
     const Py_ssize_t d = r->d;
     double *A = r->A + COMPONENTS * at * d, *y = r->y + COMPONENTS * at;
     double R[COMPONENTS][COMPONENTS], D[COMPONENTS][COMPONENTS];
     if (!PyTuple_Check(line) || PyTuple_GET_SIZE(line) != 5 ||
         !PyTuple_Check(PyTuple_GET_ITEM(line, 0))) {
-        PyErr_SetString(PyExc_ValueError, "expected a line of y, H, G, R and D");
+        PyErr_SetString(PyExc_ValueError, "expected a line of y, H, R, D and its model's variance");
         return 0;
     }
     const Py_ssize_t m = PyTuple_GET_SIZE(PyTuple_GET_ITEM(line, 0));
@@ -58,10 +59,9 @@ static int read_line(record *r, Py_ssize_t at, PyObject *line, double windows) {
         return 0;
     }
     if (!read_vector(PyTuple_GET_ITEM(line, 0), m, y) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 1), m, STATES, d, A) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 2), m, r->q, d, A + STATES) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &R[0][0]) ||
-        !read_matrix(PyTuple_GET_ITEM(line, 4), m, m, COMPONENTS, &D[0][0]))
+        !read_matrix(PyTuple_GET_ITEM(line, 1), m, d, d, A) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 2), m, m, COMPONENTS, &R[0][0]) ||
+        !read_matrix(PyTuple_GET_ITEM(line, 3), m, m, COMPONENTS, &D[0][0]))
         return 0;
 
     const double first = sqrt(R[0][0] / windows + D[0][0]);
@@ -100,19 +100,13 @@ static int cholesky(const double *A, double *L, Py_ssize_t d) {
     return 1;
 }
 
-/* A root of the covariance of state and nuisances, d = 3 + q. */
-static int root_of(record *r, PyObject *P, PyObject *cross, PyObject *variances) {
-    const Py_ssize_t d = r->d, q = r->q;
+/* A root of the covariance. */
+static int root_of(record *r, PyObject *packed) {
+    const Py_ssize_t d = r->d;
     double *joint = r->gram;
-    if (!read_matrix(P, STATES, STATES, d, joint) ||
-        !read_matrix(cross, STATES, q, d, joint + STATES))
-        return 0;
-    if (!read_vector(variances, q, r->best)) return 0;
-    for (Py_ssize_t i = STATES; i < d; i++) {
-        for (Py_ssize_t j = 0; j < STATES; j++) joint[i * d + j] = joint[j * d + i];
-        for (Py_ssize_t j = STATES; j < d; j++)
-            joint[i * d + j] = i == j ? r->best[i - STATES] : 0.0;
-    }
+    const double *P;
+    if (!read_packed(packed, d * d, &P)) return 0;
+    memcpy(joint, P, (size_t)(d * d) * sizeof(double));
     for (Py_ssize_t i = 0; i < d; i++) {
         r->sigma[i] = sqrt(joint[i * d + i]);
         r->scale[i] = r->sigma[i] > 0.0 ? r->sigma[i] : 1.0;
@@ -133,7 +127,7 @@ static int fitted(record *r) {
     for (Py_ssize_t row = 0; row < rows; row++) {
         const double *A = r->A + row * d;
         double *F = r->F + row * d;
-        r->y[row] = r->y[row] - dot(A, r->x, STATES);
+        r->y[row] = r->y[row] - dot(A, r->x, d);
         for (Py_ssize_t n = 0; n < d; n++)
             for (Py_ssize_t j = 0; j <= n; j++) F[j] += A[n] * r->root[n * d + j];
     }
@@ -212,33 +206,34 @@ static void since(record *r, double *evidence) {
 }
 
 PyDoc_STRVAR(evidence_doc,
-"evidence(x, P, cross, variances, spread, lines, windows)\n--\n\nSee filter/evidence.py.");
+"evidence(x, P, spread, lines, windows)\n--\n\nSee filter/evidence.py.");
 
 static PyObject *evidence(PyObject *module, PyObject *const *given, Py_ssize_t count) {
     (void)module;
     record r = {0};
     PyObject *factors = NULL, *x = NULL, *all = NULL;
-    if (count != 7 || !PyTuple_Check(given[3]) || !PyList_Check(given[5]) ||
-        !PyList_Check(given[6]) || PyList_GET_SIZE(given[5]) != PyList_GET_SIZE(given[6])) {
-        PyErr_SetString(PyExc_TypeError, "expected five tuples and two lists of one length");
+    if (count != 5 || !PyTuple_Check(given[0]) || !PyList_Check(given[3]) ||
+        !PyList_Check(given[4]) || PyList_GET_SIZE(given[3]) != PyList_GET_SIZE(given[4])) {
+        PyErr_SetString(PyExc_TypeError, "expected an estimate, a spread and two lists of one length");
         return NULL;
     }
-    r.s = PyList_GET_SIZE(given[5]);
-    r.q = PyTuple_GET_SIZE(given[3]);
-    r.d = STATES + r.q;
+    r.s = PyList_GET_SIZE(given[3]);
+    r.d = PyTuple_GET_SIZE(given[0]);
     if (!room(&r)) return NULL;
     double *factor = PyMem_Calloc((size_t)r.s + 1, sizeof(double));
-    if (factor != NULL && read_vector(given[0], STATES, r.x) &&
-        read_vector(given[4], STATES, r.spread) && read_lines(&r, given[5], given[6]) &&
-        root_of(&r, given[1], given[2], given[3]) && fitted(&r)) {
-        double known[STATES];
+    if (factor != NULL && r.d >= STATES && read_vector(given[0], r.d, r.x) &&
+        read_vector(given[2], STATES, r.spread) && read_lines(&r, given[3], given[4]) &&
+        root_of(&r, given[1]) && fitted(&r)) {
         since(&r, factor);
-        for (int n = 0; n < STATES; n++) known[n] = r.x[n] + dot(r.root + n * r.d, r.best, r.d);
+        for (Py_ssize_t n = 0; n < r.d; n++)
+            r.x[n] = r.x[n] + dot(r.root + n * r.d, r.best, r.d);
         factors = made_vector(factor, r.s);
-        x = made_vector(known, STATES);
+        x = made_vector(r.x, r.d);
         all = factors && x ? PyTuple_Pack(2, factors, x) : NULL;
     } else if (factor == NULL) {
         PyErr_NoMemory();
+    } else if (!PyErr_Occurred()) {
+        PyErr_SetString(PyExc_ValueError, "expected c, tan phi and ln k at least");
     }
     PyMem_Free(factor);
     PyMem_Free(r.block);

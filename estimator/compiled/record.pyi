@@ -1,11 +1,9 @@
-from gritd.estimator.filter.estimate import Matrix, Vector
+from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
 
 def evidence(
     x: Vector,
-    P: Matrix,
-    cross: Matrix,
-    variances: Vector,
+    P: bytes,
     spread: Vector,
     lines: list[Line],
     windows: list[int],

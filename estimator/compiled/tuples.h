@@ -31,6 +31,16 @@ static int read_matrix(PyObject *given, Py_ssize_t rows, Py_ssize_t size, Py_ssi
     return 1;
 }
 
+/* `size` doubles in a bytes object, where they stand */
+static int read_packed(PyObject *given, Py_ssize_t size, const double **out) {
+    if (!PyBytes_Check(given) || PyBytes_GET_SIZE(given) != size * (Py_ssize_t)sizeof(double)) {
+        PyErr_Format(PyExc_ValueError, "expected %zd packed doubles", size);
+        return 0;
+    }
+    *out = (const double *)PyBytes_AS_STRING(given);
+    return 1;
+}
+
 static PyObject *made_vector(const double *values, Py_ssize_t size) {
     PyObject *made = PyTuple_New(size);
     for (Py_ssize_t n = 0; made != NULL && n < size; n++) {

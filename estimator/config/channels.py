@@ -17,7 +17,7 @@ from gritd.estimator.config.settings import (
     Wrench,
 )
 from gritd.estimator.config.yamltree import Node, Scalar, describe
-from gritd.estimator.messages.readings import CHANNELS, ENCODERS, REQUIRED
+from gritd.estimator.messages.readings import CHANNELS, ENCODERS, MOTION
 
 # channel -> raw unit, physical unit, unit of raw differences
 UNITS = {
@@ -171,7 +171,7 @@ def channels() -> Section:
         name: Key(
             Section(WRENCH | _timing(), Wrench) if name == "wrench" else _channel(name),
             CHANNEL_DOCS[name],
-            NEEDED if name in REQUIRED else ABSENT,
+            NEEDED if name in (*MOTION, "motor_shunt") else ABSENT,
         )
         for name in CHANNELS
     }

@@ -11,6 +11,8 @@ from gritd.estimator.model.learnt import LearntForm
 from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 
 ENGINES = ("filterpy", "plain")  # of the filter
+# [N], [N·m] an axis of the wrench whose zero is no better known than this is not measured
+UNMEASURED = 1e5
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,14 @@ class SoilPrior:
     exponent: Uncertain  # n [-]
     pressure_sinkage: PressureSinkage  # moduli in either form; .modulus(width) gives K of σ = K zⁿ
     modulus_sigma: float = 0.0  # relative standard deviation of K [-]
+
+
+@dataclass(frozen=True)
+class PeakPrior:
+    """How well the place of the stress peak is known: σ of c₁ and c₂ of Eq. (5)."""
+
+    c1_sigma: float = 0.0
+    c2_sigma: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -83,6 +93,11 @@ class Wrench:
     latency: float = 0.0
     stale_after: float = 0.04
 
+    @property
+    def pulls(self) -> bool:
+        """Whether the drawbar pull is measured."""
+        return self.drawbar_pull.offset.sigma < UNMEASURED
+
 
 @dataclass(frozen=True)
 class Device:
@@ -108,7 +123,8 @@ class Drive:
     """Motor and gear, seen from the wheel axle."""
 
     torque_constant: Uncertain  # torque at the axle per ampere [N·m/A]
-    torque_source: Literal["motor_shunt", "wrench"] = "motor_shunt"
+    # none: the drawbar pull alone tells of the soil
+    torque_source: Literal["motor_shunt", "wrench", "none"] = "motor_shunt"
 
 
 @dataclass(frozen=True)
@@ -204,6 +220,7 @@ class Settings:
     effects: tuple[ConfiguredEffect, ...] = ()
     place: Place = Place()
     bed: BedSettings = BedSettings()
+    peak: PeakPrior = PeakPrior()
     discrepancy: LearntForm | None = None  # what the equations miss on this rig, as it was learnt
 
 

@@ -39,6 +39,7 @@ from gritd.estimator.config.settings import (
     FilterSettings,
     Load,
     Logging,
+    PeakPrior,
     Rates,
     Repeatability,
     Settings,
@@ -60,8 +61,12 @@ EffectSchema = Callable[[str], Mapping[str, Quantity] | None]
 WHEEL = {
     "radius": Key(Quantity("m", above=0, high=5), "wheel radius r"),
     "width": Key(Quantity("m", above=0, high=5), "wheel width b"),
-    "c1": Key(Quantity("", low=0, high=1), "c₁ of θₘ = (c₁ + c₂ i) θ₁, Eq. (5)", "0.5"),
-    "c2": Key(Quantity("", low=-1, high=1), "c₂ of Eq. (5)", "0.0"),
+    "c1": Key(
+        uncertain("", low=0, high=1),
+        "c₁ of θₘ = (c₁ + c₂ i) θ₁, Eq. (5); the default covers what was measured in sands",
+        "{value: 0.43, sigma: 0.07}",
+    ),
+    "c2": Key(uncertain("", low=-1, high=1), "c₂ of Eq. (5)", "{value: 0.15, sigma: 0.12}"),
 }
 
 SOIL = {
@@ -94,7 +99,9 @@ DRIVE = {
         uncertain("N*m/A", above=0), "torque at the wheel axle per ampere of motor current"
     ),
     "torque_source": Key(
-        Choice(("motor_shunt", "wrench")), "the channel that gives the torque", "motor_shunt"
+        Choice(("motor_shunt", "wrench", "none")),
+        "the channel that gives the torque; none: the drawbar pull alone tells of the soil",
+        "motor_shunt",
     ),
 }
 
@@ -139,6 +146,10 @@ def _friction(tan_phi: Uncertain | None, phi: Uncertain | None) -> Uncertain:
     raise Impossible("tan_phi", "the friction in one form, tan_phi or phi")
 
 
+def _wheel(c1: Uncertain, c2: Uncertain, **values: float) -> tuple[Wheel, PeakPrior]:
+    return Wheel(c1=c1.value, c2=c2.value, **values), PeakPrior(c1.sigma, c2.sigma)
+
+
 def _load(nominal: Uncertain, minimum: float) -> Load:
     if minimum >= nominal.value:
         raise Impossible("minimum", "less than load.nominal")
@@ -181,7 +192,9 @@ FILTER = {
         Interval(Quantity("m", above=0)), "k stays inside", "[1 mm, 200 mm]"
     ),
     "estimate_k": Key(
-        Choice(("auto", "always", "never")), "k as a state; auto: where slip varies enough", "auto"
+        Choice(("auto", "always", "never")),
+        "read, so that older recordings are, and without effect: k is estimated with its prior",
+        "auto",
     ),
     "model_sigma": Key(
         Quantity("", low=0, high=1),
@@ -313,7 +326,7 @@ def table(folder: Path | None = None, effect_schema: EffectSchema | None = None)
 
     keys = {
         "testbed": Key(NAME, "name of the testbed"),
-        "wheel": Key(Section(WHEEL, Wheel), "the rigid wheel"),
+        "wheel": Key(Section(WHEEL, _wheel), "the rigid wheel"),
         "pulley_radius": Key(
             Quantity("m", above=0, high=5), "radius of the carriage encoder's pulley"
         ),
@@ -345,7 +358,8 @@ def _settings(
 ) -> tuple[Settings, RunInfo]:
     wrench = channels.pop("wrench")
     known = {name: channel for name, channel in channels.items() if channel is not None}
-    settings = Settings(channels=known, wrench=wrench, **values)
+    wheel, peak = values.pop("wheel")
+    settings = Settings(channels=known, wrench=wrench, wheel=wheel, peak=peak, **values)
     _check_channels(settings)
     _check_soil(settings)
     return settings, run or RunInfo()
@@ -355,8 +369,13 @@ def _check_channels(settings: Settings) -> None:
     """Every channel has its device and arrives within the horizon; the torque's channel is
     there.
     """
-    if settings.drive.torque_source == "wrench" and settings.wrench is None:
+    source, wrench = settings.drive.torque_source, settings.wrench
+    if source == "wrench" and wrench is None:
         raise Impossible("drive.torque_source", "motor_shunt, since there is no channel wrench")
+    if source == "none" and (wrench is None or not wrench.pulls):
+        raise Impossible(
+            "drive.torque_source", "motor_shunt or wrench, since no drawbar pull is measured"
+        )
 
     sources = dict(settings.channels) | ({"wrench": settings.wrench} if settings.wrench else {})
     for name, channel in sources.items():

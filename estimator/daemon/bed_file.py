@@ -14,9 +14,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.estimate import STATES, Estimate, Vector
+from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.estimate import STATES, Estimate, Vector, made
 from gritd.estimator.filter.tracker import Tracker
+from gritd.estimator.filter.tuning import FORM
 from gritd.estimator.online.bed import Known, after_run, before_run, fingerprint
 
 FILE = "bed.json"
@@ -125,23 +129,22 @@ def useless(bed: Bed, settings: Settings, now: float) -> str:
     return ""
 
 
-def start_of(bed: Bed, settings: Settings, now: float) -> Estimate | None:
+def start_of(bed: Bed, settings: Settings, now: float) -> Bank | None:
     """What a run begins with; None for the stated prior."""
     if bed.known is None or useless(bed, settings, now):
         return None
     return before_run(bed.known, settings.bed.repeatability)
 
 
-def after(bed: Bed, settings: Settings, estimate: Estimate, began: float, now: float) -> Bed:
-    """The bed after a run that began at a time and left an estimate.
+def after(bed: Bed, settings: Settings, left: Bank, began: float, now: float) -> Bed:
+    """The bed after a run that began at a time and left a bank.
 
     began, now: [s since the epoch].
     """
-    tracker = Tracker(settings)
     known = bed.known
     if known is None or useless(bed, settings, began):
-        known = Known(tracker.prior, 0)
-    learnt = after_run(known, estimate, settings.bed.repeatability, tracker.measurement.variances)
+        known = Known(Tracker(settings).prior_bank, 0)
+    learnt = after_run(known, left, settings.bed.repeatability)
     return replace(bed, known=learnt, updated=now, rig=fingerprint(settings))
 
 
@@ -151,8 +154,11 @@ def after(bed: Bed, settings: Settings, estimate: Estimate, began: float, now: f
 def _plain(bed: Bed) -> dict[str, Any]:
     plain: dict[str, Any] = {"name": bed.name, "updated": bed.updated, "rig": bed.rig}
     if bed.known is not None:
-        x, P, cross = bed.known.estimate
-        plain |= {"runs": bed.known.runs, "x": x, "P": P, "cross": cross}
+        members = [
+            {"x": member.x, "P": member.P, "log_evidence": member.log_evidence}
+            for member in bed.known.bank
+        ]
+        plain |= {"runs": bed.known.runs, "members": members}
     return plain
 
 
@@ -161,11 +167,25 @@ def _read(plain: Mapping[str, Any]) -> Bed:
     bed = Bed(str(plain["name"]), float(plain["updated"]), None, str(plain["rig"]))
     if "runs" not in plain:
         return bed
-    x, P = _vector(plain["x"]), tuple(map(_vector, plain["P"]))
-    cross = tuple(map(_vector, plain["cross"]))
-    if not len(x) == len(P) == len(cross) == STATES or {len(row) for row in P} != {STATES}:
+    bank = tuple([_member(member) for member in plain["members"]])
+    if len(bank) != len(FORM.sizes) or len({len(member.x) for member in bank}) != 1:
+        raise ValueError("not what a run leaves")
+    return replace(bed, known=Known(bank, int(plain["runs"])))
+
+
+def _member(plain: Mapping[str, Any]) -> Estimate:
+    """Raises ValueError where the covariance is none."""
+    x, P = _vector(plain["x"]), np.array([_vector(row) for row in plain["P"]])
+    (evidence,) = _vector([plain["log_evidence"]])
+    if len(x) < STATES or P.shape != (len(x), len(x)) or not np.array_equal(P, P.T):
         raise ValueError("not an estimate")
-    return replace(bed, known=Known(Estimate(x, P, cross), int(plain["runs"])))
+
+    # a covariance, to rounding; a parameter that is exact has a variance of zero
+    scale = np.sqrt(np.maximum(np.diag(P), 0.0))
+    unit = P / np.outer(scale + (scale == 0.0), scale + (scale == 0.0))
+    if np.any(np.diag(P) < 0.0) or float(np.linalg.eigvalsh(unit)[0]) < -1e-9:
+        raise ValueError("not a covariance")
+    return made(x, P, evidence)
 
 
 def _vector(values: Any) -> Vector:

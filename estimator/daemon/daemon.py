@@ -24,7 +24,7 @@ from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
 from gritd.estimator.daemon.scheduling import first, on_one_core, undisturbed
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import Bank
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.online.carry import needs_restart
 from gritd.estimator.online.pipeline import Pipeline
@@ -82,7 +82,7 @@ class Daemon:
         readers: Sequence[ReaderThread],
         source: Source,
         clock: Clock,
-        start: Estimate | None = None,
+        start: Bank | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self.configuration = configuration

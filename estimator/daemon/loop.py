@@ -9,7 +9,7 @@ from threading import Event
 from typing import NamedTuple, Protocol
 
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import Bank
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
 from gritd.estimator.online.bed import begun
@@ -62,7 +62,7 @@ class Loop:
         sink: Sink,
         clock: Clock,
         configuration: str = "",
-        start: Estimate | None = None,
+        start: Bank | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock
@@ -76,7 +76,7 @@ class Loop:
         self.latest: tuple[TickRow, LoopRecord] | None = None
         self.ticks = self.missed = 0
         self._start = start
-        self.estimate: Estimate | None = None  # at the end
+        self.bank: Bank | None = None  # at the end
 
     def ask(self, change: Change) -> None:
         """To be done between two ticks; from any thread."""
@@ -107,7 +107,7 @@ class Loop:
             state = self._between(state, deadline)
             deadline = self._next(deadline)
 
-        self.estimate = state.track.estimate
+        self.bank = state.track.bank
 
     def _begun(self, stamp: int) -> State:
         """The state before the first tick; logged where it is not the stated prior."""

@@ -4,7 +4,7 @@ health, the account of its updates. Each function makes one block of `messages.t
 
 from __future__ import annotations
 
-from math import nan, sqrt
+from math import isnan, nan, sqrt
 
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
@@ -55,7 +55,7 @@ def measurements(snapshot: Snapshot, now: WheelState) -> Measurements:
 
 def soil_estimate(estimate: Estimate) -> SoilEstimate:
     """The estimate in SI: the state is [c/kPa, tan φ, ln k]."""
-    P = estimate.P
+    P = estimate.soil_P
     c, tan_phi, k = soil(estimate)
 
     return SoilEstimate(
@@ -79,13 +79,20 @@ def predictions(measurement: Measurement, account: Account) -> Predictions:
     now, estimate = account.now, account.estimate
     prediction = measurement.predict(estimate, now)
     torque_sigma, pull_sigma, resistance_sigma = measurement.sigmas(estimate, now, prediction)
-    load = measurement.model.load(*soil(estimate), _with_sigma(now), now.theta_m, now.slip.value)
+    load = measurement.model.load(
+        *soil(estimate),
+        _with_sigma(now),
+        now.theta_m,
+        now.slip.value,
+        measurement.form_of(estimate),
+    )
+    torque, pull = measurement.expected(estimate, now, prediction)
     return Predictions(
-        torque_predicted=prediction.torque.value,
+        torque_predicted=torque,
         torque_predicted_sigma=torque_sigma,
         load_predicted=load.value,
         load_predicted_sigma=load.sigma,
-        drawbar_pull_predicted=prediction.drawbar_pull.value,
+        drawbar_pull_predicted=pull,
         drawbar_pull_predicted_sigma=pull_sigma,
         rolling_resistance=prediction.resistance.value,
         rolling_resistance_sigma=resistance_sigma,
@@ -104,7 +111,8 @@ def health(state: TrackState, account: Account) -> FilterHealth:
 
 def aids(account: Account) -> tuple[Aid, Aid]:
     """The account of torque and of drawbar pull; zeros where one was not offered."""
-    torque, drawbar_pull = (account.aids + NO_AIDS)[: len(COMPONENTS)]
+    before = NO_AIDS[:1] if isnan(account.now.torque.value) else ()
+    torque, drawbar_pull = (before + account.aids + NO_AIDS)[: len(COMPONENTS)]
     return torque, drawbar_pull
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import log
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.estimate import KPA, Estimate, Vector, project
+from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.estimate import KPA, STATES, Estimate, Vector, project
 from gritd.estimator.filter.trust import Trust
 from gritd.estimator.filter.tuning import TRUST
 
@@ -27,6 +28,10 @@ class Bounds:
         """The estimate moved to the bound where it left it."""
         return project(estimate, self._bounds)
 
+    def all_inside(self, bank: Bank) -> Bank:
+        """Every member moved to the bound where it left it."""
+        return tuple([self.inside(member) for member in bank])
+
     def stood(self, trust: Trust, estimate: Estimate, elapsed: float = 0.0) -> Trust:
         """For how long an estimate has stood at a bound, `elapsed` [s] of driving later."""
         at_bound = trust.at_bound + elapsed if self.improbable(estimate) else 0.0
@@ -38,7 +43,7 @@ class Bounds:
             [
                 value in bounds and abs(value - mean) > TRUST.improbable * sigma
                 for value, bounds, mean, sigma in zip(
-                    estimate.x, self._bounds, self._mean, self._sigma, strict=True
+                    estimate.x[:STATES], self._bounds, self._mean, self._sigma, strict=True
                 )
             ]
         )

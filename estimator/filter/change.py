@@ -1,11 +1,10 @@
 """Whether the soil changed: the record explained by one soil, against a change at some instant.
 
-Every stretch of the memory is an affine measurement (line.py) of the soil x and of the calibration
-errors b. Both are the same for all stretches as long as the soil stays what it is. A wrong
-calibration moves all stretches together, as G says; a change of the soil moves only those after it.
-With x and b Gaussian (the posterior of what came before) and a change δ drawn from the prior of the
-soil, the Bayes factor of "changed before stretch j" against "never changed" has a closed form. Here
-b is estimated: it serves to judge the soil, and does not enter the estimate that is published.
+Every stretch of the memory is an affine measurement (line.py) of the soil and of the errors that
+all stretches share. Both are the same for all stretches as long as the soil stays what it is. A
+wrong calibration moves all stretches together; a change of the soil moves only those after it. With
+both Gaussian (the posterior of what came before) and a change drawn from the prior of the soil, the
+Bayes factor of "changed before stretch j" against "never changed" has a closed form.
 
 Where nothing changes, a Bayes factor exceeds A in at most 1 of A trials (Ville's inequality), and
 the mean time to a false alarm, when a trial begins at every stretch, is at least A stretches
@@ -32,27 +31,26 @@ class Judgement(NamedTuple):
 
     evidence: Array  # (s,) ln of the Bayes factor of a change before each; the first is not asked
     change: int  # number of the stretch before which the soil changed; 0 where it did not
-    x: Vector  # (3,) the state that fits best if nothing changed
+    x: Vector  # (d,) the vector that fits best if nothing changed
 
 
 def judge(
     before: Estimate,
-    variances: Vector,
     spread: Vector,
     lines: Sequence[Line],
     windows: Sequence[int],
 ) -> Judgement:
     """One soil against a change of it.
 
-    before: what is known of the soil, and its correlation with the nuisances, ahead of the first
-    line; variances (q,): of the nuisances; spread (3,): σ of a change of the state; lines (s) and
-    how many windows each is the mean of.
+    before: what is known ahead of the first line; spread (3,): σ of a change of the soil; lines (s)
+    and how many windows each is the mean of.
     """
     if arithmetic.BUILT:
-        known = (*before, variances, spread, list(lines), list(windows))
-        factors, x = arithmetic.evidence(*known)
+        factors, x = arithmetic.evidence(
+            before.x, before.packed, spread, list(lines), list(windows)
+        )
     else:
-        factors, x = evidence(before, variances, spread, lines, windows)
+        factors, x = evidence(before, spread, lines, windows)
 
     return Judgement(np.array(factors), _change(factors), x)
 

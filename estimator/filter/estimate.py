@@ -1,98 +1,131 @@
-"""What the extended Kalman filter knows of c, tan φ and ln k, and the algebra on it.
+"""What the extended Kalman filter knows, and the algebra on it.
 
-Nuisances (nuisance.py) are errors of the calibration: constant, zero mean, of stated variance.
-They, and ln k while slip does not vary, are considered (Schmidt): their uncertainty and their
-correlation with the state take part in every innovation covariance, but their own value and
-variance never change. Without them a filter fed ten windows a second soon claims to know c far
-better than the calibration of the sensors allows.
+The vector x (d,) holds c, tan φ and ln k, and behind them the errors that are the same in every
+window (nuisance.py): of the calibration, of the place of the stress peak, of the exponent, of the
+form of the equations. All of them have a stated prior and are estimated together. So the part of a
+misfit that a calibration explains is not taken from the soil, and a thousand windows under one
+condition do not claim more than the errors they share allow.
 """
 
 from __future__ import annotations
 
-from operator import mul
+from collections.abc import Sequence
+from struct import Struct
 from typing import NamedTuple
 
+import numpy as np
+
 from gritd.estimator.compiled import arithmetic
+from gritd.estimator.terramechanics.soil import Array
 
 C = 0  # cohesion [kPa]
 TAN_PHI = 1  # tangent of the internal friction angle [-]
 LN_K = 2  # logarithm of the shear modulus k/m [-]
-STATES = 3
+STATES = 3  # of the soil: the first of the vector
 KPA = 1e3  # [Pa]; cohesion is scaled so that all three states are of order one
 
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, ...]
+_DOUBLE = Struct("d")
+_SIZE = _DOUBLE.size
 
 
 class Estimate(NamedTuple):
-    """Mean and covariance of [c, tan φ, ln k], and their correlation with the q nuisances."""
+    """Mean and covariance of a vector (d,); see the module."""
 
-    x: Vector  # (3,)
-    P: Matrix  # (3, 3)
-    cross: Matrix  # (3, q) covariance of the state with each nuisance
+    x: Vector  # (d,)
+    packed: bytes  # covariance (d, d), row by row, as doubles of the processor
+    # ln of the density of all measurements so far, up to a constant that depends on their number
+    log_evidence: float = 0.0
+
+    @property
+    def P(self) -> Matrix:
+        """Covariance (d, d)."""
+        return rows(covariance(self))
+
+    @property
+    def soil_P(self) -> Matrix:
+        """Covariance (3, 3) of c [kPa], tan φ and ln k."""
+        size = len(self.x) * _SIZE
+        return tuple([_ROW.unpack_from(self.packed, i * size) for i in range(STATES)])
+
+
+_ROW = Struct("3d")
 
 
 class Update(NamedTuple):
     """A vector measurement of m = 1 or 2 components, linearised at the present estimate."""
 
     innovation: Vector  # y (m,)
-    H: Matrix  # (m, 3) with respect to the state
-    G: Matrix  # (m, q) with respect to the nuisances
+    H: Matrix  # (m, d)
     R: Matrix  # (m, m) noise
 
 
+def made(x: Vector, P: Array, log_evidence: float = 0.0) -> Estimate:
+    """An estimate from a covariance (d, d)."""
+    return Estimate(x, np.ascontiguousarray(P, float).tobytes(), log_evidence)
+
+
+def covariance(estimate: Estimate) -> Array:
+    """P (d, d), for reading."""
+    size = len(estimate.x)
+    return np.frombuffer(estimate.packed).reshape(size, size)
+
+
+def rows(matrix: Array) -> Matrix:
+    """A matrix as tuples."""
+    return tuple([tuple(row) for row in matrix.tolist()])
+
+
 def predict(estimate: Estimate, walk: Vector) -> Estimate:
-    """Random walk: add the variances `walk` (3,) to the diagonal of P."""
-    (a, b, c), (_, d, e), (_, _, f) = estimate.P
-    a, d, f = a + walk[0], d + walk[1], f + walk[2]
-    return Estimate(estimate.x, ((a, b, c), (b, d, e), (c, e, f)), estimate.cross)
+    """Random walk of the soil: add the variances `walk` (3,) to the diagonal of P."""
+    packed, step = bytearray(estimate.packed), (len(estimate.x) + 1) * _SIZE
+    for state, more in enumerate(walk):
+        (value,) = _DOUBLE.unpack_from(packed, state * step)
+        _DOUBLE.pack_into(packed, state * step, value + more)
+    return estimate._replace(packed=bytes(packed))
 
 
-def cross_covariances(
-    estimate: Estimate, variances: Vector, h: Vector, g: Vector
-) -> tuple[Vector, Vector]:
-    """Covariance of the state (3,) and of the nuisances (q,) with a quantity of gradient h (3,) and
-    g (q,).
-    """
-    h0, h1, h2 = h
-    (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
-    c0, c1, c2 = estimate.cross
-    state = (
-        p00 * h0 + p01 * h1 + p02 * h2 + dot(c0, g),
-        p01 * h0 + p11 * h1 + p12 * h2 + dot(c1, g),
-        p02 * h0 + p12 * h1 + p22 * h2 + dot(c2, g),
-    )
-
-    nuisance = [
-        a * h0 + b * h1 + c * h2 + v * w
-        for a, b, c, v, w in zip(c0, c1, c2, variances, g, strict=True)
-    ]
-    return state, tuple(nuisance)
-
-
-def variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
-    """Variance of a quantity with gradient h (3,) in the state and g (q,) in the nuisances, or ()
-    where none of them is felt; never negative.
-    """
+def variance(estimate: Estimate, h: Vector) -> float:
+    """Variance of a quantity with gradient h (d,); never negative."""
     if arithmetic.BUILT:
-        return arithmetic.variance(estimate.P, estimate.cross, variances, h, g)
-    return plain_variance(estimate, variances, h, g)
+        return arithmetic.variance(estimate.packed, h)
+    return plain_variance(estimate, h)
 
 
-def plain_variance(estimate: Estimate, variances: Vector, h: Vector, g: Vector) -> float:
-    """`variance` in plain floats, to the same bits as compiled."""
-    (p00, p01, p02), (_, p11, p12), (_, _, p22) = estimate.P
-    (h0, h1, h2), (c0, c1, c2) = h, estimate.cross
+def plain_variance(estimate: Estimate, h: Vector) -> float:
+    """`variance` in Python, to the same bits as compiled."""
+    return max(plain_dot(h, times(covariance(estimate), h)), 0.0)
 
-    own = (
-        p00 * h0 * h0
-        + p11 * h1 * h1
-        + p22 * h2 * h2
-        + 2.0 * (p01 * h0 * h1 + p02 * h0 * h2 + p12 * h1 * h2)
-    )
 
-    shared = h0 * dot(c0, g) + h1 * dot(c1, g) + h2 * dot(c2, g)
-    return max(own + 2.0 * shared + dot(variances, tuple(map(mul, g, g))), 0.0)
+def times(P: Array, h: Vector) -> Vector:
+    """P h (d,) of a symmetric P (d, d), term by term."""
+    # a reduction over the first axis adds row to row, in their order
+    product = np.add.reduce(P * np.array(h)[:, None], axis=0)
+    return tuple(product.tolist())
+
+
+def mixed(members: Sequence[Estimate], weights: Sequence[float]) -> Estimate:
+    """Mean and covariance of a mixture of estimates with weights that sum to one."""
+    if len(members) == 1:
+        return members[0]
+    if arithmetic.BUILT:
+        x, packed = arithmetic.mixed([(e.x, e.packed) for e in members], tuple(weights))
+        return Estimate(x, packed)
+    return plain_mixed(members, weights)
+
+
+def plain_mixed(members: Sequence[Estimate], weights: Sequence[float]) -> Estimate:
+    """`mixed` in Python, to the same bits as compiled."""
+    x = np.zeros(len(members[0].x))
+    for estimate, weight in zip(members, weights, strict=True):
+        x = x + weight * np.array(estimate.x)
+
+    P = np.zeros((x.size, x.size))
+    for estimate, weight in zip(members, weights, strict=True):
+        off = np.array(estimate.x) - x
+        P = P + weight * (covariance(estimate) + off[:, None] * off)
+    return made(tuple(x.tolist()), P)
 
 
 def dot(a: Vector, b: Vector) -> float:
@@ -110,21 +143,23 @@ def plain_dot(a: Vector, b: Vector) -> float:
     return total
 
 
-def project(estimate: Estimate, bounds: tuple[tuple[float, float], ...]) -> Estimate:
-    """Move a state that left its bounds back to the bound, and the states correlated with it along.
+def project(estimate: Estimate, bounds: Sequence[tuple[float, float]]) -> Estimate:
+    """Move states of the soil that left their bounds back to the bound, and all that is correlated
+    with them along.
 
     The covariance is kept: a bound is knowledge of the state, not a measurement that narrows it.
     """
-    if all([low <= value <= high for value, (low, high) in zip(estimate.x, bounds, strict=True)]):
+    x = estimate.x
+    if all([low <= value <= high for value, (low, high) in zip(x, bounds, strict=False)]):
         return estimate
 
-    x, P = list(estimate.x), estimate.P
+    P, moved = covariance(estimate), np.array(x)
     for j, (low, high) in enumerate(bounds):
-        step = min(max(x[j], low), high) - x[j]
-        if step != 0.0:
-            x = [value + P[i][j] / P[j][j] * step for i, value in enumerate(x)]
+        step = min(max(float(moved[j]), low), high) - float(moved[j])
+        if step != 0.0 and P[j, j] > 0.0:
+            moved = moved + P[:, j] / P[j, j] * step
 
-    clamped = tuple(
-        min(max(value, low), high) for value, (low, high) in zip(x, bounds, strict=True)
-    )
-    return Estimate(clamped, P, estimate.cross)
+    clamped = moved.tolist()
+    for j, (low, high) in enumerate(bounds):
+        clamped[j] = min(max(clamped[j], low), high)
+    return estimate._replace(x=tuple(clamped))

@@ -21,20 +21,19 @@ Rows = list[list[float]]
 
 def evidence(
     before: Estimate,
-    variances: Vector,
     spread: Vector,
     lines: Sequence[Line],
     windows: Sequence[int],
 ) -> tuple[Vector, Vector]:
-    """ln of the Bayes factors of a change before each of s stretches (s,), and the state (3,) that
+    """ln of the Bayes factors of a change before each of s stretches (s,), and the vector (d,) that
     fits best if nothing changed. Arguments are those of `change.judge`.
     """
     A, y = _whitened(lines, windows)
-    H = A[..., :STATES]
-    y = y - np.add.reduce(H * np.array(before.x), axis=2)
-    root = _root(before, variances)
+    # accumulated: along the last axis `reduce` would add in pairs
+    y = y - np.add.accumulate(A * np.array(before.x), axis=2)[..., -1]
+    root = _root(before)
     F = np.add.reduce(A[..., :, None] * np.array(root), axis=2)  # (s, 2, d): of unit normals
-    steps = H * np.array(spread)  # (s, 2, 3): of the change's normals
+    steps = A[..., :STATES] * np.array(spread)  # (s, 2, 3): of the change's normals
 
     # one soil for all: normal equations of the d normals
     rows = F.reshape(-1, len(root))
@@ -42,10 +41,9 @@ def evidence(
     right = np.add.reduce(rows * y.reshape(-1, 1), axis=0)
     factor = cholesky(gram.tolist())
     best = _solved(factor, right.tolist())
-    x = [value + _dot(row, best) for value, row in zip(before.x, root[:STATES], strict=True)]
+    x = [value + _dot(row, best) for value, row in zip(before.x, root, strict=True)]
 
     # and a change on top of it, from each stretch on
-    # accumulated: along the last axis `reduce` would add in pairs
     left = y - np.add.accumulate(F * np.array(best), axis=2)[..., -1]
     shared = _since(_product(F, steps))
     information = _since(_product(steps, steps))
@@ -55,12 +53,10 @@ def evidence(
 
 
 def _whitened(lines: Sequence[Line], windows: Sequence[int]) -> tuple[Array, Array]:
-    """H and G side by side (s, 2, 3 + q) and y (s, 2) of unit noise; zeros for a component that is
-    not measured.
-    """
-    y, H, G, R, D = (np.array(column) for column in zip(*map(_full, lines), strict=True))
+    """H (s, 2, d) and y (s, 2) of unit noise; zeros for a component that is not measured."""
+    y, H, R, D = (np.array(column) for column in list(zip(*map(_full, lines), strict=True))[:4])
     noise = R / np.array(windows, float)[:, None, None] + D
-    columns = np.concatenate((H, G, y[:, :, None]), axis=2)
+    columns = np.concatenate((H, y[:, :, None]), axis=2)
 
     first = np.sqrt(noise[:, 0, 0])
     slope = noise[:, 1, 0] / first
@@ -76,19 +72,14 @@ def _full(line: Line) -> Line:
     if len(line.y) == 2:
         return line
 
-    (h,), (g,), ((r,),), ((d,),) = line.H, line.G, line.R, line.D
-    nothing, none = (0.0,) * len(h), (0.0,) * len(g)
-    return Line((*line.y, 0.0), (h, nothing), (g, none), ((r, 0.0), (0.0, r)), ((d, 0.0), (0.0, d)))
+    (h,), ((r,),), ((d,),) = line.H, line.R, line.D
+    nothing = (0.0,) * len(h)
+    return Line((*line.y, 0.0), (h, nothing), ((r, 0.0), (0.0, r)), ((d, 0.0), (0.0, d)))
 
 
-def _root(before: Estimate, variances: Vector) -> Rows:
-    """A root (d, d) of the covariance of state and nuisances, d = 3 + q."""
-    q = len(variances)
-    joint = [[*p, *c] for p, c in zip(before.P, before.cross, strict=True)]
-    for n, variance in enumerate(variances):
-        apart = [variance if m == n else 0.0 for m in range(q)]
-        joint.append([*(row[n] for row in before.cross), *apart])
-
+def _root(before: Estimate) -> Rows:
+    """A root (d, d) of the covariance."""
+    joint = before.P
     sigma = [sqrt(row[n]) for n, row in enumerate(joint)]
     scale = [value if value > 0.0 else 1.0 for value in sigma]
     unit = [

@@ -11,9 +11,12 @@ from __future__ import annotations
 
 from math import isclose
 
+import numpy as np
+
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.estimate import STATES, Estimate
+from gritd.estimator.filter.estimate import STATES
 from gritd.estimator.model.learnt import LearntSoil
+from gritd.estimator.terramechanics.soil import Array
 
 SAME = 1e-6  # relative difference up to which a soil is the one that was written
 
@@ -28,23 +31,19 @@ def learnt_soil(settings: Settings) -> LearntSoil | None:
     return form.soil if all(alike) else None
 
 
-def with_learnt_soil(prior: Estimate, settings: Settings) -> Estimate:
-    """The prior (diagonal P) with its correlations: P (3, 3), and cross (3, q), whose last columns
-    are the discrepancy's.
+def with_learnt_soil(P: Array, columns: slice, settings: Settings) -> Array:
+    """The prior's covariance (d, d) with the correlations of the soil, with itself and with the
+    directions of δ in `columns`.
     """
     learnt = learnt_soil(settings)
     if learnt is None:
-        return prior
+        return P
 
-    sigma = [prior.P[i][i] ** 0.5 for i in range(STATES)]
+    P, sigma = P.copy(), np.sqrt(np.diag(P)[:STATES])
     c_tan, c_k, tan_k = learnt.among
-    among = ((1.0, c_tan, c_k), (c_tan, 1.0, tan_k), (c_k, tan_k, 1.0))
-    P = tuple(
-        tuple([among[i][j] * sigma[i] * sigma[j] for j in range(STATES)]) for i in range(STATES)
-    )
-
-    cross = []
-    for row, correlation, own in zip(prior.cross, learnt.correlations, sigma, strict=True):
-        kept = row[: len(row) - len(correlation)]
-        cross.append((*kept, *[own * value for value in correlation]))
-    return Estimate(prior.x, P, tuple(cross))
+    among = np.array([[1.0, c_tan, c_k], [c_tan, 1.0, tan_k], [c_k, tan_k, 1.0]])
+    P[:STATES, :STATES] = among * sigma[:, None] * sigma
+    cross = np.array(learnt.correlations) * sigma[:, None]
+    P[:STATES, columns] = cross
+    P[columns, :STATES] = cross.T
+    return P

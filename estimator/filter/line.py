@@ -11,41 +11,56 @@ from gritd.estimator.wheel.wheel_state import WheelState
 
 
 class Line(NamedTuple):
-    """y = H x + G b + noise, of m = 1 or 2 components: torque, or torque and drawbar pull."""
+    """y = H x + noise, of m = 1 or 2 components: torque, or torque and drawbar pull."""
 
     y: Vector  # (m,) measured, less the tangent of the prediction at x = 0
-    H: Matrix  # (m, 3) with respect to the state
-    G: Matrix  # (m, q) with respect to the nuisances
+    H: Matrix  # (m, d)
     R: Matrix  # (m, m) noise of a single window
-    D: Matrix  # (m, m) of what does not average out within a stretch
+    D: Matrix  # (m, m) of what may not average out within a stretch
+    model: Vector = ()  # (m,) variance of what the model itself misses in a stretch
 
     def innovation(self, x: Vector) -> Vector:
-        """What the state x (3,) leaves of it (m,)."""
+        """What the vector x (d,) leaves of it (m,)."""
         return tuple([y - dot(h, x) for y, h in zip(self.y, self.H, strict=True)])
 
     def update(self, x: Vector, windows: int) -> Update:
-        """The mean of so many windows as a measurement, about the state x (3,)."""
-        R = tuple([tuple([r / windows for r in row]) for row in self.R])
-        return Update(self.innovation(x), self.H, self.G, R)
+        """The mean of so many windows as a measurement, about the vector x (d,)."""
+        R = tuple(
+            [
+                tuple([r / windows + (own if i == j else 0.0) for j, r in enumerate(row)])
+                for i, (row, own) in enumerate(zip(self.R, self.model, strict=True))
+            ]
+        )
+        return Update(self.innovation(x), self.H, R)
 
     def mixed(self, other: Line, weight: float) -> Line:
         """The mean of two, `weight` on the other."""
         keep = 1.0 - weight
         y = tuple([keep * a + weight * b for a, b in zip(self.y, other.y, strict=True)])
-        H, G, R, D = (_mixed(a, b, weight) for a, b in zip(self[1:], other[1:], strict=True))
-        return Line(y, H, G, R, D)
+        H, R, D, (model,) = (
+            _mixed(a, b, weight)
+            for a, b in (
+                (self.H, other.H),
+                (self.R, other.R),
+                (self.D, other.D),
+                ((self.model,), (other.model,)),
+            )
+        )
+        return Line(y, H, R, D, model)
 
 
 def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
-    """The mean state of a stretch, along the tangent at the state x (3,)."""
-    prediction = measurement.predict(Estimate(x, (), ()), mean)
-    update = measurement.linearise(mean, prediction)
+    """The mean state of a stretch, along the tangent at the vector x (d,)."""
+    estimate = Estimate(x, b"")
+    prediction = measurement.predict(estimate, mean)
+    update = measurement.linearise(mean, prediction, estimate)
     y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
 
     thrust = CHANGE.model_error * prediction.torque.value
-    own = (thrust, thrust / measurement.chain.wheel.radius)
+    own = (thrust, thrust / measurement.chain.wheel.radius)[: len(y)]
     slips = [quantity.by_slip * mean.slip.sigma for quantity in prediction[:2]]
-    return Line(y, update.H, update.G, update.R, _lasting(own[: len(y)], slips[: len(y)]))
+    lasting = _lasting(own, slips[: len(y)])
+    return Line(y, update.H, update.R, lasting, tuple([value * value for value in own]))
 
 
 def _lasting(own: Vector, shared: list[float]) -> Matrix:

@@ -8,13 +8,32 @@ from collections.abc import Mapping
 from math import exp, isnan, sqrt
 from operator import mul
 
+import numpy as np
+
 from gritd.estimator.config.effects import configured
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.estimate import KPA, Estimate, Matrix, Update, Vector, dot, variance
-from gritd.estimator.filter.model import Prediction, Quantity, WheelModel
-from gritd.estimator.filter.nuisance import Sensitivity, nuisances
+from gritd.estimator.filter import form_error
+from gritd.estimator.filter.estimate import (
+    KPA,
+    STATES,
+    Estimate,
+    Matrix,
+    Update,
+    Vector,
+    dot,
+    variance,
+)
+from gritd.estimator.filter.model import FormError, Prediction, Quantity, WheelModel
+from gritd.estimator.filter.nuisance import (
+    EXPONENT,
+    PEAK,
+    PEAK_BY_SLIP,
+    Sensitivity,
+    nuisances,
+)
 from gritd.estimator.filter.tuning import FORM
 from gritd.estimator.stages.situation import Recall
+from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.wheel.chain import Added, Chain, Context, Here, variants
 from gritd.estimator.wheel.form import NAME, FormHere, Three
 from gritd.estimator.wheel.sync import Snapshot
@@ -27,7 +46,12 @@ Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
 
 
 class Measurement:
-    """Settings turned into h(x), its Jacobians and R. The state is [c/kPa, tan φ, ln k]."""
+    """Settings turned into h(x), its Jacobians and R.
+
+    The vector is [c/kPa, tan φ, ln k], then the nuisances (nuisance.py), the uncertain parameters of
+    effects, the directions of the learnt discrepancy, and the errors of form at their nodes
+    (form_error.py): of the torque, and of the drawbar pull where it is measured.
+    """
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
@@ -35,15 +59,48 @@ class Measurement:
         self.model = WheelModel(settings, self.chain)
         self.nuisances = nuisances(settings)
 
-        self._variants = _variants(settings, self.chain)
+        self._variants = _variants(settings)
         self._unmoved = ((0.0, 0.0),) * len(self._variants)
-        self.variances = (
-            *(nuisance.sigma**2 for nuisance in self.nuisances),
-            *(1.0,) * len(self._variants),
-            *(1.0,) * directions_of(settings),
+        pulls = settings.wrench is not None and settings.wrench.pulls
+        turns = settings.drive.torque_source != "none"
+        # which of COMPONENTS are measured on this rig
+        self.components = tuple([at for at, has in enumerate((turns, pulls)) if has])
+        names = [nuisance.name for nuisance in self.nuisances]
+        self._stress_places = tuple(
+            [
+                STATES + names.index(name) if name in names else None
+                for name in (EXPONENT, PEAK, PEAK_BY_SLIP)
+            ]
         )
         # windows over which the rest of the discrepancy stays the same
         self._lasting = max(FORM.lasting * settings.rates.update, 1.0)
+
+    def prior(self, soil: Array, size: float) -> Array:
+        """Covariance (d, d) before the run, of the soil (3, 3) and all that is estimated beside it;
+        size: of the error of form.
+        """
+        ones = len(self._variants) + directions_of(self.settings)
+        known = [*[nuisance.sigma**2 for nuisance in self.nuisances], *[1.0] * ones]
+        form = size**2 * form_error.prior()
+        parts = [soil, np.diag(known), *[form] * len(self.components)]
+
+        total = sum(len(part) for part in parts)
+        P, at = np.zeros((total, total)), 0
+        for part in parts:
+            P[at : at + len(part), at : at + len(part)] = part
+            at += len(part)
+        return P
+
+    @property
+    def nonlinear(self) -> tuple[int, ...]:
+        """Entries of the vector that the tangents change with: the soil and the stresses' shape."""
+        return (*range(STATES), *[at for at in self._stress_places if at is not None])
+
+    @property
+    def learnt_columns(self) -> slice:
+        """Where the directions of the learnt discrepancy stand in the vector."""
+        first = STATES + len(self.nuisances) + len(self._variants)
+        return slice(first, first + directions_of(self.settings))
 
     def state(
         self, snapshot: Snapshot, context: Context, estimate: Estimate, columns: Columns
@@ -51,7 +108,7 @@ class Measurement:
         """The window in the wheel's own terms, effects accounted for; columns: those of the last
         update.
         """
-        now = _sensed(self.settings, self.model, self.chain, snapshot, context, estimate)
+        now = self._sensed(self.model, self.chain, snapshot, context, estimate)
         columns = columns or self._unmoved
         return now if columns == now.columns else now._replace(columns=columns)
 
@@ -64,22 +121,35 @@ class Measurement:
         if not self._variants:
             return now
 
-        here = _innovation(now, _predicted(self.model, estimate, now))
+        here = _innovation(now, self.predict(estimate, now))
         columns = []
         for model, chain in self._variants:
-            moved = (
-                now
-                if chain is self.chain
-                else _sensed(self.settings, model, chain, snapshot, context, estimate)
-            )
-            there = _innovation(moved, _predicted(model, estimate, moved))
+            moved = self._sensed(model, chain, snapshot, context, estimate)
+            there = _innovation(moved, self._predicted(model, estimate, moved))
             columns.append((here[0] - there[0], here[1] - there[1]))
 
         return now._replace(columns=tuple(columns))
 
     def predict(self, estimate: Estimate, now: WheelState) -> Prediction:
-        """T, DP and resistance at the estimate, in this window's geometry."""
-        return _predicted(self.model, estimate, now)
+        """T, DP and resistance of the equations at the estimate, in this window's geometry."""
+        return self._predicted(self.model, estimate, now)
+
+    def expected(
+        self, estimate: Estimate, now: WheelState, prediction: Prediction
+    ) -> tuple[float, float]:
+        """T [N·m] and DP [N] as the sensors should read them: the prediction, and the errors that
+        all windows share.
+        """
+        torque, pull = self._shared_gradients(_sensitivity(now, prediction), now)
+        x = self._without_stresses(estimate.x)
+        return (
+            prediction.torque.value + dot(torque, x),
+            prediction.drawbar_pull.value + dot(pull, x),
+        )
+
+    def form_of(self, estimate: Estimate) -> FormError:
+        """What the estimate adds to the configured shape of the stresses."""
+        return FormError(*[0.0 if at is None else estimate.x[at] for at in self._stress_places])
 
     def at_slip(self, now: WheelState, slip: float) -> WheelState:
         """The window at another slip that is held."""
@@ -103,27 +173,54 @@ class Measurement:
         lagging = form.remember(wheeling(now, snapshot.wheel_angle), recall.get(NAME, ()))
         return {**after, NAME: lagging}
 
-    def linearise(self, now: WheelState, prediction: Prediction) -> Update:
-        """Innovation, H, G and R of the components that are measured: T always, DP where there
-        is a sensor.
-        """
+    def linearise(self, now: WheelState, prediction: Prediction, estimate: Estimate) -> Update:
+        """Innovation, H and R of the components that are measured."""
         torque, pull = prediction.torque, prediction.drawbar_pull
         sensitivity = _sensitivity(now, prediction)
+        by_torque, by_pull = self._shared_gradients(sensitivity, now)
+        x = self._without_stresses(estimate.x)
 
         update = Update(
-            innovation=(now.torque.value - torque.value, now.drawbar_pull.value - pull.value),
-            H=(_state_gradient(torque), _state_gradient(pull)),
-            G=self._nuisance_gradients(sensitivity, now),
+            innovation=(
+                now.torque.value - torque.value - dot(by_torque, x),
+                now.drawbar_pull.value - pull.value - dot(by_pull, x),
+            ),
+            H=((*_state_gradient(torque), *by_torque), (*_state_gradient(pull), *by_pull)),
             R=self._noise(now, sensitivity),
         )
-        return selected(update, (0,)) if isnan(now.drawbar_pull.value) else update
+        values = (now.torque.value, now.drawbar_pull.value)
+        return selected(update, tuple([at for at in self.components if not isnan(values[at])]))
 
-    def _nuisance_gradients(self, s: Sensitivity, now: WheelState) -> Matrix:
-        """G (2, q): of the calibration, of the effects' parameters, then of the discrepancy."""
+    def _without_stresses(self, x: Vector) -> Vector:
+        """The errors (q,) that shift the measurements in proportion to their gradients: not those
+        of the stresses, which the model follows.
+        """
+        kept = list(x)
+        for at in self._stress_places:
+            if at is not None:
+                kept[at] = 0.0
+        return tuple(kept[STATES:])
+
+    def _shared_gradients(self, s: Sensitivity, now: WheelState) -> tuple[Vector, Vector]:
+        """Of T and DP (q,) each: by the calibration, the effects' parameters, the learnt
+        discrepancy, and the error of form.
+        """
         columns = [*[nuisance.gradient(s) for nuisance in self.nuisances], *now.columns]
         if now.form is not None:
             columns += [_felt(column, s) for column in now.form.columns]
-        return tuple([column[0] for column in columns]), tuple([column[1] for column in columns])
+
+        wheel, load = self.chain.wheel, now.load.value
+        shares = form_error.shares(wheel, now.slip.value, load)
+        of_torque = [wheel.radius * load * share for share in shares]
+        of_pull = [load * share for share in shares]
+        none = [0.0] * form_error.NODES
+
+        torque = [column[0] for column in columns]
+        pull = [column[1] for column in columns]
+        for component in self.components:
+            torque += of_torque if component == 0 else none
+            pull += none if component == 0 else of_pull
+        return tuple(torque), tuple(pull)
 
     def _noise(self, now: WheelState, s: Sensitivity) -> Matrix:
         """R (2, 2): each component's own noise, and that of z, i and W through the Jacobians,
@@ -143,17 +240,16 @@ class Measurement:
     def sigmas(
         self, estimate: Estimate, now: WheelState, prediction: Prediction
     ) -> tuple[float, float, float]:
-        """σ of T, DP and resistance predicted: of the state, of the nuisances, and of this
-        window's z, i and W.
-        """
+        """σ of T, DP and resistance predicted: of the estimate, and of this window's z, i and W."""
         sensitivity = _sensitivity(now, prediction)
-        torque, pull = self._nuisance_gradients(sensitivity, now)
+        torque, pull = self._shared_gradients(sensitivity, now)
         of_torque, of_pull = _rest(now.form, sensitivity) if now.form is not None else ((), ())
+        no_sensor = (0.0,) * len(torque)
 
         return (
             self._sigma(estimate, now, prediction.torque, torque, of_torque),
             self._sigma(estimate, now, prediction.drawbar_pull, pull, of_pull),
-            self._sigma(estimate, now, prediction.resistance, ()),  # no sensor reads it
+            self._sigma(estimate, now, prediction.resistance, no_sensor),
         )
 
     def _sigma(
@@ -161,7 +257,7 @@ class Measurement:
         estimate: Estimate,
         now: WheelState,
         quantity: Quantity,
-        nuisance: Vector,
+        shared: Vector,
         rest: Vector = (),
     ) -> float:
         noise = (
@@ -170,16 +266,57 @@ class Measurement:
             quantity.by_load * now.load.sigma,
             *rest,
         )
+        known = variance(estimate, (*_state_gradient(quantity), *shared))
+        return sqrt(known + dot(noise, noise))
 
-        return sqrt(
-            variance(estimate, self.variances, _state_gradient(quantity), nuisance)
-            + dot(noise, noise)
+    def _sensed(
+        self,
+        model: WheelModel,
+        chain: Chain,
+        snapshot: Snapshot,
+        context: Context,
+        estimate: Estimate,
+    ) -> WheelState:
+        """The window with one chain of effects; what wheel and testbed effects add is linear about
+        the estimate.
+        """
+        now = wheel_state(self.settings, snapshot, chain, context)
+        if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
+            return now
+
+        rim = self._predicted(model, estimate, now)
+        return now._replace(added=_added(chain, now, rim, soil(estimate)))
+
+    def _predicted(self, model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
+        """T, DP and resistance of the rim in the soil under this window, and what effects add,
+        along the estimate.
+        """
+        ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
+
+        prediction = model.predict(
+            *ground, now.theta_1.value, now.slip.value, now.load.value, self.form_of(estimate)
         )
+        if now.here is not None:
+            here = now.here
+            prediction = Prediction(
+                *(_by_estimate(quantity, estimate, here) for quantity in prediction)
+            )
+
+        if now.form is not None:
+            torque, pull, _ = now.form.mean
+            prediction = prediction._replace(
+                torque=_raised(prediction.torque, torque),
+                drawbar_pull=_raised(prediction.drawbar_pull, pull),
+            )
+
+        if now.added is None:
+            return prediction
+        return _with_added(prediction, now.added, estimate)
 
 
 def soil(estimate: Estimate) -> tuple[float, float, float]:
     """c [Pa], tan φ [-], k [m] of a state."""
-    c, tan_phi, ln_k = estimate.x
+    c, tan_phi, ln_k = estimate.x[:STATES]
     return c * KPA, tan_phi, exp(ln_k)
 
 
@@ -193,28 +330,10 @@ def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
     )
 
 
-def _sensed(
-    settings: Settings,
-    model: WheelModel,
-    chain: Chain,
-    snapshot: Snapshot,
-    context: Context,
-    estimate: Estimate,
-) -> WheelState:
-    """The window with one chain of effects; what wheel and testbed effects add is linear about
-    the estimate.
-    """
-    now = wheel_state(settings, snapshot, chain, context)
-    if now.situation is None or not chain.reacts or now.theta_1.value <= 0.0:
-        return now
-
-    return now._replace(added=_added(model, chain, now, estimate))
-
-
-def _added(model: WheelModel, chain: Chain, now: WheelState, estimate: Estimate) -> Added:
-    """What the effects add to the rim's torque and pull, with its slope along c, tan φ and k."""
-    rim = _predicted(model, estimate, now)
-    x = soil(estimate)
+def _added(
+    chain: Chain, now: WheelState, rim: Prediction, x: tuple[float, float, float]
+) -> Added:
+    """What the effects add to the rim's torque and pull, with its slope along x = (c, tan φ, k)."""
 
     def added(x: tuple[float, float, float], torque: float, pull: float) -> tuple[float, float]:
         assert now.situation is not None
@@ -238,31 +357,6 @@ def _added(model: WheelModel, chain: Chain, now: WheelState, estimate: Estimate)
     return Added._make(
         (here[0] - dot(by_torque, x), *by_torque, here[1] - dot(by_pull, x), *by_pull)
     )
-
-
-def _predicted(model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
-    """T, DP and resistance of the rim in the soil under this window, and what effects add, along
-    the estimate.
-    """
-    ground = soil(estimate) if now.here is None else soil_here(estimate, now.here)
-
-    prediction = model.predict(*ground, now.theta_1.value, now.slip.value, now.load.value)
-    if now.here is not None:
-        here = now.here
-        prediction = Prediction(
-            *(_by_estimate(quantity, estimate, here) for quantity in prediction)
-        )
-
-    if now.form is not None:
-        torque, pull, _ = now.form.mean
-        prediction = prediction._replace(
-            torque=_raised(prediction.torque, torque),
-            drawbar_pull=_raised(prediction.drawbar_pull, pull),
-        )
-
-    if now.added is None:
-        return prediction
-    return _with_added(prediction, now.added, estimate)
 
 
 def _with_added(prediction: Prediction, added: Added, estimate: Estimate) -> Prediction:
@@ -330,21 +424,16 @@ def _by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity
 
 
 def _innovation(now: WheelState, prediction: Prediction) -> tuple[float, float]:
-    """Measured minus predicted T and DP; 0 where DP is not measured."""
+    """Measured minus predicted T and DP; 0 where one is not measured."""
+    torque = now.torque.value - prediction.torque.value
     pull = now.drawbar_pull.value - prediction.drawbar_pull.value
-    return now.torque.value - prediction.torque.value, 0.0 if isnan(pull) else pull
+    return 0.0 if isnan(torque) else torque, 0.0 if isnan(pull) else pull
 
 
-def _variants(settings: Settings, chain: Chain) -> list[tuple[WheelModel, Chain]]:
-    """Model and effects with one uncertain effect parameter, or the exponent n, moved by its
-    sigma.
-    """
+def _variants(settings: Settings) -> list[tuple[WheelModel, Chain]]:
+    """Model and effects with one uncertain effect parameter moved by its sigma."""
     moved = [Chain(settings, effects) for effects in variants(settings)]
-    models = [(WheelModel(settings, other), other) for other in moved]
-    exponent = settings.soil.exponent.sigma
-    if exponent > 0.0 and any(e.name == "stress_linearisation" for e in chain.effects):
-        models.append((WheelModel(settings, chain, exponent), chain))
-    return models
+    return [(WheelModel(settings, chain), chain) for chain in moved]
 
 
 def selected(update: Update, components: tuple[int, ...]) -> Update:
@@ -354,7 +443,6 @@ def selected(update: Update, components: tuple[int, ...]) -> Update:
     return Update(
         tuple([update.innovation[a] for a in components]),
         tuple([update.H[a] for a in components]),
-        tuple([update.G[a] for a in components]),
         tuple([tuple([update.R[a][b] for b in components]) for a in components]),
     )
 
@@ -372,6 +460,8 @@ def _sensitivity(now: WheelState, prediction: Prediction) -> Sensitivity:
         by_sinkage=(torque.by_theta_1 * by_z, pull.by_theta_1 * by_z),
         by_slip=(torque.by_slip, pull.by_slip),
         by_load=(torque.by_load, pull.by_load),
+        by_exponent=(torque.by_exponent, pull.by_exponent),
+        by_peak=(torque.by_peak, pull.by_peak),
     )
 
 

@@ -4,6 +4,7 @@ to them.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, hypot, log, sin
 from typing import NamedTuple
 
@@ -27,6 +28,19 @@ class Quantity(NamedTuple):
     by_theta_1: float
     by_slip: float
     by_load: float
+    by_exponent: float  # n
+    by_peak: float  # θₘ/θ₁
+
+
+class FormError(NamedTuple):
+    """What is added to the configured shape of the stresses."""
+
+    exponent: float = 0.0  # n
+    c1: float = 0.0  # of θₘ = (c₁ + c₂ i) θ₁
+    c2: float = 0.0
+
+
+AS_CONFIGURED = FormError()
 
 
 class Prediction(NamedTuple):
@@ -38,39 +52,55 @@ class Prediction(NamedTuple):
 class WheelModel:
     """Eqs. (20)-(22) for one wheel, σₘ eliminated through (21)."""
 
-    def __init__(self, settings: Settings, chain: Chain, exponent_error: float = 0.0) -> None:
+    def __init__(self, settings: Settings, chain: Chain) -> None:
         self._wheel = chain.wheel
         self._soil = settings.soil
         self._modulus = settings.soil.pressure_sinkage.modulus(settings.wheel.width)
-        self._exponent_error = exponent_error
         self._shift = _shift(settings, chain)
         self._closed = _compiled(self._wheel, self._shift)
 
     def predict(
-        self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, load: float
+        self,
+        c: float,
+        tan_phi: float,
+        k: float,
+        theta_1: float,
+        slip: float,
+        load: float,
+        form: FormError = AS_CONFIGURED,
     ) -> Prediction:
         """T, DP and resistance with gradients; c [Pa], k [m], θ₁ > 0 [rad], W [N]."""
         if self._closed is not None:
-            known = self._closed.predict(c, tan_phi, k, theta_1, slip, load, self._exponent_error)
+            known = self._closed.predict(c, tan_phi, k, theta_1, slip, load, *form)
             if known is not None:
                 return Prediction(*known)
 
-        p = scalar.predict(
-            self._wheel, c, tan_phi, k, theta_1, slip, load, self._at(k, theta_1, slip)
-        )
+        shift = self._at(k, theta_1, slip, form)
+        p = scalar.predict(self._moved(form), c, tan_phi, k, theta_1, slip, load, shift)
         return Prediction(
             Quantity(p.torque, *p.torque_gradient),
             Quantity(p.drawbar_pull, *p.drawbar_pull_gradient),
             Quantity(p.resistance, *p.resistance_gradient),
         )
 
-    def _at(self, k: float, theta_1: float, slip: float) -> linear.Shift | None:
-        return (
-            None if self._shift is None else self._shift.at(k, theta_1, slip, self._exponent_error)
-        )
+    def _at(
+        self, k: float, theta_1: float, slip: float, form: FormError
+    ) -> linear.Shift | None:
+        return None if self._shift is None else self._shift.at(k, theta_1, slip, *form)
+
+    def _moved(self, form: FormError) -> Wheel:
+        wheel = self._wheel
+        return replace(wheel, c1=wheel.c1 + form.c1, c2=wheel.c2 + form.c2)
 
     def load(
-        self, c: float, tan_phi: float, k: float, theta_1: Measured, theta_m: float, slip: float
+        self,
+        c: float,
+        tan_phi: float,
+        k: float,
+        theta_1: Measured,
+        theta_m: float,
+        slip: float,
+        form: FormError = AS_CONFIGURED,
     ) -> Measured:
         """W [N] by Eq. (21) with σₘ of Eq. (3) and the prior moduli; its σ is that of the moduli
         and of θ₁.
@@ -81,7 +111,7 @@ class WheelModel:
             return Measured(0.0, 0.0)
 
         sigma_m = self._modulus * depth**soil.exponent.value
-        load = self._carried(c, tan_phi, k, theta_1.value, slip, sigma_m)
+        load = self._carried(c, tan_phi, k, theta_1.value, slip, sigma_m, form)
         by_angle = soil.exponent.value * radius * sin(theta_1.value) / depth
         relative = hypot(
             soil.modulus_sigma, log(depth) * soil.exponent.sigma, by_angle * theta_1.sigma
@@ -90,15 +120,22 @@ class WheelModel:
         return Measured(load, abs(load) * relative)
 
     def _carried(
-        self, c: float, tan_phi: float, k: float, theta_1: float, slip: float, sigma_m: float
+        self,
+        c: float,
+        tan_phi: float,
+        k: float,
+        theta_1: float,
+        slip: float,
+        sigma_m: float,
+        form: FormError,
     ) -> float:
         """W [N] for a peak stress σₘ [Pa]."""
         if self._closed is not None:
-            known = self._closed.load(c, tan_phi, k, theta_1, slip, sigma_m, self._exponent_error)
+            known = self._closed.load(c, tan_phi, k, theta_1, slip, sigma_m, *form)
             if known is not None:
                 return known
-        shift = self._at(k, theta_1, slip)
-        return scalar.load(self._wheel, c, tan_phi, k, theta_1, slip, sigma_m, shift)
+        shift = self._at(k, theta_1, slip, form)
+        return scalar.load(self._moved(form), c, tan_phi, k, theta_1, slip, sigma_m, shift)
 
 
 def _compiled(wheel: Wheel, shift: IntegralShift | None) -> arithmetic.Closed | None:
@@ -112,8 +149,11 @@ def _compiled(wheel: Wheel, shift: IntegralShift | None) -> arithmetic.Closed | 
 
 
 def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
-    """The shift of the integrals, if the true stresses or a contact effect are configured."""
-    share = sum(e.share for e in chain.effects if isinstance(e, StressLinearisation))
+    """The shift of the integrals: to the true stresses, unless `stress_linearisation` is configured
+    with a share of 0, and with the contact effects.
+    """
+    shares = [e.share for e in chain.effects if isinstance(e, StressLinearisation)]
+    share = shares[0] if shares else 1.0
     shaping = tuple(
         e for e in chain.effects if e.stage in ("contact", "soil", "wheel") and not e.filter_only
     )

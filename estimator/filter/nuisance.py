@@ -1,5 +1,4 @@
-"""Errors of the calibration that stay the same for the whole run: what the filter considers but
-never estimates.
+"""Errors that stay the same for the whole run, and that the filter estimates beside the soil.
 
 Each nuisance is zero mean with the standard deviation stated in the configuration. Its gradient
 says how the prediction of the measured torque and drawbar pull changes with it. Nuisances of zero
@@ -31,6 +30,8 @@ class Sensitivity(NamedTuple):
     by_sinkage: tuple[float, float]  # ∂(T, DP)/∂z [N, N/m]
     by_slip: tuple[float, float]  # ∂(T, DP)/∂i [N·m, N]
     by_load: tuple[float, float]  # ∂(T, DP)/∂W [m, -]
+    by_exponent: tuple[float, float]  # ∂(T, DP)/∂n [N·m, N]
+    by_peak: tuple[float, float]  # ∂(T, DP)/∂(θₘ/θ₁) [N·m, N]
 
 
 Gradient = Callable[[Sensitivity], tuple[float, float]]
@@ -47,11 +48,24 @@ def nuisances(settings: Settings) -> tuple[Nuisance, ...]:
     return tuple(nuisance for nuisance in _all(settings) if nuisance.sigma > 0.0)
 
 
+# the shape of the stresses: the model itself follows these (measurement.py)
+EXPONENT, PEAK, PEAK_BY_SLIP = "exponent n", "c1", "c2"
+
+
 def _all(settings: Settings) -> Iterator[Nuisance]:
+    yield from _of_stresses(settings)
     yield from _of_motion(settings)
     yield from _of_torque(settings)
     yield from _of_closed_forms(settings)
     yield from _of_forces(settings)
+
+
+def _of_stresses(settings: Settings) -> Iterator[Nuisance]:
+    """The exponent n, and the place of the stress peak θₘ = (c₁ + c₂ i) θ₁."""
+    peak = settings.peak
+    yield Nuisance(EXPONENT, settings.soil.exponent.sigma, lambda s: s.by_exponent)
+    yield Nuisance(PEAK, peak.c1_sigma, lambda s: s.by_peak)
+    yield Nuisance(PEAK_BY_SLIP, peak.c2_sigma, lambda s: _scaled(s.slip, s.by_peak))
 
 
 def _of_motion(settings: Settings) -> Iterator[Nuisance]:
@@ -74,7 +88,7 @@ def _of_torque(settings: Settings) -> Iterator[Nuisance]:
         shunt = settings.channels["motor_shunt"].calibration
         scale = hypot(_relative(drive.torque_constant), _relative(shunt.scale))
         offset = shunt.offset.sigma * drive.torque_constant.value
-    elif wrench is not None:
+    elif wrench is not None and drive.torque_source == "wrench":
         scale, offset = _relative(wrench.torque.scale), wrench.torque.offset.sigma
     else:
         return
@@ -101,6 +115,8 @@ def _of_forces(settings: Settings) -> Iterator[Nuisance]:
     load, pull = wrench.load, wrench.drawbar_pull
     yield Nuisance("load offset [N]", load.offset.sigma, lambda s: _scaled(-1.0, s.by_load))
     yield Nuisance("load scale [-]", _relative(load.scale), lambda s: _scaled(-s.load, s.by_load))
+    if not wrench.pulls:
+        return
     yield Nuisance("drawbar pull offset [N]", pull.offset.sigma, lambda _: (0.0, 1.0))
     yield Nuisance("drawbar pull scale [-]", _relative(pull.scale), lambda s: (0.0, s.drawbar_pull))
 

@@ -11,7 +11,7 @@ window is always used with the same memory, however many ticks came before it.
 
 from __future__ import annotations
 
-from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.bank import told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
@@ -22,33 +22,29 @@ from gritd.estimator.filter.track import (
     Ended,
     Judging,
     Passing,
-    Point,
     Relining,
     Task,
     TrackState,
-    slip_varies,
 )
 
-MOVED = 0.05  # prior standard deviations after which the memory is linearised anew
+# prior standard deviations of the soil, or of the shape of the stresses, after which the memory is
+# linearised anew
+MOVED = 0.05
 
 # What a tick does. A memory of 36 stretches is judged, linearised and passed in 14 of the 24 ticks
 # that lie between two windows at 250 Hz and 10 Hz. A change of the soil takes tangents three times
 # over, 36 ticks for a full memory: the rest is then done with the next window.
 LINES = 4  # tangents
-PASSED = 12  # stretches of a pass, each an update without its tangent
+PASSED = 6  # stretches of a pass, each an update without its tangent
 
 
 class Reviewer:
     """The settings turned into the steps of a review; what is under way stands in the state."""
 
-    def __init__(self, settings: Settings, smoother: Smoother, bounds: Bounds) -> None:
-        self._choice = settings.filter.estimate_k
+    def __init__(self, smoother: Smoother, bounds: Bounds, scales: Vector) -> None:
         self._smoother = smoother
         self._bounds = bounds
-
-    def estimates_k(self, state: TrackState) -> bool:
-        """Whether ln k is a state; otherwise it is considered."""
-        return self._choice == "always" or (self._choice == "auto" and state.slip_varied)
+        self._scales = scales
 
     def begun(self, like: bool, unlinearised: int) -> Task:
         """A stretch has ended; like: the next is of the same condition; unlinearised: windows since
@@ -78,13 +74,12 @@ class Reviewer:
 
     def _completed(self, state: TrackState, task: Ended) -> TrackState:
         """The stretch that has ended as a measurement."""
-        considered, doubt = not self.estimates_k(state), state.trust.doubt
-        memory = self._smoother.completed(state.memory, state.estimate.x, considered, doubt)
+        memory = self._smoother.completed(state.memory, state.estimate.x, state.trust.doubt)
         return state._replace(memory=memory, task=Judging(task.same))
 
     def _judged(self, state: TrackState, task: Judging) -> TrackState:
         """Whether the soil seems to have changed."""
-        judgement = self._smoother.judgement(state.memory, state.trust.doubt)
+        judgement = self._smoother.judgement(state.memory, state.bank, state.trust.doubt)
         if judgement is None or not judgement.change:
             return self._weighed(state, task.same)
 
@@ -99,44 +94,41 @@ class Reviewer:
             return state._replace(task=task._replace(lines=lines))
 
         state = state._replace(memory=state.memory.along(lines), linearised=None)
-        judgement = self._smoother.judgement(state.memory, state.trust.doubt)
+        judgement = self._smoother.judgement(state.memory, state.bank, state.trust.doubt)
         if judgement is None or not judgement.change:
             return self._weighed(state, task.same)
-        memory = state.memory.changed_at(judgement.change, state.estimate)
+        memory = state.memory.changed_at(judgement.change, state.bank)
         return self._restarted(state, memory, task.same)
 
     def _restarted(self, state: TrackState, memory: Memory, same: bool) -> TrackState:
         """The state with a memory in which the soil changed: linearised where the estimate is, and
         once more where that is a new condition and leads far.
         """
-        before = state.before
-        varied = before is not None and slip_varies(memory, before.slip.sigma)
-        state = state._replace(memory=memory, slip_varied=varied)
-        point = (self.estimates_k(state), state.estimate.x)
-        return state._replace(trust=state.trust.changed(), task=Relining(point, same))
+        trust, x = state.trust.changed(), state.estimate.x
+        return state._replace(memory=memory, trust=trust, task=Relining(x, same))
 
     def _weighed(self, state: TrackState, same: bool) -> TrackState:
         """On one soil: linearised anew where the condition changes and the estimate has moved."""
-        point = (self.estimates_k(state), state.estimate.x)
-        anew = not same and self._moved(state.linearised, point)
-        return state._replace(task=Relining(point, last=True) if anew else None)
+        x = state.estimate.x
+        anew = not same and self._moved(state.linearised, x)
+        return state._replace(task=Relining(x, last=True) if anew else None)
 
-    def _moved(self, before: Point | None, now: Point) -> bool:
-        """Whether the state is so far from where the memory was linearised that its Jacobians no
+    def _moved(self, before: Vector | None, now: Vector) -> bool:
+        """Whether the estimate is so far from where the memory was linearised that its Jacobians no
         longer serve.
         """
-        if before is None or before[0] != now[0]:
+        if before is None:
             return True
-        steps = zip(before[1], now[1], self._smoother.prior_sigma, strict=True)
-        return any(abs(b - a) > MOVED * sigma for a, b, sigma in steps)
+        steps = zip(before, now, self._scales, strict=True)
+        return any([abs(b - a) > MOVED * scale for a, b, scale in steps])
 
     def _relined(self, state: TrackState, task: Relining) -> TrackState:
         """More tangents; with all of them, on to the pass."""
-        lines = self._more(state.memory, task.point[1], task.lines)
+        lines = self._more(state.memory, task.x, task.lines)
         if len(lines) < len(state.memory.stretches):
             return state._replace(task=task._replace(lines=lines))
         memory = state.memory.along(lines)
-        return state._replace(memory=memory, task=Passing(task.point, task.last, memory.anchor))
+        return state._replace(memory=memory, task=Passing(task.x, task.last, memory.anchor))
 
     def _more(self, memory: Memory, x: Vector, lines: tuple[Line, ...]) -> tuple[Line, ...]:
         """A share of the tangents at x (3,) more."""
@@ -144,22 +136,22 @@ class Reviewer:
         return (*lines, *self._smoother.tangents(todo, x))
 
     def _passed(self, state: TrackState, task: Passing) -> TrackState:
-        """The filter over some more stretches; over the last, its estimate is the state's."""
+        """The filter over some more stretches; over the last, its bank is the state's."""
         done = len(task.stretches)
         todo = state.memory.stretches[done : done + PASSED]
-        stretches, estimate = self._smoother.over(
-            task.estimate, todo, not task.point[0], state.trust.doubt
-        )
+        stretches, bank = self._smoother.over(task.bank, todo, state.trust.doubt)
         stretches = (*task.stretches, *stretches)
         if len(stretches) < len(state.memory.stretches):
-            return state._replace(task=task._replace(estimate=estimate, stretches=stretches))
+            return state._replace(task=task._replace(bank=bank, stretches=stretches))
 
         memory = state.memory._replace(stretches=stretches)
-        estimate = self._bounds.inside(estimate)
+        bank = self._bounds.all_inside(bank)
+        estimate = told(bank)
         state = state._replace(
             estimate=estimate,
+            bank=bank,
             memory=memory,
-            linearised=task.point,
+            linearised=task.x,
             unlinearised=0,
             trust=self._bounds.stood(state.trust, estimate),
             task=None,

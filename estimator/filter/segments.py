@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from math import exp, isnan
 from typing import Any, NamedTuple
 
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import Bank
 from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.tuning import CHANGE
 from gritd.estimator.messages.replacing import quickly_replaced
@@ -51,12 +51,13 @@ class Stretch(NamedTuple):
     elapsed: float  # [s] since the end of the stretch before
     unrest: float = 0.0  # random walk of the soil meanwhile, in prior σ/√s
     line: Line | None = None  # once it is complete
-    changed: Estimate | None = None  # where the soil changed before it: what is still known then
+    changed: Bank | None = None  # where the soil changed before it: what is still known then
 
     @property
     def judged(self) -> bool:
         """Whether it tells of the soil: a window or two that failed a gate are outliers."""
-        measured = 1 if isnan(self.mean.drawbar_pull.value) else 2
+        values = (self.mean.torque.value, self.mean.drawbar_pull.value)
+        measured = len(values) - sum(map(isnan, values))
         return self.windows >= STEADY or len(self.components) == measured
 
     def like(self, now: WheelState, components: tuple[int, ...]) -> bool:
@@ -116,7 +117,7 @@ def _blend(old: tuple[float, ...], now: tuple[float, ...], weight: float) -> Any
 class Memory(NamedTuple):
     """The anchor and what came after it; the last stretch is still open."""
 
-    anchor: Estimate
+    anchor: Bank
     stretches: tuple[Stretch, ...] = ()
     pending: float = 0.0  # [s] of random walk not yet assigned to a stretch
 
@@ -125,15 +126,6 @@ class Memory(NamedTuple):
         """Number of the first stretch after the last change of the soil; 0 without one."""
         changes = [at for at, stretch in enumerate(self.stretches) if stretch.changed is not None]
         return changes[-1] if changes else 0
-
-    def slip_span(self) -> float:
-        """Largest difference of slip between steady stretches on the present soil."""
-        slips = [
-            stretch.mean.slip.value
-            for stretch in self.stretches[self.since :]
-            if stretch.windows >= STEADY and stretch.components
-        ]
-        return max(slips) - min(slips) if slips else 0.0
 
     def extended(
         self,
@@ -168,7 +160,7 @@ class Memory(NamedTuple):
         both = zip(self.stretches, lines, strict=True)
         return self._replace(stretches=tuple([s._replace(line=line) for s, line in both]))
 
-    def changed_at(self, number: int, known: Estimate) -> Memory:
+    def changed_at(self, number: int, known: Bank) -> Memory:
         """The memory with a change of the soil before the complete stretch of this number. What
         failed its gate since then belongs to the new soil, and that may go on changing.
         """

@@ -4,9 +4,14 @@ to A₁ … C₃.
 Eqs. (20)-(22) are linear in c, σₘ and σₘ tan φ, with eight integrals A₁ … C₃ over the contact as
 coefficients (see terramechanics/linear.py). The original stresses (3), (4), (7) obey the same three
 equations with eight other integrals, whatever c, tan φ and W are. What separates the two models is
-therefore eight functions of θ₁ and i for a soil of given k and n. They are tabulated once, as
-Chebyshev polynomials, together with their derivatives with respect to ln k and n: the filter stays
-exact in c, tan φ and W, and is first-order in ln k and n.
+therefore eight functions of θ₁ and i for a soil of given k and n and a stress peak at given c₁ and
+c₂. They are tabulated once, as Chebyshev polynomials, with what changes when ln k, n and the place
+λ = θₘ/θ₁ of the peak do:
+
+    Δ = Δ₀ + κ (Δ₁ + κ Δ₂) + ν (Δ₃ + κ Δ₄) + μ (Δ₅ + κ Δ₆)
+
+κ, ν, μ: ln k, n and λ less those of the prior. The filter stays exact in c, tan φ and W, and the
+triangles in k and λ too.
 
 Polynomials are summed in a stated order, by numpy along axes that it does not reorder, and never by
 BLAS, whose order depends on the processor: compiled/closed.c gives the same bits.
@@ -14,11 +19,10 @@ BLAS, whose order depends on the processor: compiled/closed.c gives the same bit
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import cos, log, pi
-from typing import NamedTuple
-
 import numpy as np
 
 from gritd.estimator.effects import in_order
@@ -34,25 +38,18 @@ THETA_1 = (0.05, 1.45)  # [rad] range of the table; outside it the edge is used
 SLIP = (-0.1, 1.0)
 NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
-STEP = 0.02  # of ln k and n for the derivatives
+# of ln k, n and λ, between which a polynomial stands for the shift: about what priors leave open
+STEP_LN_K, STEP_N, STEP_PEAK = 0.3, 0.1, 0.05
+FARTHEST = 1.0  # of ln k: beyond it the shift stays as it is
 QUANTUM = 2.0**-30  # of a coefficient; the largest is about 0.2, and the table is good to 1e-4
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
 ORDER = 24  # quadrature nodes in each zone
 PEAK = 0.999  # of θₘ/θ₁: at the entry itself σₘ says nothing of the modulus
 INTEGRALS = len(Integrals._fields)
-PLAIN, BY_LN_K, BY_N = (slice(part * INTEGRALS, (part + 1) * INTEGRALS) for part in range(3))
+PARTS = 7  # Δ₀ … Δ₆
 
 Vector = tuple[float, ...]
-
-
-class Point(NamedTuple):
-    """The tables at one θ₁ and i."""
-
-    # (3, q): values and derivatives with respect to θ₁ and i, of PLAIN, BY_LN_K and where it is
-    # asked for BY_N, the shift at the soil's k and n and its derivatives
-    tables: Array
-    ln_k: Integrals  # values of BY_LN_K
 
 
 class IntegralShift:
@@ -70,42 +67,77 @@ class IntegralShift:
         theta_1, slip = np.meshgrid(
             _nodes(THETA_1, NODES[0]), _nodes(SLIP, NODES[1]), indexing="ij"
         )
+        ordered, n = in_order(effects), float(soil.exponent)
 
-        def shift(ln_k: float, n: float) -> Array:
-            varied = replace(soil, shear_modulus=float(np.exp(ln_k)), exponent=n)
-            return _shift(wheel, varied, in_order(effects), share, theta_1, slip)
+        def shift(ln_k: int, exponent: int = 0, peak: int = 0) -> Array:
+            """So many steps from the prior."""
+            k = float(np.exp(self.ln_k + ln_k * STEP_LN_K))
+            varied = replace(soil, shear_modulus=k, exponent=n + exponent * STEP_N)
+            moved = replace(wheel, c1=wheel.c1 + peak * STEP_PEAK)
+            return _shift(moved, varied, ordered, share, theta_1, slip)
 
-        k, n = self.ln_k, float(soil.exponent)
-        by_ln_k = (shift(k + STEP, n) - shift(k - STEP, n)) / (2.0 * STEP)
-        by_n = (shift(k, n + STEP) - shift(k, n - STEP)) / (2.0 * STEP)
-        coefficients = _fitted(np.concatenate((shift(k, n), by_ln_k, by_n)))
-        # (DEGREE[0] + 1, DEGREE[1] + 1, 24)
+        coefficients = _fitted(np.concatenate(_parts(shift)))
+        # (DEGREE[0] + 1, DEGREE[1] + 1, 56)
         self.coefficients: Array = np.ascontiguousarray(coefficients.transpose(1, 2, 0))
-        self._without_n = self.coefficients[..., : BY_N.start].copy()
         self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
-    def at(self, k: float, theta_1: float, slip: float, exponent_error: float = 0.0) -> Shift:
-        """At a shear modulus k [m], θ₁ [rad] and slip i; exponent_error is added to the soil's
-        exponent n.
+    def at(
+        self,
+        k: float,
+        theta_1: float,
+        slip: float,
+        exponent: float = 0.0,
+        c1: float = 0.0,
+        c2: float = 0.0,
+    ) -> Shift:
+        """At a shear modulus k [m], θ₁ [rad] and slip i; exponent, c1 and c2 are added to the
+        prior's.
         """
-        tables, ln_k = self._table(theta_1, slip, exponent_error != 0.0)
-        shift = tables[:, PLAIN] + (log(k) - self.ln_k) * tables[:, BY_LN_K]
-        if exponent_error:
-            shift = shift + exponent_error * tables[:, BY_N]
-        value, by_theta_1, by_slip = map(Integrals._make, shift.tolist())
-        return Shift(value, by_theta_1, by_slip, ln_k)
+        far = log(k) - self.ln_k
+        ln_k, peak = min(max(far, -FARTHEST), FARTHEST), c1 + c2 * slip
+        t0, t1, t2, t3, t4, t5, t6 = self._table(theta_1, slip)  # each (3, 8)
 
-    def _tabulated(self, theta_1: float, slip: float, with_n: bool) -> Point:
-        """The tables at one point."""
-        coefficients = self.coefficients if with_n else self._without_n
+        by_n, by_peak = t3 + ln_k * t4, t5 + ln_k * t6
+        value, by_theta_1, by_slip = (
+            t0 + ln_k * (t1 + ln_k * t2) + exponent * by_n + peak * by_peak
+        )
+        by_slip = by_slip + c2 * by_peak[0]
+        by_ln_k = t1[0] + (2.0 * ln_k) * t2[0] + exponent * t4[0] + peak * t6[0]
+        if ln_k != far:
+            by_ln_k = 0.0 * by_ln_k
+
+        every = (value, by_theta_1, by_slip, by_ln_k, by_n[0], by_peak[0])
+        return Shift(*[Integrals(*row.tolist()) for row in every])
+
+    def _tabulated(self, theta_1: float, slip: float) -> Array:
+        """Δ₀ … Δ₆ at one point, each with its derivatives by θ₁ and by i: (7, 3, 8)."""
         rows = np.array(_polynomials(*_unit(theta_1, THETA_1), DEGREE[0]))
         columns = np.array(_polynomials(*_unit(slip, SLIP), DEGREE[1]))
 
         # sums over an axis that is not the last are made term by term; (2 for θ₁, powers of i, q)
-        along = np.add.reduce(rows[:, :, None, None] * coefficients, axis=1)
+        along = np.add.reduce(rows[:, :, None, None] * self.coefficients, axis=1)
         value, by_slip = np.add.reduce(columns[:, :, None] * along[0], axis=1)
         by_theta_1 = np.add.reduce(columns[0][:, None] * along[1], axis=0)
-        return Point(np.array((value, by_theta_1, by_slip)), Integrals(*value[BY_LN_K].tolist()))
+        every = np.array((value, by_theta_1, by_slip)).reshape(3, PARTS, INTEGRALS)
+        return np.ascontiguousarray(every.transpose(1, 0, 2))
+
+
+def _parts(shift: Callable[..., Array]) -> list[Array]:
+    """Δ₀ … Δ₆ from the shift some steps of ln k, n and λ from the prior."""
+    here, more, less = shift(0), shift(1), shift(-1)
+    parts = [
+        here,
+        (more - less) / (2.0 * STEP_LN_K),
+        (more - 2.0 * here + less) / (2.0 * STEP_LN_K**2),
+    ]
+
+    for name, step in (("exponent", STEP_N), ("peak", STEP_PEAK)):
+        slopes = [
+            (shift(ln_k, **{name: 1}) - shift(ln_k, **{name: -1})) / (2.0 * step)
+            for ln_k in (-1, 0, 1)
+        ]
+        parts += [slopes[1], (slopes[2] - slopes[0]) / (2.0 * STEP_LN_K)]
+    return parts
 
 
 def true_integrals(

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.bank import Bank, leading
 from gritd.estimator.filter.change import Judgement, judge
 from gritd.estimator.filter.engine import Engine
 from gritd.estimator.filter.estimate import (
@@ -16,6 +15,8 @@ from gritd.estimator.filter.estimate import (
     STATES,
     Estimate,
     Vector,
+    covariance,
+    made,
     predict,
 )
 from gritd.estimator.filter.line import Line, line_of
@@ -27,26 +28,25 @@ class Smoother:
     """The settings turned into passes over a memory; it holds no state."""
 
     def __init__(
-        self, settings: Settings, measurement: Measurement, engine: Engine, prior_sigma: Vector
+        self, settings: Settings, measurement: Measurement, engine: Engine, prior: Estimate
     ) -> None:
         self._measurement = measurement
         self._engine = engine
-        self.prior_sigma = prior_sigma
+        self._prior = prior.x[:STATES]
+        self.prior_sigma = tuple([prior.soil_P[i][i] ** 0.5 for i in range(STATES)])
         self._radius = measurement.chain.wheel.radius
         walk = settings.filter
         self._rates = (walk.cohesion_walk / KPA, walk.tan_phi_walk, walk.ln_k_walk)
 
-    def walked(self, estimate: Estimate, elapsed: float, unrest: float) -> Estimate:
+    def walked(self, bank: Bank, elapsed: float, unrest: float) -> Bank:
         """Random walk of the soil over the elapsed time [s]; unrest: more of it after a change,
         [prior σ/√s].
         """
         rates = zip(self._rates, self.prior_sigma, strict=True)
-        return predict(
-            estimate,
-            tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates]),
-        )
+        walk = tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates])
+        return tuple([predict(member, walk) for member in bank])
 
-    def completed(self, memory: Memory, x: Vector, consider_k: bool, doubt: float) -> Memory:
+    def completed(self, memory: Memory, x: Vector, doubt: float) -> Memory:
         """The stretch before the last is complete: a measurement along the tangent at x. The oldest
         goes to the anchor when there are too many.
         """
@@ -60,63 +60,65 @@ class Smoother:
             return memory
 
         oldest, *rest = memory.stretches
-        _, anchor = self._absorbed(memory.anchor, oldest, consider_k, doubt)
+        _, anchor = self._absorbed(memory.anchor, oldest, doubt)
         return Memory(anchor, tuple(rest))
 
-    def judgement(self, memory: Memory, doubt: float) -> Judgement | None:
-        """What the complete stretches on the present soil say of it; None where there is none."""
-        told = memory.complete()
-        if not told:
+    def judgement(self, memory: Memory, bank: Bank, doubt: float) -> Judgement | None:
+        """What the complete stretches on the present soil say of it, by the most probable member of
+        the bank; None where there is none.
+        """
+        complete = memory.complete()
+        if not complete:
             return None
         first = memory.stretches[memory.since]
-        before = memory.anchor if first.changed is None else first.changed
-        lines = [stretch.line for stretch in told if stretch.line is not None]
-        variances, windows = self._measurement.variances, [stretch.windows for stretch in told]
-        return judge(before, variances, self._doubted(doubt), lines, windows)
+        before = (memory.anchor if first.changed is None else first.changed)[leading(bank)]
+        lines = [stretch.line for stretch in complete if stretch.line is not None]
+        windows = [stretch.windows for stretch in complete]
+        return judge(before, self._doubted(doubt), lines, windows)
 
     def tangents(self, stretches: Sequence[Stretch], x: Vector) -> tuple[Line, ...]:
         """Stretches along the tangents at x (3,)."""
         return tuple([line_of(self._measurement, stretch.mean, x) for stretch in stretches])
 
     def over(
-        self, estimate: Estimate, stretches: Sequence[Stretch], consider_k: bool, doubt: float
-    ) -> tuple[tuple[Stretch, ...], Estimate]:
+        self, bank: Bank, stretches: Sequence[Stretch], doubt: float
+    ) -> tuple[tuple[Stretch, ...], Bank]:
         """The filter over stretches that have their tangents; where the soil changed, a stretch
         notes what is still known.
         """
         passed = []
         for stretch in stretches:
-            stretch, estimate = self._absorbed(estimate, stretch, consider_k, doubt)
+            stretch, bank = self._absorbed(bank, stretch, doubt)
             passed.append(stretch)
-        return tuple(passed), estimate
+        return tuple(passed), bank
 
-    def _absorbed(
-        self, estimate: Estimate, stretch: Stretch, consider_k: bool, doubt: float
-    ) -> tuple[Stretch, Estimate]:
+    def _absorbed(self, bank: Bank, stretch: Stretch, doubt: float) -> tuple[Stretch, Bank]:
         """Update with a whole stretch."""
-        estimate = self.walked(estimate, stretch.elapsed, stretch.unrest)
+        bank = self.walked(bank, stretch.elapsed, stretch.unrest)
         if stretch.changed is not None:
-            estimate = self.widened(estimate, doubt)
-            stretch = stretch._replace(changed=estimate)
+            bank = tuple([self.renewed(member, doubt) for member in bank])
+            stretch = stretch._replace(changed=bank)
         if not stretch.components:
-            return stretch, estimate
+            return stretch, bank
 
-        assert stretch.line is not None
-        update = selected(stretch.line.update(estimate.x, stretch.windows), stretch.components)
-        return stretch, self._engine.update(estimate, update, consider_k)
+        line = stretch.line
+        assert line is not None
+        after = []
+        for member in bank:
+            update = selected(line.update(member.x, stretch.windows), stretch.components)
+            after.append(self._engine.update(member, update))
+        return stretch, tuple(after)
 
     def _doubted(self, doubt: float) -> Vector:
         """The prior's σ (3,), so many times."""
         return tuple([doubt * sigma for sigma in self.prior_sigma])
 
-    def widened(self, estimate: Estimate, doubt: float = 1.0) -> Estimate:
-        """As uncertain as the prior, about where it is; its correlation with the calibration errors
-        stays.
+    def renewed(self, estimate: Estimate, doubt: float = 1.0) -> Estimate:
+        """Of another soil nothing is known but the prior. What is known of the errors that all
+        windows share stays.
         """
-        P = np.array(estimate.P)
-        more = np.diag(np.square(self._doubted(doubt))) - P
-        if np.linalg.eigvalsh(more)[0] < 0.0:  # somewhere it is wider already
-            more = np.diag(np.maximum(np.diag(more), 0.0))
-        wide = (P + more).tolist()
-        rows = tuple(tuple(row[:STATES]) for row in wide)
-        return Estimate(estimate.x, rows, estimate.cross)
+        P = covariance(estimate).copy()
+        P[:STATES] = P[:, :STATES] = 0.0
+        for state, sigma in enumerate(self._doubted(doubt)):
+            P[state, state] = sigma * sigma
+        return made((*self._prior, *estimate.x[STATES:]), P, estimate.log_evidence)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from gritd.estimator.filter.bank import Bank
 from gritd.estimator.filter.estimate import Estimate, Vector
 from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.measurement import Columns
@@ -14,11 +15,6 @@ from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.tick import Aid
 from gritd.estimator.stages.situation import Recall
 from gritd.estimator.wheel.wheel_state import WheelState
-
-SLIP_VARIES = 0.1  # k is estimated once steady stretches have differed by this much slip …
-CLEARLY = 5.0  # … and by this many standard deviations of a window's slip
-
-Point = tuple[bool, Vector]  # whether ln k is estimated, and the state
 
 
 class Ended(NamedTuple):
@@ -44,7 +40,7 @@ class Again(NamedTuple):
 class Relining(NamedTuple):
     """The memory is linearised anew: its tangents so far."""
 
-    point: Point
+    x: Vector  # (d,) at which they are taken
     last: bool  # whatever the pass then finds, it is not linearised once more
     lines: tuple[Line, ...] = ()
 
@@ -52,9 +48,9 @@ class Relining(NamedTuple):
 class Passing(NamedTuple):
     """The filter runs over the memory that was linearised anew: the stretches it has been over."""
 
-    point: Point
+    x: Vector  # (d,)
     last: bool
-    estimate: Estimate
+    bank: Bank
     stretches: tuple[Stretch, ...] = ()
 
 
@@ -74,16 +70,16 @@ class Withheld(NamedTuple):
 class TrackState(NamedTuple):
     """Everything the tracker remembers from window to window."""
 
-    estimate: Estimate
+    estimate: Estimate  # what the members of the bank say together
+    bank: Bank
     memory: Memory
     recall: Mapping[str, Recall]  # what configured effects remember, by name
     columns: Columns = ()  # of the uncertain effect parameters, at the last update
-    linearised: Point | None = None  # where the memory was linearised last
+    linearised: Vector | None = None  # where the memory was linearised last
     unlinearised: int = 0  # windows since then
     began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
-    slip_varied: bool = False  # from one steady stretch to another, on the present soil
     trust: Trust = Trust()
     updates: int = 0
     resets: int = 0
@@ -92,8 +88,3 @@ class TrackState(NamedTuple):
     task: Task | None = None  # of the review of the record that is under way
     withheld: Withheld | None = None  # likewise
     resets_told: int = 0  # of `resets`, those that a tick has flagged
-
-
-def slip_varies(memory: Memory, sigma: float) -> bool:
-    """Whether slip has varied enough to tell k; sigma: of the slip of a window."""
-    return memory.slip_span() > max(SLIP_VARIES, CLEARLY * sigma)

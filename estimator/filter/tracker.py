@@ -6,20 +6,26 @@ done. It reads no clock and keeps nothing between calls.
 
 from __future__ import annotations
 
-from math import hypot, log, sqrt
+from math import hypot, inf, log, sqrt
 from typing import NamedTuple
 
+import numpy as np
+
 from gritd.estimator.config.settings import Settings
+from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
     KPA,
+    LN_K,
     STATES,
     TAN_PHI,
     C,
     Estimate,
     Update,
     Vector,
+    dot,
+    made,
     variance,
 )
 from gritd.estimator.filter.learnt_soil import with_learnt_soil
@@ -27,15 +33,16 @@ from gritd.estimator.filter.measurement import Measurement, selected, soil
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother
-from gritd.estimator.filter.track import Task, TrackState, Withheld, slip_varies
-from gritd.estimator.filter.tuning import CHANGE, TRUST
+from gritd.estimator.filter.track import Task, TrackState, Withheld
+from gritd.estimator.filter.tuning import CHANGE, FORM, TRUST
 from gritd.estimator.messages.readings import NS
-from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
+from gritd.estimator.messages.status import Flag, Status
 from gritd.estimator.messages.tick import Aid
 from gritd.estimator.wheel.chain import Context
 from gritd.estimator.wheel.sync import Snapshot
-from gritd.estimator.wheel.wheel_state import REQUIRED_BITS, WheelState, classify
+from gritd.estimator.wheel.wheel_state import WheelState, classify, required_bits
 
+KNOWN = 0.7  # posterior over prior σ of ln k below which the run has told of k
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
 
 
@@ -62,11 +69,9 @@ class Tracker:
     def __init__(self, settings: Settings, engine: str | None = None) -> None:
         self.settings = settings
         self.measurement = Measurement(settings)
-        self.engine = make_engine(engine or settings.filter.engine, self.measurement.variances)
+        self.engine = make_engine(engine or settings.filter.engine)
         self._window = round(NS / settings.rates.update)
-        self._required = REQUIRED_BITS | (
-            CHANNEL_BITS["wrench"] if settings.wrench is not None else 0
-        )
+        self._required = required_bits(settings)
         # half of what the memory of innovations holds of one component
         self._experienced = 0.5 * TRUST.memory * NS / self._window
         soil = settings.soil
@@ -76,27 +81,37 @@ class Tracker:
             soil.shear_modulus.sigma / soil.shear_modulus.value,
         )
 
-        self.prior = with_learnt_soil(
-            self._unsure(
-                (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
-            ),
-            settings,
-        )
-        self._bounds = Bounds(settings, self.prior.x, self._prior_sigma)
-        self.smoother = Smoother(settings, self.measurement, self.engine, self._prior_sigma)
-        self.reviewer = Reviewer(settings, self.smoother, self._bounds)
+        self.prior_bank = self._unsure()
+        self.prior = told(self.prior_bank)
+        self._bounds = Bounds(settings, self.prior.x[:STATES], self._prior_sigma)
+        self.smoother = Smoother(settings, self.measurement, self.engine, self.prior)
+        self.reviewer = Reviewer(self.smoother, self._bounds, self._scales())
 
     def start(self) -> TrackState:
         """The prior."""
-        return TrackState(self.prior, Memory(self.prior), self.measurement.chain.fresh_memory())
+        bank = self.prior_bank
+        return TrackState(self.prior, bank, Memory(bank), self.measurement.chain.fresh_memory())
 
-    def _unsure(self, x: Vector, factor: float = 1.0) -> Estimate:
-        """The state x with the prior's standard deviations, times a factor."""
-        sigma = tuple([factor * s for s in self._prior_sigma])
-        P = tuple(
-            tuple(sigma[i] ** 2 if i == j else 0.0 for j in range(STATES)) for i in range(STATES)
-        )
-        return Estimate(x, P, ((0.0,) * len(self.measurement.variances),) * STATES)
+    def _unsure(self, factor: float = 1.0) -> Bank:
+        """The prior, the soil's standard deviations so many times."""
+        soil = self.settings.soil
+        mean = (soil.cohesion.value / KPA, soil.tan_phi.value, log(soil.shear_modulus.value))
+        spread = np.diag(np.square([factor * sigma for sigma in self._prior_sigma]))
+
+        bank = []
+        for size in FORM.sizes:
+            P = self.measurement.prior(spread, size)
+            P = with_learnt_soil(P, self.measurement.learnt_columns, self.settings)
+            bank.append(made((*mean, *(0.0,) * (len(P) - STATES)), P))
+        return tuple(bank)
+
+    def _scales(self) -> Vector:
+        """How far each entry of the vector (d,) may be off before the run; infinite for those that
+        the measurements are linear in.
+        """
+        nonlinear = self.measurement.nonlinear
+        P = self.prior.P
+        return tuple([sqrt(P[i][i]) if i in nonlinear else inf for i in range(len(P))])
 
     def step(self, state: TrackState, snapshot: Snapshot) -> tuple[TrackState, Account]:
         """Classify the window; when a whole new one has passed, and it is fit for it, update the
@@ -130,7 +145,7 @@ class Tracker:
         """When the review is complete, what the innovations of its window say of the estimate."""
         if state.task is not None or state.withheld is None:
             return state
-        trust = state.trust.surprised(*state.withheld)
+        trust = state.trust.surprised(*state.withheld, self.measurement.components[0])
         return self._set_back(state._replace(trust=trust, withheld=None))
 
     def _account(
@@ -183,39 +198,51 @@ class Tracker:
         of the record.
         """
         trust = state.trust.passed(elapsed)
-        walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
+        bank = self.smoother.walked(state.bank, elapsed, trust.unrest)
+        walked = told(bank)
 
-        update = self.measurement.linearise(now, self.measurement.predict(walked, now))
+        prediction = self.measurement.predict(walked, now)
+        update = self.measurement.linearise(now, prediction, walked)
         aids = self._gate(walked, now, update)
         taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
         estimate = walked
         if taken:
-            update = selected(update, taken)
-            estimate = self.engine.update(walked, update, not self.reviewer.estimates_k(state))
-            estimate = self._bounds.inside(estimate)
+            bank = self._bounds.all_inside(self._updated(bank, selected(update, taken), walked.x))
+            estimate = told(bank)
             trust = self._bounds.stood(trust, estimate, elapsed)
 
         memory, task = self._remembered(state, now, taken, elapsed, trust.unrest)
         state = state._replace(
             estimate=estimate,
+            bank=bank,
             columns=now.columns,
             memory=memory,
-            slip_varied=state.slip_varied or slip_varies(memory, now.slip.sigma),
             unlinearised=state.unlinearised + 1,
-            trust=trust.surprised(aids, elapsed) if task is None else trust,
+            trust=trust if task else trust.surprised(aids, elapsed, self.measurement.components[0]),
             updates=state.updates + bool(taken),
             task=task,
             withheld=None if task is None else Withheld(aids, elapsed),
         )
         return (self._set_back(state) if task is None else state), aids
 
+    def _updated(self, bank: Bank, update: Update, x: Vector) -> Bank:
+        """Every member with a window, along the tangent at x (d,) for all."""
+        after = []
+        for member in bank:
+            apart = tuple([b - a for a, b in zip(x, member.x, strict=True)])
+            moved = zip(update.innovation, update.H, strict=True)
+            innovation = tuple([y - dot(h, apart) for y, h in moved])
+            after.append(self.engine.update(member, update._replace(innovation=innovation)))
+        return tuple(after)
+
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
-        gate, variances = self.settings.filter.gate, self.measurement.variances
-        measured = (now.torque.value, now.drawbar_pull.value)
+        gate = self.settings.filter.gate
+        values = (now.torque.value, now.drawbar_pull.value)
+        measured = [values[at] for at in self.measurement.components]
         aids = []
         for index, innovation in enumerate(update.innovation):
             r = update.R[index][index]
-            s = variance(estimate, variances, update.H[index], update.G[index]) + r
+            s = variance(estimate, update.H[index]) + r
             ratio = innovation * innovation / (gate * gate * s)
             aids.append(Aid(measured[index], r, innovation, s, ratio, ratio <= 1.0))
         return tuple(aids)
@@ -237,20 +264,19 @@ class Tracker:
         return memory, self.reviewer.begun(before[0].like(now, taken), state.unlinearised + 1)
 
     def _set_back(self, state: TrackState) -> TrackState:
-        """Back to the prior's covariance, or a wider one, when the innovations were out of all
-        measure and no change of the soil explained them. From a bound, back to its mean as well.
+        """Back to the prior, or a wider one, when the mean square of the innovations is above the
+        reset threshold and no change of the soil explained them.
         """
         if not state.trust.inconsistent(self._experienced):
             return state
 
         trust = state.trust.reset()
-        x = self.prior.x if self._bounds.improbable(state.estimate) else state.estimate.x
-        estimate = self._unsure(x, trust.doubt)
+        bank = self._unsure(trust.doubt)
         return state._replace(
-            estimate=estimate,
-            memory=Memory(estimate),
+            estimate=told(bank),
+            bank=bank,
+            memory=Memory(bank),
             linearised=None,
-            slip_varied=False,
             trust=trust,
             resets=state.resets + 1,
         )
@@ -260,10 +286,14 @@ class Tracker:
         sigma_c, sigma_t = self._prior_sigma[C], self._prior_sigma[TAN_PHI]
         if sigma_c == 0.0 or sigma_t == 0.0:
             return 0.0
-        P = estimate.P
+        P = estimate.soil_P
         a, d = P[C][C] / sigma_c**2, P[TAN_PHI][TAN_PHI] / sigma_t**2
         b = P[C][TAN_PHI] / (sigma_c * sigma_t)
         return sqrt(max(0.5 * (a + d) + hypot(0.5 * (a - d), b), 0.0))
+
+    def _knows_k(self, estimate: Estimate) -> bool:
+        """Whether the run has told of k, and not the prior alone."""
+        return estimate.soil_P[LN_K][LN_K] < (KNOWN * self._prior_sigma[LN_K]) ** 2
 
     def _flags(self, state: TrackState, aids: tuple[Aid, ...], separability: float) -> int:
         trust = state.trust
@@ -272,7 +302,7 @@ class Tracker:
 
         return (
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
-            + Flag.K_ESTIMATED * self.reviewer.estimates_k(state)
+            + Flag.K_ESTIMATED * self._knows_k(state.estimate)
             + Flag.GATED * (not all([aid.accepted for aid in aids]))
             + Flag.RESET * (bool(aids) and state.resets > state.resets_told)
             + Flag.MISMATCH * disagrees

@@ -46,11 +46,11 @@ class Trust(NamedTuple):
             changes=self.changes * exp(-elapsed / TRUST.restless_memory),
         )
 
-    def surprised(self, aids: Sequence[Aid], elapsed: float) -> Trust:
-        """With the innovations of one more window."""
+    def surprised(self, aids: Sequence[Aid], elapsed: float, first: int = 0) -> Trust:
+        """With the innovations of one more window; first: 1 where the torque is not measured."""
         keep = exp(-elapsed / TRUST.memory)
         squares = [min(aid.innovation**2 / aid.s, TRUST.most) for aid in aids]
-        both = (*squares, 0.0)[: len(self.surprise)]
+        both = (*(0.0,) * first, *squares, 0.0)[: len(self.surprise)]
         surprise = tuple([keep * a + b for a, b in zip(self.surprise, both, strict=True)])
         return self._replace(surprise=surprise, components=keep * self.components + len(aids))
 

@@ -89,6 +89,17 @@ class FormTuning:
     # so it does not average out while they last; the longest stretches of a schedule are this long.
     lasting: float = 10.0
 
+    # Sizes of the error of form of which nothing was learnt, in shares of the load: no more than
+    # integrals and tables miss; what a good model misses; what a wrong one does. A factor of eight
+    # between them: with five conditions a record tells such sizes apart. Judgement.
+    sizes: tuple[float, ...] = (0.0005, 0.004, 0.032)
+
+    # Their probabilities before the run. Judgement: half of the rigs obey their equations.
+    odds: tuple[float, ...] = (0.5, 0.25, 0.25)
+
+    # Probability of the largest size from which on the estimate is not believed.
+    misfit: float = 0.5
+
 
 CHANGE = ChangeTuning()
 FORM = FormTuning()

@@ -37,4 +37,4 @@ CHANNELS: dict[str, tuple[str, ...]] = {
 }
 
 ENCODERS = ("wheel_encoder", "carriage_encoder")
-REQUIRED = ("wheel_encoder", "carriage_encoder", "sinkage_pot", "motor_shunt")
+MOTION = (*ENCODERS, "sinkage_pot")  # without which there is neither slip nor entry angle

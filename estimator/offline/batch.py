@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
-from gritd.estimator.filter.estimate import Estimate, Vector
+from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Account, Tracker
 from gritd.estimator.messages.readings import NS
@@ -89,9 +90,13 @@ class Replayed(NamedTuple):
     """What the filter made of a recording."""
 
     rows: Table  # one a window (n,), fields ESTIMATES, each as in /tick
-    estimate: Estimate  # at the end
-    nuisances: Vector  # variances of the calibration's errors (q,)
+    bank: Bank  # at the end
     believed: bool  # at the end: a tick would tell it, and not the stated prior
+
+    @property
+    def estimate(self) -> Estimate:
+        """At the end: what the members of the bank say together."""
+        return told(self.bank)
 
 
 def estimates(settings: Settings, recording: Recording, engine: str = "plain") -> Table:
@@ -105,7 +110,7 @@ def replayed(
     settings: Settings,
     recording: Recording,
     engine: str = "plain",
-    start: Estimate | None = None,
+    start: Bank | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of a recording, begun with the stated prior or with `start`. See
@@ -120,7 +125,7 @@ def followed(
     settings: Settings,
     streams: RecordedStreams,
     engine: str = "plain",
-    start: Estimate | None = None,
+    start: Bank | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of readings, window by window.
@@ -152,8 +157,7 @@ def followed(
     state = tracker.reviewed(state)
     return Replayed(
         np.concatenate(tables),
-        state.estimate,
-        tracker.measurement.variances,
+        state.bank,
         not flags & Flag.PRIOR,
     )
 
@@ -196,9 +200,11 @@ def _predictions(tracker: Tracker, account: Account) -> PointPredictions:
     if not account.touching:
         return PointPredictions()
 
-    prediction = tracker.measurement.predict(account.estimate, account.now)
+    measurement = tracker.measurement
+    prediction = measurement.predict(account.estimate, account.now)
+    torque, pull = measurement.expected(account.estimate, account.now, prediction)
     return PointPredictions(
-        torque_predicted=prediction.torque.value,
-        drawbar_pull_predicted=prediction.drawbar_pull.value,
+        torque_predicted=torque,
+        drawbar_pull_predicted=pull,
         rolling_resistance=prediction.resistance.value,
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Repeatability, Settings
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.offline.batch import Replayed, replayed
 from gritd.estimator.online.bed import Known, after_run, before_run, surprise
@@ -21,7 +21,7 @@ class BedRun(NamedTuple):
 
     recording: Recording
     settings: Settings
-    prior: Estimate
+    prior: Bank
     alone: Replayed  # begun with the stated prior
     carried: Replayed  # begun with what the runs before it know
     known: Known  # of the bed after it
@@ -44,7 +44,7 @@ def bed_runs(
     """
     known: Known | None = None
     for settings, recording in runs:
-        prior = Tracker(settings, engine).prior
+        prior = Tracker(settings, engine).prior_bank
         known = known or Known(prior, 0)
 
         alone = replayed(settings, recording, engine, None, advance)
@@ -62,8 +62,8 @@ def bed_runs(
             prior,
             alone,
             carried,
-            after_run(known, carried.estimate, repeatability, carried.nuisances),
-            surprise(start, carried.estimate),
+            after_run(known, carried.bank, repeatability),
+            surprise(told(start), carried.estimate),
         )
         run = run if run.counts else run._replace(known=known)
         known = run.known

@@ -41,7 +41,9 @@ def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> It
     carriage = view.slope("carriage_encoder", settings.pulley_radius)
     means = {name: view.mean(name) for name in settings.channels if name not in ENCODERS}
     axes = view.wrench()
-    required = [wheel.known, carriage.known, *(means[name].known for name in ANALOGUE)]
+    torque = ["motor_shunt"] if settings.drive.torque_source == "motor_shunt" else []
+    sought = [means[name].known for name in ("sinkage_pot", *torque)]
+    required = [wheel.known, carriage.known, *sought]
 
     columns: tuple[NDArray[Any] | Series, ...] = (
         view.ends - view.length // 2,
@@ -184,7 +186,7 @@ class View:
 
         return (
             axis("fz", wrench.force_noise, wrench.load),
-            axis("fx", wrench.force_noise, wrench.drawbar_pull),
+            axis("fx", wrench.force_noise, wrench.drawbar_pull) if wrench.pulls else self.nothing,
             axis("ty", wrench.torque_noise, wrench.torque),
         )
 

@@ -2,10 +2,10 @@
 
 The bed has a soil s. Every run drives on it after a preparation, on s + d, where d is zero mean
 with the stated repeatability Q. A run begins with what is known of s, widened by Q; what it leaves
-is told of s by the regression of s on the run's soil and the calibration's errors ν, which are the
-same in all runs and correlated with both. With Q = 0 the run's posterior is the bed's.
+is known of s by the regression of s on the run's soil and on the errors ν, which are the same in
+all runs and correlated with both. With Q = 0 the run's posterior is the bed's.
 Source: Kalman filter with the preparation as process noise, smoothed back to the common mean
-(Rauch, Tung, Striebel 1965, AIAA J. 3, 1445-1450), ν considered (Schmidt 1966).
+(Rauch, Tung, Striebel 1965, AIAA J. 3, 1445-1450).
 """
 
 from __future__ import annotations
@@ -17,7 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.estimator.config.settings import Repeatability, Settings
-from gritd.estimator.filter.estimate import KPA, STATES, Estimate, Vector
+from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.estimate import (
+    KPA,
+    STATES,
+    Estimate,
+    Vector,
+    covariance,
+    made,
+    predict,
+)
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.track import TrackState
 
@@ -28,8 +37,13 @@ LEAST = 1e-9  # of the largest narrowing: a direction that was narrowed by less 
 class Known(NamedTuple):
     """What is known of a bed."""
 
-    estimate: Estimate  # of the soil that all preparations have in common
+    bank: Bank  # of the soil that all preparations have in common, and the shared errors
     runs: int  # that it rests on
+
+    @property
+    def estimate(self) -> Estimate:
+        """What the members of the bank say together."""
+        return told(self.bank)
 
 
 def variances_of(repeatability: Repeatability) -> Vector:
@@ -41,58 +55,40 @@ def variances_of(repeatability: Repeatability) -> Vector:
     )
 
 
-def before_run(known: Known, repeatability: Repeatability) -> Estimate:
+def before_run(known: Known, repeatability: Repeatability) -> Bank:
     """What is known of the soil of the next run."""
     if known.runs == 0:  # the prior is of the soil under the wheel
-        return known.estimate
-    x, P, cross = known.estimate
-    widened = np.array(P) + np.diag(variances_of(repeatability))
-    return Estimate(x, _rows(widened), cross)
+        return known.bank
+    return tuple([predict(member, variances_of(repeatability)) for member in known.bank])
 
 
-def after_run(
-    known: Known, after: Estimate, repeatability: Repeatability, nuisances: Vector
-) -> Known:
-    """What is known of the bed after a run that began with `before_run` and left `after`.
-
-    nuisances: variances of the calibration's errors (q,).
-    """
+def after_run(known: Known, after: Bank, repeatability: Repeatability) -> Known:
+    """What is known of the bed after a run that began with `before_run` and left `after`."""
     if known.runs == 0:
-        return Known(_of_bed(after, repeatability), 1)
+        spread = variances_of(repeatability)
+        return Known(tuple([predict(member, spread) for member in after]), 1)
 
-    x, P, X = (np.array(part) for part in known.estimate)
-    before = before_run(known, repeatability)
-    V = np.diag(nuisances)
-    joint = np.block([[np.array(before.P), X], [X.T, V]])  # of the run's soil and ν
-    gain = np.hstack([P, X]) @ np.linalg.pinv(joint)
-
-    moved = np.array(after.x) - np.array(before.x)
-    learnt = np.block([[np.array(after.P), np.array(after.cross)], [np.array(after.cross).T, V]])
-    rest = P - gain @ joint @ gain.T  # what the run and ν leave open of the bed
-
-    together = gain @ learnt
-    return Known(
-        Estimate(
-            tuple((x + gain[:, :STATES] @ moved).tolist()),
-            _rows(_symmetric(together @ gain.T + rest)),
-            _rows(together[:, STATES:]),
-        ),
-        known.runs + 1,
-    )
+    pairs = zip(known.bank, before_run(known, repeatability), after, strict=True)
+    return Known(tuple([_of_bed(*each) for each in pairs]), known.runs + 1)
 
 
-def _of_bed(after: Estimate, repeatability: Repeatability) -> Estimate:
-    """What the first run tells of the bed: its own soil, known as well as it is, and the
-    preparation.
+def _of_bed(bed: Estimate, before: Estimate, after: Estimate) -> Estimate:
+    """The bed's soil and the shared errors ν, from those of the run: [s, ν] regressed on
+    [s + d, ν].
     """
-    return Estimate(
-        after.x, _rows(np.array(after.P) + np.diag(variances_of(repeatability))), after.cross
-    )
+    P, joint = covariance(bed), covariance(before)
+    gain = P @ np.linalg.pinv(joint, hermitian=True)
+    moved = np.array(after.x) - np.array(before.x)
+    left = P - gain @ joint @ gain.T  # what the run leaves open of the bed
+
+    x = np.array(bed.x) + gain @ moved
+    together = gain @ covariance(after) @ gain.T + left
+    return made(tuple(x.tolist()), _symmetric(together), after.log_evidence)
 
 
-def begun(fresh: TrackState, estimate: Estimate) -> TrackState:
-    """The state that a tracker starts with, with an estimate in the place of the prior."""
-    return fresh._replace(estimate=estimate, memory=Memory(estimate))
+def begun(fresh: TrackState, bank: Bank) -> TrackState:
+    """The state that a tracker starts with, with a bank in the place of the prior."""
+    return fresh._replace(estimate=told(bank), bank=bank, memory=Memory(bank))
 
 
 def surprise(before: Estimate, after: Estimate) -> float:
@@ -100,8 +96,8 @@ def surprise(before: Estimate, after: Estimate) -> float:
 
     Chi-square with as many degrees of freedom as states where the run's soil is the one expected.
     """
-    moved = np.array(after.x) - np.array(before.x)
-    narrowed = np.array(before.P) - np.array(after.P)
+    moved = np.array(after.x[:STATES]) - np.array(before.x[:STATES])
+    narrowed = np.array(before.soil_P) - np.array(after.soil_P)
     values, vectors = np.linalg.eigh(_symmetric(narrowed))
     known = values > LEAST * max(float(values[-1]), 0.0)
     return float(np.sum((vectors.T @ moved)[known] ** 2 / values[known]))
@@ -114,6 +110,7 @@ def fingerprint(settings: Settings) -> str:
     parts = (
         settings.soil,
         settings.wheel,
+        settings.peak,
         settings.pulley_radius,
         settings.drive,
         settings.load.nominal.sigma,
@@ -129,7 +126,3 @@ def fingerprint(settings: Settings) -> str:
 
 def _symmetric(matrix: Array) -> Array:
     return 0.5 * (matrix + matrix.T)
-
-
-def _rows(matrix: Array) -> tuple[Vector, ...]:
-    return tuple(tuple(row) for row in matrix.tolist())

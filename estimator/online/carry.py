@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import told
+from gritd.estimator.filter.estimate import STATES
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.online.pipeline import Pipeline, State
@@ -80,5 +81,7 @@ def _read_anew(position: float, before: Settings, now: Settings) -> float:
 
 
 def _kept(track: TrackState, old: TrackState) -> TrackState:
-    estimate = Estimate(old.estimate.x, track.estimate.P, track.estimate.cross)
-    return track._replace(estimate=estimate, memory=Memory(estimate))
+    """The soil as it was estimated, as uncertain as the prior."""
+    soil = old.estimate.x[:STATES]
+    bank = tuple([member._replace(x=(*soil, *member.x[STATES:])) for member in track.bank])
+    return track._replace(estimate=told(bank), bank=bank, memory=Memory(bank))

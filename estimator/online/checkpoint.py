@@ -62,6 +62,8 @@ def _plain(value: Any) -> Any:
         return {type(value).__name__: [int(value)]}
     if value is None or isinstance(value, bool | int | float | str):
         return value
+    if isinstance(value, bytes):
+        return {"bytes": value.hex()}
     if isinstance(value, tuple) and not hasattr(value, "_fields"):
         return [_plain(item) for item in value]
     if isinstance(value, list | deque):
@@ -84,6 +86,8 @@ def _object(plain: Any, depth: int = 0) -> Any:
         return plain
 
     ((name, content),) = plain.items()
+    if name == "bytes":
+        return bytes.fromhex(content)
     if name == "dict":
         return {key: _object(item, depth + 1) for key, item in content.items()}
 

@@ -45,7 +45,8 @@ from gritd.estimator.terramechanics.soil import Array, Scalar, Wheel
 
 ARRAYS: Maths = Arrays()
 
-GRADIENT = ("c", "tan_phi", "ln_k", "theta_1", "slip", "load")  # order of every gradient below
+# order of every gradient below; peak: θₘ/θ₁ of (5), at any slip
+GRADIENT = ("c", "tan_phi", "ln_k", "theta_1", "slip", "load", "exponent", "peak")
 
 
 class Exponent(NamedTuple):
@@ -65,6 +66,8 @@ class Shift(NamedTuple):
     theta_1: Integrals
     slip: Integrals
     ln_k: Integrals
+    exponent: Integrals
+    peak: Integrals
 
 
 class Prediction(NamedTuple):
@@ -107,7 +110,7 @@ def predict(
     c [Pa], tan φ [-], k [m], θ₁ [rad], i [-], W [N], all floats. With a shift the forces are
     those of the stresses it stands for.
     """
-    ratio, ratio_slip = _peak_ratio(wheel, slip, maths)
+    ratio, inside = _peak_ratio(wheel, slip, maths)
     exponent = shear_exponent(wheel, k, theta_1, slip, maths)
     both = both_kernels(theta_1, ratio, exponent.f, maths)
     bare = integrals_of(theta_1, exponent.f, both, maths)
@@ -117,18 +120,16 @@ def predict(
     at = _At(wheel, x, tan_phi, s)
     by_theta_1 = at.along(c, *theta_1_derivative(theta_1, exponent.f, bare, both, maths))
     by_f = at.along(c, *f_derivative(theta_1, both, maths))
-    by_ratio = (
-        at.along(c, *ratio_derivative(theta_1, exponent.f, both, maths))
-        if wheel.c2
-        else (0.0, 0.0, 0.0)
-    )
+    by_ratio = at.along(c, *ratio_derivative(theta_1, exponent.f, both, maths))
     columns: tuple[Sequence[Value], ...] = (
         at.response(-theta_1 * x.b2, theta_1 * x.a1, theta_1 * x.c1, 0.0),
         at.response(-s * x.b3, s * x.a2, s * x.c2, 0.0),
         [-exponent.f * by for by in by_f],
         [by + exponent.theta_1 * f for by, f in zip(by_theta_1, by_f, strict=True)],
-        [exponent.slip * f + ratio_slip * by for f, by in zip(by_f, by_ratio, strict=True)],
+        [exponent.slip * f + wheel.c2 * inside * by for f, by in zip(by_f, by_ratio, strict=True)],
         at.response(1.0 / (wheel.radius * wheel.width), 0.0, 0.0, 0.0),
+        [0.0 * by for by in by_ratio],
+        [inside * by for by in by_ratio],
     )
     if shift:
         columns = tuple(map(_summed, columns, at.along_shift(c, theta_1, shift)))
@@ -248,10 +249,10 @@ def tau_m(
 
 
 def _peak_ratio(wheel: Wheel, slip: Value, maths: Maths) -> tuple[Value, Value]:
-    """θₘ/θ₁ of (5), kept inside [0, 1], and its derivative with respect to slip."""
+    """θₘ/θ₁ of (5), kept inside [0, 1], and 1 where it is inside, else 0."""
     free = wheel.c1 + wheel.c2 * slip
     ratio = maths.clip(free, 0.0, 1.0)
-    return ratio, wheel.c2 * (ratio == free)
+    return ratio, 1.0 * (ratio == free)
 
 
 def _wheel_integrals(
@@ -333,8 +334,9 @@ class _At(NamedTuple):
         grown = Integrals(
             *[a + theta_1 * b for a, b in zip(shift.value, shift.theta_1, strict=True)]
         )
-        by_ln_k, by_slip = (
+        by_ln_k, by_slip, by_exponent, by_peak = (
             self.along(c, Integrals(*[theta_1 * d for d in dx]), dx)
-            for dx in (shift.ln_k, shift.slip)
+            for dx in (shift.ln_k, shift.slip, shift.exponent, shift.peak)
         )
-        return none, none, by_ln_k, self.along(c, grown, shift.theta_1), by_slip, none
+        by_theta_1 = self.along(c, grown, shift.theta_1)
+        return none, none, by_ln_k, by_theta_1, by_slip, none, by_exponent, by_peak

@@ -80,15 +80,18 @@ def predict(
         forces(
             a1 + by_theta_1[0], by_theta_1[1], by_theta_1[2], one + by_theta_1[3], by_theta_1[4]
         ),
-        forces(*_by_ratio(theta_1, f * theta_1, lam)) if wheel.c2 else NONE,
-        forces(*_added(NOTHING, shift.ln_k, 1.0)) if shift is not None else NONE,
-        forces(*_added(NOTHING, shift.slip, 1.0)) if shift is not None else NONE,
+        forces(*_by_ratio(theta_1, f * theta_1, lam)),
+        *(
+            [forces(*_added(NOTHING, by, 1.0)) for by in shift[2:]]
+            if shift is not None
+            else [NONE] * 4
+        ),
     ]
     # s gives way to each of them so that W stays the same
     ds = -1.0 / (area * carry)
     torque_s, drag_s = arm * tan_phi * a2 * ds, area * bare.imag * ds
     pull_s = area * tan_phi * hat.real * ds - drag_s
-    by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam, by_ln_k, by_slip = [
+    by_c, by_tan_phi, by_ln_f, by_ln_theta_1, by_lam, by_slip, by_ln_k, by_n, by_peak = [
         (torque + torque_s * load, pull + pull_s * load, drag + drag_s * load)
         for torque, pull, drag, load in columns
     ]
@@ -103,6 +106,8 @@ def predict(
             by_ln_theta_1[q] / theta_1 + f_theta_1 * by_ln_f[q],
             by_slip[q] + f_slip * by_ln_f[q] + wheel.c2 * by_lam[q],
             -by_w,
+            by_n[q],
+            by_lam[q] + by_peak[q],
         )
         for q, by_w in enumerate((torque_s, pull_s, drag_s))
     ]

@@ -175,7 +175,7 @@ class Chain:
         return float(slip), float(load)
 
     def _torque(self, true: Sensed, situation: Situation) -> float:
-        if self._settings.drive.torque_source == "wrench":
+        if self._settings.drive.torque_source != "motor_shunt":
             return float(true.torque)
         return float(
             axle_torque(situation, self.effects, self._settings.drive.torque_constant.value)

@@ -168,14 +168,16 @@ class Sync:
         wheel = self._slopes["wheel_encoder"].slope()
         carriage = self._slopes["carriage_encoder"].slope()
         means = {name: window.mean() for name, window in self._means.items()}
-        ready = None not in (wheel, carriage, means["sinkage_pot"], means["motor_shunt"])
+        sought = [wheel, carriage, means["sinkage_pot"]]
+        if self.settings.drive.torque_source == "motor_shunt":
+            sought.append(means["motor_shunt"])
         angle, speed = self._encoder("wheel_encoder", wheel, 1.0)
         position, travel = self._encoder("carriage_encoder", carriage, self.settings.pulley_radius)
         temperature = means.get("motor_temperature")
 
         return Snapshot(
             evaluated=end - self._length // 2,
-            ready=ready,
+            ready=None not in sought,
             wheel_angle=angle,
             wheel_speed=speed,
             carriage_position=position,
@@ -211,7 +213,7 @@ class Sync:
     def _axis(self, axis: str) -> Measured:
         wrench = self.settings.wrench
         mean = self._wrench[axis].mean() if wrench is not None else None
-        if wrench is None or mean is None:
+        if wrench is None or mean is None or (axis == "fx" and not wrench.pulls):
             return NOTHING
         calibration = {"fx": wrench.drawbar_pull, "fz": wrench.load, "ty": wrench.torque}[axis]
         scale = calibration.scale.value

@@ -9,7 +9,7 @@ from math import hypot, isnan, pi
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.messages.readings import REQUIRED
+from gritd.estimator.messages.readings import MOTION
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
@@ -23,7 +23,7 @@ from gritd.estimator.wheel.geometry import (
     slip,
     slip_sigma,
 )
-from gritd.estimator.wheel.sync import Measured, Snapshot
+from gritd.estimator.wheel.sync import NOTHING, Measured, Snapshot
 
 # the linearised shear displacement changes sign along the contact below about this slip
 BRAKING_SLIP = -0.05
@@ -34,7 +34,20 @@ ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
 # relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
 STEADY = 0.05
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
-REQUIRED_BITS = sum(CHANNEL_BITS[name] for name in REQUIRED)
+
+
+def required(settings: Settings) -> tuple[str, ...]:
+    """The channels without which there is no update: motion, torque where it is measured, and the
+    wrench where there is one.
+    """
+    shunt = ("motor_shunt",) if settings.drive.torque_source == "motor_shunt" else ()
+    wrench = ("wrench",) if settings.wrench is not None else ()
+    return (*MOTION, *shunt, *wrench)
+
+
+def required_bits(settings: Settings) -> int:
+    """Their CHANNEL_BITS."""
+    return sum([CHANNEL_BITS[name] for name in required(settings)])
 
 
 @quickly_replaced
@@ -162,6 +175,8 @@ def _load(settings: Settings, snapshot: Snapshot) -> tuple[Measured, Flag]:
 
 
 def _torque(settings: Settings, snapshot: Snapshot) -> Measured:
+    if settings.drive.torque_source == "none":
+        return NOTHING
     if settings.drive.torque_source == "wrench":
         return snapshot.axle_torque
     constant = settings.drive.torque_constant.value
@@ -173,16 +188,16 @@ def classify(
     snapshot: Snapshot,
     now: WheelState,
     before: WheelState | None,
-    required: int = REQUIRED_BITS,
+    needed: int,
     started: bool = True,
 ) -> Status:
     """TRACKING, or the first reason that applies why the window is not used.
 
-    required: CHANNEL_BITS; started: whether every required channel has filled a window once.
+    needed: CHANNEL_BITS; started: whether every required channel has filled a window once.
     """
-    if snapshot.stale & required or not snapshot.ready or _unread(settings, now):
+    if snapshot.stale & needed or not snapshot.ready or _unread(settings, now):
         return Status.STALE if started else Status.STARTING
-    if snapshot.stuck:
+    if snapshot.stuck & needed:
         return Status.STUCK
 
     return _contact(settings, now) or _travel(settings, now) or _steadiness(now, before)
@@ -191,7 +206,8 @@ def classify(
 def _unread(settings: Settings, now: WheelState) -> bool:
     """Whether the wrench, where there is one, sends nothing usable of what is needed of it."""
     assumed = int(now.flags) & Flag.LOAD_ASSUMED.value  # numbers: a flag is made anew each time
-    return isnan(now.torque.value) or (settings.wrench is not None and assumed > 0)
+    sought = now.drawbar_pull if settings.drive.torque_source == "none" else now.torque
+    return isnan(sought.value) or (settings.wrench is not None and assumed > 0)
 
 
 def _contact(settings: Settings, now: WheelState) -> Status | None:
@@ -234,6 +250,7 @@ def _steadiness(now: WheelState, before: WheelState | None) -> Status:
             (now.travel_speed, before.travel_speed),
             (now.load, before.load),
             (now.sinkage, before.sinkage),
+            (now.torque, before.torque),
         )
     ):
         return Status.UNSTEADY
@@ -247,6 +264,7 @@ def moves(speed: Measured) -> bool:
 
 
 def _steady(now: Measured, before: Measured) -> bool:
-    return abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * hypot(
+    """Whether two windows agree; what is not measured does not disagree."""
+    return isnan(now.value) or abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * hypot(
         now.sigma, before.sigma
     )

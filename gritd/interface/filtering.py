@@ -103,7 +103,7 @@ class Filter:
         >>> abs(estimates.tan_phi.value - 0.577) < 2 * estimates.tan_phi.sigma
         True
         """
-        start = after.replayed.estimate if after is not None else None
+        start = after.replayed.bank if after is not None else None
 
         if isinstance(readings, Run):
             info = readings.info

@@ -22,6 +22,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import ENGINES
 from gritd.estimator.filter.engine import make_engine
+from gritd.estimator.filter.estimate import STATES
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.batch import estimates
@@ -266,26 +267,28 @@ def update(subject: Subject) -> Figures:
     ):  # into the first steady stretch
         state, account = tracker.step(state, snapshot)
     estimate, measurement = state.estimate, tracker.measurement
-    offered = measurement.linearise(account.now, measurement.predict(estimate, account.now))
+    offered = measurement.linearise(
+        account.now, measurement.predict(estimate, account.now), estimate
+    )
 
     def cost(engine: str) -> float:
-        apply = make_engine(engine, measurement.variances).update
+        apply = make_engine(engine).update
         return (
             statistics.median(
-                subject.repeated(lambda: [apply(estimate, offered, False) for _ in range(200)])
+                subject.repeated(lambda: [apply(estimate, offered) for _ in range(200)])
             )
             / 200
         )
 
     costs = {engine: cost(engine) for engine in ENGINES}
-    alone = peers.filterpy_alone(estimate, offered, measurement.variances)
+    alone = peers.filterpy_alone(estimate, offered)
     alone_cost = statistics.median(subject.repeated(lambda: [alone() for _ in range(200)])) / 200
     return {
         **costs,
         "ratio": costs["filterpy"] / costs["plain"],
         "filterpy_alone": alone_cost,
         "over_filterpy_alone": alone_cost / costs["plain"],
-        "nuisances": len(measurement.variances),
+        "nuisances": len(estimate.x) - STATES,
     }
 
 

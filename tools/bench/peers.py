@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer
 
-from gritd.estimator.filter.estimate import STATES, Estimate, Update
+from gritd.estimator.filter.estimate import Estimate, Update
 from gritd.estimator.recording.blocks import Unpacker
 from gritd.estimator.recording.cdr import Topic
 from gritd.estimator.recording.salvage import read
@@ -124,19 +124,16 @@ def write_by_rosbags(path: Path, messages: Encoded) -> None:
             writer.write(connections[name], time, data)
 
 
-def filterpy_alone(
-    estimate: Estimate, update: Update, variances: tuple[float, ...]
-) -> Callable[[], object]:
-    """filterpy's ExtendedKalmanFilter on the same vectors, without considered states, as its
-    documentation uses it: a filter that is there already takes one measurement.
+def filterpy_alone(estimate: Estimate, update: Update) -> Callable[[], object]:
+    """filterpy's ExtendedKalmanFilter on the same vectors, as its documentation uses it: a filter
+    that is there already takes one measurement.
     """
     kalman = import_module("filterpy.kalman")
-    size = STATES + len(variances)
+    size = len(estimate.x)
     ekf = kalman.ExtendedKalmanFilter(dim_x=size, dim_z=len(update.innovation))
     ekf.x = np.zeros(size)
-    ekf.P = np.diag([*np.diag(np.array(estimate.P)), *variances])
-    H = np.array([h + g for h, g in zip(update.H, update.G, strict=True)])
-    y, R = np.array(update.innovation), np.array(update.R)
+    ekf.P = np.array(estimate.P)
+    y, H, R = (np.array(part) for part in update)
     start = ekf.x.copy(), ekf.P.copy()
 
     def apply() -> object:

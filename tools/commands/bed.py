@@ -52,7 +52,7 @@ def lines(folder: Path, bed: Bed | None) -> Iterator[str]:
         yield "  the next run begins with the stated prior"
         return
 
-    x, P, _ = bed.known.estimate
+    x, P = bed.known.estimate.x, bed.known.estimate.soil_P
     yield f"  c        {x[C] * KPA:.0f} ± {sqrt(P[C][C]) * KPA:.0f} Pa"
     yield f"  tan φ    {x[TAN_PHI]:.4f} ± {sqrt(P[TAN_PHI][TAN_PHI]):.4f}"
 

@@ -113,8 +113,8 @@ def report(figures: dict[str, Figures]) -> str:
             f"quadrature {_µs(f['quadrature_in_batch'])}: "
             f"ratio {f['ratio_in_batch']:.1f}",
             f"update     filterpy {_µs(u['filterpy'])}, plain {_µs(u['plain'])}: "
-            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} nuisances); filterpy without Schmidt's "
-            f"gain {_µs(u['filterpy_alone'])}: ratio {u['over_filterpy_alone']:.1f}",
+            f"ratio {u['ratio']:.1f} ({u['nuisances']:.0f} errors beside the soil); filterpy alone "
+            f"{_µs(u['filterpy_alone'])}: ratio {u['over_filterpy_alone']:.1f}",
             f"recording  a message: write {_µs(m['write'])}, "
             f"read as arrays {_µs(m['read_as_arrays'])}, "
             f"one by one {_µs(m['read_one_by_one'])}, {m['bytes']:.0f} bytes",

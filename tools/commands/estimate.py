@@ -186,8 +186,8 @@ def _pair(estimate: Estimate) -> tuple[str, str]:
 
 def _values(estimate: Estimate) -> tuple[float, float, float, float, float, float, float]:
     """c ± σ [Pa], tan φ ± σ, k ± σ [m], correlation of c and tan φ."""
-    x, P, _ = estimate
-    sigma = [sqrt(max(P[i][i], 0.0)) for i in range(len(x))]
+    x, P = estimate.x, estimate.soil_P
+    sigma = [sqrt(max(P[i][i], 0.0)) for i in range(len(P))]
     k = exp(x[LN_K])
 
     product = sigma[C] * sigma[TAN_PHI]
@@ -263,7 +263,7 @@ def _run_json(run: BedRun) -> dict[str, Any]:
         "file": str(run.recording.path),
         "load": run.settings.load.nominal.value,
         "used": run.counts,
-        "alone": _json(Known(run.alone.estimate, 1)),
+        "alone": _json(Known(run.alone.bank, 1)),
         "together": _json(run.known),
         "chi_square": run.surprise,
     }

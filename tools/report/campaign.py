@@ -81,7 +81,7 @@ def _title(campaign: Campaign) -> Markup:
 
 def _summary(campaign: Campaign) -> str:
     """Soil, and how far both forms of the equations are off."""
-    x, P, _ = campaign.estimate
+    x, P = campaign.estimate.x, campaign.estimate.soil_P
     c, tan_phi = (x[i] for i in (C, TAN_PHI))
     sigma_c, sigma_t = (sqrt(P[i][i]) for i in (C, TAN_PHI))
     together = "together know" if len(campaign.runs) > 1 else "knows"

@@ -12,7 +12,7 @@ from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import Bed, BedError
 from gritd.estimator.daemon.daemon import Daemon
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.bank import Bank
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
@@ -31,7 +31,7 @@ class BedOfRun:
     began: float  # [s since the epoch]
 
     @property
-    def start(self) -> Estimate | None:
+    def start(self) -> Bank | None:
         """What the run begins with; None for the stated prior."""
         return bed_file.start_of(self.bed, self.settings, self.began)
 
@@ -51,9 +51,9 @@ class BedOfRun:
         if reason := self._nothing_learnt(daemon):
             return f"bed {self.bed.name!r}: this run adds nothing: {reason}"
 
-        assert daemon.loop.estimate is not None
+        assert daemon.loop.bank is not None
         after = bed_file.after(
-            self.bed, self.settings, daemon.loop.estimate, self.began, time.time()
+            self.bed, self.settings, daemon.loop.bank, self.began, time.time()
         )
 
         try:
@@ -63,7 +63,7 @@ class BedOfRun:
         return f"bed {self.bed.name!r}: {after.runs} runs now"
 
     def _nothing_learnt(self, daemon: Daemon) -> str:
-        if daemon.loop.estimate is None or daemon.loop.latest is None:
+        if daemon.loop.bank is None or daemon.loop.latest is None:
             return "it had no tick"
 
         settings = settings_of_run(daemon.configuration.settings, daemon.run)

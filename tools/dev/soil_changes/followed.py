@@ -44,7 +44,7 @@ def followed(case: Case) -> Track:
         if account.status not in UPDATED:
             continue
         estimate = account.estimate
-        covariance = np.array(estimate.P)[: TAN_PHI + 1, : TAN_PHI + 1]
+        covariance = np.array(estimate.soil_P)[: TAN_PHI + 1, : TAN_PHI + 1]
         error = np.array(
             (
                 estimate.x[C] - case.cohesion[number] / KPA,

@@ -1,0 +1,58 @@
+"""The same record under several sizes of the error of form, weighed by what they foretold.
+
+How far the equations are from a rig is not known before the run (form_error.py). A member of the
+bank is the filter with one size of that error. The density that a member gave to what was then
+measured is its evidence: where the equations fit, the smallest size foretells best; where they do
+not, a larger one does. With little driven, all of them count, and what is told is as uncertain as
+that.
+
+A misfit shows only in part. What c, tan φ, k and the calibrations can imitate they take for
+themselves, and of what is left out of the physics that is most. So the size that is seen is not
+that of the misfit: where any is seen, what is told is what the largest size leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import exp, log
+
+from gritd.estimator.filter.estimate import Estimate, Vector, mixed
+from gritd.estimator.filter.tuning import FORM
+
+Bank = tuple[Estimate, ...]  # one a size, in the order of FORM.sizes
+
+
+def weights(bank: Bank) -> Vector:
+    """Probability of each size."""
+    scores = [
+        log(odds) + member.log_evidence for odds, member in zip(FORM.odds, bank, strict=True)
+    ]
+    best = max(scores)
+    each = [exp(score - best) for score in scores]
+    total = _sum(each)
+    return tuple([value / total for value in each])
+
+
+def told(bank: Bank) -> Estimate:
+    """What the members say together."""
+    exact = weights(bank)[0]
+    return mixed((bank[0], bank[-1]), (exact, 1.0 - exact))
+
+
+def leading(bank: Bank) -> int:
+    """Number of the most probable member."""
+    each = weights(bank)
+    return max(range(len(each)), key=each.__getitem__)
+
+
+def misfit(bank: Bank) -> float:
+    """Probability that the equations miss as much as the largest size says."""
+    return weights(bank)[-1]
+
+
+def _sum(values: Sequence[float]) -> float:
+    """Term by term: newer versions of Python compensate what `sum` rounds."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total

@@ -220,3 +220,20 @@ def scalar(node: Node, expected: str) -> str:
 
 def tag(node: Node) -> str:
     return node.tag if isinstance(node, Scalar) else ""
+
+
+@dataclass(frozen=True)
+class Either:
+    """A word, read as None, or a value of another kind."""
+
+    word: str
+    other: Kind
+
+    @property
+    def expected(self) -> str:
+        return f"{self.word}, or {self.other.expected}"
+
+    def read(self, node: Node) -> tuple[Any, Node]:
+        if isinstance(node, Scalar) and node.text == self.word:
+            return None, node
+        return self.other.read(node)

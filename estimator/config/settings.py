@@ -140,6 +140,8 @@ class Rates:
     tick: float = 250.0  # [Hz]
     update: float = 10.0  # [Hz] filter updates; the averaging window is 1/update
     horizon: float = 0.05  # [s] a tick describes the bed this long ago
+    # whether the pipeline chooses the window by what the encoders read (wheel/window_choice.py)
+    auto: bool = False
 
 
 @dataclass(frozen=True)

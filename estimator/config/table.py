@@ -17,7 +17,16 @@ from typing import Any
 from gritd.estimator.config.channels import channels
 from gritd.estimator.config.devices import NAME, device
 from gritd.estimator.config.discrepancy import discrepancy
-from gritd.estimator.config.kinds import UNLIMITED, Choice, Integer, Interval, Kind, Quantity, Text
+from gritd.estimator.config.kinds import (
+    UNLIMITED,
+    Choice,
+    Either,
+    Integer,
+    Interval,
+    Kind,
+    Quantity,
+    Text,
+)
 from gritd.estimator.config.names import EXPECTED, PATTERN
 from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.config.schema import (
@@ -158,12 +167,14 @@ def _load(nominal: Uncertain, minimum: float) -> Load:
 
 # ---- rates, filter, logging, effects, run --------------------------------------------------------
 
+AUTO = "auto"
 RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
     "update": Key(
-        Quantity("Hz", low=0.01, high=1000),
-        "updates of the filter; its window is 1/update",
-        "10 Hz",
+        Either(AUTO, Quantity("Hz", low=0.01, high=1000)),
+        "updates of the filter; its window is 1/update. auto: a window of 0.1 to 3.2 s, as short as "
+        "the noise of slip allows",
+        AUTO,
     ),
     "horizon": Key(
         Quantity("s", above=0, high=1), "a tick describes the bed this long ago", "50 ms"
@@ -260,7 +271,9 @@ def _run(name: str, load: float | None, start: float, **values: Any) -> RunInfo:
     return RunInfo(name, load, values["pass"], start, values["notes"], operator=values["operator"])
 
 
-def _rates(tick: float, update: float, horizon: float) -> Rates:
+def _rates(tick: float, update: float | None, horizon: float) -> Rates:
+    if update is None:
+        return Rates(tick, horizon=horizon, auto=True)
     ratio = tick / update
     if round(ratio) < 2 or abs(ratio - round(ratio)) > 1e-9 * ratio:
         raise Impossible(

@@ -24,9 +24,7 @@ Bank = tuple[Estimate, ...]  # one a size, in the order of FORM.sizes
 
 def weights(bank: Bank) -> Vector:
     """Probability of each size."""
-    scores = [
-        log(odds) + member.log_evidence for odds, member in zip(FORM.odds, bank, strict=True)
-    ]
+    scores = [log(odds) + member.log_evidence for odds, member in zip(FORM.odds, bank, strict=True)]
     best = max(scores)
     each = [exp(score - best) for score in scores]
     total = _sum(each)

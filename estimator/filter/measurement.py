@@ -330,9 +330,7 @@ def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
     )
 
 
-def _added(
-    chain: Chain, now: WheelState, rim: Prediction, x: tuple[float, float, float]
-) -> Added:
+def _added(chain: Chain, now: WheelState, rim: Prediction, x: tuple[float, float, float]) -> Added:
     """What the effects add to the rim's torque and pull, with its slope along x = (c, tan φ, k)."""
 
     def added(x: tuple[float, float, float], torque: float, pull: float) -> tuple[float, float]:

@@ -83,9 +83,7 @@ class WheelModel:
             Quantity(p.resistance, *p.resistance_gradient),
         )
 
-    def _at(
-        self, k: float, theta_1: float, slip: float, form: FormError
-    ) -> linear.Shift | None:
+    def _at(self, k: float, theta_1: float, slip: float, form: FormError) -> linear.Shift | None:
         return None if self._shift is None else self._shift.at(k, theta_1, slip, *form)
 
     def _moved(self, form: FormError) -> Wheel:

@@ -71,4 +71,3 @@ def _root(variance: float) -> float:
     if not variance > 0.0:
         raise ZeroDivisionError("the covariance of the innovations is singular")
     return sqrt(variance)
-

@@ -23,6 +23,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import cos, log, pi
+
 import numpy as np
 
 from gritd.estimator.effects import in_order
@@ -98,9 +99,7 @@ class IntegralShift:
         t0, t1, t2, t3, t4, t5, t6 = self._table(theta_1, slip)  # each (3, 8)
 
         by_n, by_peak = t3 + ln_k * t4, t5 + ln_k * t6
-        value, by_theta_1, by_slip = (
-            t0 + ln_k * (t1 + ln_k * t2) + exponent * by_n + peak * by_peak
-        )
+        value, by_theta_1, by_slip = t0 + ln_k * (t1 + ln_k * t2) + exponent * by_n + peak * by_peak
         by_slip = by_slip + c2 * by_peak[0]
         by_ln_k = t1[0] + (2.0 * ln_k) * t2[0] + exponent * t4[0] + peak * t6[0]
         if ln_k != far:

@@ -14,7 +14,7 @@ from gritd.estimator.filter.trust import Trust
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.tick import Aid
 from gritd.estimator.stages.situation import Recall
-from gritd.estimator.wheel.wheel_state import WheelState
+from gritd.estimator.wheel.wheel_state import Steady, WheelState
 
 
 class Ended(NamedTuple):
@@ -73,6 +73,8 @@ class TrackState(NamedTuple):
     estimate: Estimate  # what the members of the bank say together
     bank: Bank
     memory: Memory
+    window: int  # [ns] length of a window
+    choosing: bool  # whether that is one from which another length is to be chosen
     recall: Mapping[str, Recall]  # what configured effects remember, by name
     columns: Columns = ()  # of the uncertain effect parameters, at the last update
     linearised: Vector | None = None  # where the memory was linearised last
@@ -80,6 +82,7 @@ class TrackState(NamedTuple):
     began: int = -1  # end of the first window [ns]
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
+    steady: Steady | None = None  # None where the last window was not ready
     trust: Trust = Trust()
     updates: int = 0
     resets: int = 0

@@ -39,8 +39,13 @@ from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import Flag, Status
 from gritd.estimator.messages.tick import Aid
 from gritd.estimator.wheel.chain import Context
-from gritd.estimator.wheel.sync import Snapshot
-from gritd.estimator.wheel.wheel_state import WheelState, classify, required_bits
+from gritd.estimator.wheel.sync import Snapshot, window_at_first
+from gritd.estimator.wheel.wheel_state import (
+    WheelState,
+    classify,
+    required_bits,
+    steady_since,
+)
 
 KNOWN = 0.7  # posterior over prior σ of ln k below which the run has told of k
 SEPARABLE = 0.5  # posterior over prior σ in the weakest direction of (c, tan φ)
@@ -70,10 +75,7 @@ class Tracker:
         self.settings = settings
         self.measurement = Measurement(settings)
         self.engine = make_engine(engine or settings.filter.engine)
-        self._window = round(NS / settings.rates.update)
         self._required = required_bits(settings)
-        # half of what the memory of innovations holds of one component
-        self._experienced = 0.5 * TRUST.memory * NS / self._window
         soil = settings.soil
         self._prior_sigma = (
             soil.cohesion.sigma / KPA,
@@ -90,7 +92,14 @@ class Tracker:
     def start(self) -> TrackState:
         """The prior."""
         bank = self.prior_bank
-        return TrackState(self.prior, bank, Memory(bank), self.measurement.chain.fresh_memory())
+        return TrackState(
+            self.prior,
+            bank,
+            Memory(bank),
+            window_at_first(self.settings),
+            self.settings.rates.auto,
+            self.measurement.chain.fresh_memory(),
+        )
 
     def _unsure(self, factor: float = 1.0) -> Bank:
         """The prior, the soil's standard deviations so many times."""
@@ -118,17 +127,17 @@ class Tracker:
         filter. In the ticks between, a share of what is done with the record.
         """
         elapsed = 0.0 if state.window_end < 0 else (snapshot.evaluated - state.window_end) / NS
-        closes = state.window_end < 0 or snapshot.evaluated - state.window_end >= self._window
+        closes = state.window_end < 0 or snapshot.evaluated - state.window_end >= state.window
         if state.task is not None:
             state = self.reviewed(state) if closes else self._concluded(self.reviewer.step(state))
 
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
-        status = classify(self.settings, snapshot, now, state.before, self._required, state.started)
+        status = classify(self.settings, snapshot, now, state.steady, self._required, state.started)
         aids: tuple[Aid, ...] = ()
         if closes:
             state = self._closed(state, snapshot, now, elapsed)
-            if status == Status.TRACKING:
+            if status == Status.TRACKING and not state.choosing:
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state, now, elapsed)
 
@@ -158,7 +167,7 @@ class Tracker:
     ) -> Account:
         """What is told: the filter's estimate where it is believed, else the prior and why."""
         separability = self.separability(state.estimate)
-        standing = state.trust.standing(self._experienced, separability)
+        standing = state.trust.standing(_experienced(state), separability)
         believed = standing == Status.TRACKING
         told = separability if believed else 1.0
 
@@ -184,6 +193,9 @@ class Tracker:
             window_end=snapshot.evaluated,
             began=snapshot.evaluated if state.began < 0 else state.began,
             before=now if snapshot.ready else None,
+            steady=steady_since(state.steady, now, snapshot.wheel_angle)
+            if snapshot.ready
+            else None,
             recall=recall,
             started=state.started or snapshot.ready,
             origin=snapshot.carriage_position
@@ -267,7 +279,7 @@ class Tracker:
         """Back to the prior, or a wider one, when the mean square of the innovations is above the
         reset threshold and no change of the soil explained them.
         """
-        if not state.trust.inconsistent(self._experienced):
+        if not state.trust.inconsistent(_experienced(state)):
             return state
 
         trust = state.trust.reset()
@@ -297,7 +309,7 @@ class Tracker:
 
     def _flags(self, state: TrackState, aids: tuple[Aid, ...], separability: float) -> int:
         trust = state.trust
-        disagrees = trust.disagrees(self._experienced)
+        disagrees = trust.disagrees(_experienced(state))
         torque, drawbar_pull = trust.surprise
 
         return (
@@ -310,6 +322,11 @@ class Tracker:
             + Flag.TORQUE_OFF * (disagrees and torque >= drawbar_pull)
             + Flag.DRAWBAR_PULL_OFF * (disagrees and torque < drawbar_pull)
         )
+
+
+def _experienced(state: TrackState) -> float:
+    """Half of what the memory of innovations holds of one component."""
+    return 0.5 * TRUST.memory * NS / state.window
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:

@@ -8,8 +8,7 @@ tracker is that of the live loop.
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import nan
 from struct import Struct
 from typing import Annotated, NamedTuple
@@ -23,7 +22,6 @@ from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.estimate import Estimate
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Account, Tracker
-from gritd.estimator.messages.readings import NS
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import (
     TICK_FIELDS,
@@ -34,12 +32,13 @@ from gritd.estimator.messages.tick import (
     names_of,
     row,
 )
+from gritd.estimator.offline.run_window import Windows, windows
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.offline.streams import RecordedStreams, recorded_streams
-from gritd.estimator.offline.windows import Ints
 from gritd.estimator.online.bed import begun
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
+from gritd.estimator.wheel.sync import Snapshot
 
 Table = NDArray[np.void]  # structured
 
@@ -136,23 +135,24 @@ def followed(
     and how many there are.
     """
     pipeline = Pipeline(settings, engine)
-    chosen = window_ends(streams.ticks, round(NS / pipeline.settings.rates.update))
-
-    tracker = pipeline.tracker
+    tracker, settings = pipeline.tracker, pipeline.settings
     state, flags = tracker.start(), 0
     state = state if start is None else begun(state, start)
     tables = [np.empty(0, _WINDOW_DTYPE)]
 
     rows: list[bytes] = []
-    for begin in range(0, len(chosen), AT_ONCE):
-        seen = snapshots(pipeline.settings, streams, chosen[begin : begin + AT_ONCE])
-        for done, snapshot in enumerate(seen, begin + 1):
+    every = windows(settings, streams)
+    total, done = sum(len(part.ends) for part in every), 0
+    for part in every:
+        state = state._replace(window=part.length, choosing=part.choosing)
+        for snapshot in _snapshots(settings, streams, part):
             state, account = tracker.step(state, snapshot)
             rows.append(_PACK(*row(_window(tracker, state, account))))
-            if done % ROWS == 0 or done == len(chosen):
+            done += 1
+            if done % ROWS == 0 or done == total:
                 tables.append(np.frombuffer(b"".join(rows), _WINDOW_DTYPE))
                 rows, flags = [], account.flags
-            advance(done, len(chosen))
+            advance(done, total)
 
     state = tracker.reviewed(state)
     return Replayed(
@@ -162,15 +162,11 @@ def followed(
     )
 
 
-def window_ends(ticks: Ints, length: int) -> Ints:
-    """Numbers (m,) of the ticks (k,) [ns] that end a window of `length` [ns]: the first, then each
-    that comes a window later.
-    """
-    ends, following = [], 0
-    while following < len(ticks):
-        ends.append(following)
-        following = bisect_left(ticks, ticks[following] + length, following)
-    return np.array(ends, dtype=np.int64)
+def _snapshots(settings: Settings, streams: RecordedStreams, part: Windows) -> Iterator[Snapshot]:
+    """What each window shows; so many at once."""
+    for begin in range(0, len(part.ends), AT_ONCE):
+        ends = part.ends[begin : begin + AT_ONCE]
+        yield from snapshots(settings, streams, ends, part.length)
 
 
 def _window(tracker: Tracker, state: TrackState, account: Account) -> Window:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.messages.readings import ENCODERS, NS
+from gritd.estimator.offline.run_window import window_length
 from gritd.estimator.offline.snapshots import Series, View
 from gritd.estimator.offline.streams import RecordedStreams, streams_at
 from gritd.estimator.offline.windows import Bools
@@ -37,9 +38,8 @@ def recorded_motion(recording: Recording, settings: Settings, rate: float) -> Mo
 
     time, columns, known = _windows(settings, streams_at(recording, rate))
     if np.count_nonzero(known) < 2:
-        window = f"{1.0 / settings.rates.update:g} s"
         raise RecordingError(
-            f"{recording.path}: channels overlap for less than {window}; expected more"
+            f"{recording.path}: channels overlap for less than a window; expected more"
         )
 
     inside = slice(np.flatnonzero(known)[0], np.flatnonzero(known)[-1] + 1)
@@ -64,17 +64,20 @@ def _windows(settings: Settings, recorded: RecordedStreams) -> tuple[Array, Arra
     """Centre of every tick's window (n,) [s], the five columns of the motion (5, n), and where all
     of them are known (n,).
     """
-    parts = list(_parts(settings, recorded))
+    parts = list(_parts(settings, recorded, window_length(settings, recorded)))
     if not parts:
         return np.zeros(0), np.zeros((5, 0)), np.zeros(0, bool)
     time, columns, known = zip(*parts, strict=True)
     return np.concatenate(time), np.concatenate(columns, axis=1), np.concatenate(known)
 
 
-def _parts(settings: Settings, recorded: RecordedStreams) -> Iterator[tuple[Array, Array, Bools]]:
+def _parts(
+    settings: Settings, recorded: RecordedStreams, length: int
+) -> Iterator[tuple[Array, Array, Bools]]:
     began = max(int(recorded.streams[name].stamp.min()) for name in ENCODERS)
     for start in range(0, len(recorded.ticks), AT_ONCE):
-        view = View(settings, recorded, np.arange(start, min(start + AT_ONCE, len(recorded.ticks))))
+        ticks = np.arange(start, min(start + AT_ONCE, len(recorded.ticks)))
+        view = View(settings, recorded, ticks, length)
         wheel = view.slope("wheel_encoder", 1.0)
         carriage = view.slope("carriage_encoder", settings.pulley_radius)
         load = _load(settings, recorded, view)

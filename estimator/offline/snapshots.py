@@ -22,21 +22,34 @@ from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.offline.windows import Bools, Ints, Lines, Members, lines, members
 from gritd.estimator.terramechanics.soil import Array
-from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot
-from gritd.estimator.wheel.windows import DITHER, ENOUGH
+from gritd.estimator.wheel.sync import STUCK_AFTER, Measured, Snapshot, window_at_first
+from gritd.estimator.wheel.windows import DITHER, ENOUGH, Sample
+
+
+def encoder_samples(
+    settings: Settings, recorded: RecordedStreams, tick: int, length: int
+) -> dict[str, list[Sample]]:
+    """What each encoder read in the window of `length` [ns] that ends at a tick of this number."""
+    view = View(settings, recorded, np.array([tick]), length)
+    return {name: view.samples(name) for name in ENCODERS}
+
 
 ANALOGUE = ("sinkage_pot", "motor_shunt")
 NEVER = -(1 << 62)  # [ns]
 AT_ONCE = 500  # windows that are numbers of Python at a time
 
 
-def snapshots(settings: Settings, recorded: RecordedStreams, chosen: Ints) -> Iterator[Snapshot]:
+def snapshots(
+    settings: Settings, recorded: RecordedStreams, chosen: Ints, length: int | None = None
+) -> Iterator[Snapshot]:
     """What Sync says at the ticks numbered `chosen`, shape (m,), ascending; equal to rounding.
+
+    length: of the windows [ns]; default: as a run begins.
 
     They are handed out one by one: as numbers of Python a window takes ten times its place in an
     array, and a heap of them is walked over and over by the garbage collector.
     """
-    view = View(settings, recorded, chosen)
+    view = View(settings, recorded, chosen, length or window_at_first(settings))
     wheel = view.slope("wheel_encoder", 1.0)
     carriage = view.slope("carriage_encoder", settings.pulley_radius)
     means = {name: view.mean(name) for name in settings.channels if name not in ENCODERS}
@@ -143,14 +156,16 @@ def _followed(values: Array, near: Array) -> tuple[list[float], list[bool]]:
 class View:
     """A recording seen through the windows that end at chosen ticks."""
 
-    def __init__(self, settings: Settings, recorded: RecordedStreams, chosen: Ints) -> None:
+    def __init__(
+        self, settings: Settings, recorded: RecordedStreams, chosen: Ints, length: int
+    ) -> None:
         self._settings = settings
         self._streams = recorded.streams
         self._chosen = chosen
         self._ticks = recorded.ticks[chosen]
         # ends of the windows of all ticks [ns]
         self._closed = recorded.ticks - round(settings.rates.horizon * NS)
-        self.length = round(NS / settings.rates.update)
+        self.length = length
         self.ends = self._closed[chosen]
         nan, zero = np.full(len(chosen), np.nan), np.zeros(len(chosen))
         self.nothing = Motion(nan, zero, zero > 0, np.zeros(len(chosen), np.int64), nan)
@@ -250,6 +265,18 @@ class View:
             accepted.still(self.ends),
             np.where(known, position, np.nan),
         )
+
+    def samples(self, name: str) -> list[Sample]:
+        """What an encoder read in the last of the windows."""
+        channel, stream = self._settings.channels[name], self._streams[name]
+        every = np.full(stream.stamp.shape, True)
+        accepted = self._accepted(stream, stream.values, every, channel.latency)
+        if accepted is None:
+            return []
+        stamp, counts, members = self._rebaselined(accepted, channel.max_rate)
+        inside = slice(members.first[-1], members.last[-1] + 1)
+        pairs = zip(stamp[inside].tolist(), counts[inside].tolist(), strict=True)
+        return [Sample(*pair) for pair in pairs]
 
     def _accepted(
         self, stream: Stream, values: NDArray[Any], valid: Bools, latency: float

@@ -58,6 +58,8 @@ def carry_over(pipeline: Pipeline, state: State, before: Settings) -> State:
     recall = {name: old.recall.get(name, value) for name, value in fresh.track.recall.items()}
     origin = None if old.origin is None else _read_anew(old.origin, before, pipeline.settings)
     track = fresh.track._replace(
+        window=old.window,
+        choosing=old.choosing,
         updates=old.updates,
         resets=old.resets,
         resets_told=old.resets,

@@ -22,7 +22,8 @@ from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import Head, LargestPull, Tick, TickRow, row
 from gritd.estimator.wheel.chain import with_latencies
-from gritd.estimator.wheel.sync import Sync
+from gritd.estimator.wheel.sync import Snapshot, Sync
+from gritd.estimator.wheel.window_choice import driving, window_of
 
 MOST = (1 << 32) - 1  # a tick's counters go so far
 
@@ -40,6 +41,7 @@ class State:
     first: int = -1  # time of the first tick [ns]
     late: int = 0
     jumps: int = 0
+    driven: Snapshot | None = None  # the last window, while its length is being chosen
 
 
 class Pipeline:
@@ -62,6 +64,9 @@ class Pipeline:
             sync.push(reading)
 
         track, account = self.tracker.step(state.track, sync.snapshot(t))
+        driven = state.driven
+        if track.choosing and track.window_end == account.snapshot.evaluated:
+            track, driven = self._chosen(sync, track, account.snapshot, driven)
 
         search, pull = state.search, state.pull
         if search is not None:
@@ -71,8 +76,17 @@ class Pipeline:
 
         first = t if state.first < 0 else state.first
         late, jumps = sync.counters.late, sync.counters.jumps
-        after = State(sync, track, search, pull, first, late, jumps)
+        after = State(sync, track, search, pull, first, late, jumps, driven)
         return after, row(self._tick(state, after, account, len(readings), t))
+
+    def _chosen(
+        self, sync: Sync, track: TrackState, now: Snapshot, before: Snapshot | None
+    ) -> tuple[TrackState, Snapshot | None]:
+        """The length of the windows, once wheel and carriage drive."""
+        if not driving(now, before):
+            return track, now
+        sync.resize(window_of(self.settings, now, sync.samples()))
+        return track._replace(window=sync.length, choosing=False), None
 
     def _tick(self, before: State, after: State, account: Account, consumed: int, t: int) -> Tick:
         """What the tick at t [ns] says."""

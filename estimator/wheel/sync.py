@@ -17,8 +17,17 @@ from typing import Any, NamedTuple
 from gritd.estimator.config.settings import Channel, Settings
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.status import CHANNEL_BITS
-from gritd.estimator.wheel.windows import Counters, Mean, MeanWindow, Slope, SlopeWindow
+from gritd.estimator.wheel.windows import (
+    Counters,
+    Mean,
+    MeanWindow,
+    Sample,
+    Slope,
+    SlopeWindow,
+    Window,
+)
 
+PROBE = NS  # [ns] length of the windows from which another is chosen (window_choice.py)
 STUCK_AFTER = int(0.34 * NS)  # [ns] a live sensor shows noise or motion sooner than this
 
 
@@ -53,6 +62,13 @@ class Snapshot(NamedTuple):
     stuck: int  # CHANNEL_BITS of channels that stand still while others move
 
 
+def window_at_first(settings: Settings) -> int:
+    """Length of a run's first windows [ns]: the configured one, or that from which one is
+    chosen.
+    """
+    return PROBE if settings.rates.auto else round(NS / settings.rates.update)
+
+
 class Sync:
     """The sorted windows of all channels. `push` takes readings, `snapshot` closes the windows for
     one tick.
@@ -64,10 +80,10 @@ class Sync:
         self.received: dict[str, int] = {}
 
         self._horizon = round(settings.rates.horizon * NS)
-        self._length = round(NS / settings.rates.update)
+        self.length = window_at_first(settings)  # [ns]
         self._slopes = {name: self._slope_window(settings.channels[name]) for name in _ENCODERS}
         self._means = {
-            name: MeanWindow(channel.noise, round(channel.latency * NS), self._length)
+            name: MeanWindow(channel.noise, round(channel.latency * NS), self.length)
             for name, channel in settings.channels.items()
             if name not in _ENCODERS
         }
@@ -80,11 +96,24 @@ class Sync:
         if settings.wrench is not None:
             self._stale_after["wrench"] = round(settings.wrench.stale_after * NS)
 
+    def resize(self, length: int) -> None:
+        """Windows of another length [ns] from the next snapshot on."""
+        self.length = length
+        for window in self._windows():
+            window.length = length
+
+    def samples(self) -> dict[str, list[Sample]]:
+        """What each encoder read in the window."""
+        return {name: list(window.inside) for name, window in self._slopes.items()}
+
+    def _windows(self) -> tuple[Window, ...]:
+        return (*self._slopes.values(), *self._means.values(), *self._wrench.values())
+
     def _slope_window(self, channel: Channel) -> SlopeWindow:
         return SlopeWindow(
             channel.noise,
             round(channel.latency * NS),
-            self._length,
+            self.length,
             max_rate=channel.max_rate,
             counters=self.counters,
         )
@@ -95,7 +124,7 @@ class Sync:
             return {}
         latency = round(wrench.latency * NS)
         noises = {"fx": wrench.force_noise, "fz": wrench.force_noise, "ty": wrench.torque_noise}
-        return {axis: MeanWindow(noise, latency, self._length) for axis, noise in noises.items()}
+        return {axis: MeanWindow(noise, latency, self.length) for axis, noise in noises.items()}
 
     def memory(self) -> dict[str, Any]:
         """Everything that the readings so far have left, by name; `remember` takes it in again."""
@@ -112,6 +141,7 @@ class Sync:
         self.counters, self.received = memory["counters"], memory["received"]
         for window in self._slopes.values():
             window.counters = self.counters
+        self.length = self._slopes["wheel_encoder"].length
 
     def continued(self, before: Sync) -> None:
         """Begin with empty windows where another sync ends: its counters and its encoders'
@@ -119,6 +149,7 @@ class Sync:
         """
         self.received = before.received
         self.counters = before.counters
+        self.resize(before.length)
         for name, window in self._slopes.items():
             window.counters, window.shift = self.counters, before._slopes[name].shift
 
@@ -162,7 +193,7 @@ class Sync:
     def snapshot(self, t: int) -> Snapshot:
         """Close all windows at t − horizon [ns] and evaluate them at their common centre."""
         end = t - self._horizon
-        for window in (*self._slopes.values(), *self._means.values(), *self._wrench.values()):
+        for window in self._windows():
             window.advance(end)
 
         wheel = self._slopes["wheel_encoder"].slope()
@@ -176,7 +207,7 @@ class Sync:
         temperature = means.get("motor_temperature")
 
         return Snapshot(
-            evaluated=end - self._length // 2,
+            evaluated=end - self.length // 2,
             ready=None not in sought,
             wheel_angle=angle,
             wheel_speed=speed,

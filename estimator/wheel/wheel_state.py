@@ -31,7 +31,7 @@ STALL_SLIP = 0.95
 LOAD_SIGMA_MAX = 0.1  # likewise, relative error of the load
 SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an update
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
-# relative change of speed or load from window to window; Eqs. 1–22 hold in steady motion
+# relative change of speed, load or sinkage in steady motion, in which Eqs. 1–22 hold
 STEADY = 0.05
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
@@ -187,20 +187,24 @@ def classify(
     settings: Settings,
     snapshot: Snapshot,
     now: WheelState,
-    before: WheelState | None,
+    since: Steady | None,
     needed: int,
     started: bool = True,
 ) -> Status:
     """TRACKING, or the first reason that applies why the window is not used.
 
-    needed: CHANNEL_BITS; started: whether every required channel has filled a window once.
+    since: since when the motion is steady; needed: CHANNEL_BITS; started: whether every required channel has filled a window once.
     """
     if snapshot.stale & needed or not snapshot.ready or _unread(settings, now):
         return Status.STALE if started else Status.STARTING
     if snapshot.stuck & needed:
         return Status.STUCK
 
-    return _contact(settings, now) or _travel(settings, now) or _steadiness(now, before)
+    return (
+        _contact(settings, now)
+        or _travel(settings, now)
+        or _steadiness(now, since, snapshot.wheel_angle)
+    )
 
 
 def _unread(settings: Settings, now: WheelState) -> bool:
@@ -233,7 +237,7 @@ def _travel(settings: Settings, now: WheelState) -> Status | None:
     return None
 
 
-def _steadiness(now: WheelState, before: WheelState | None) -> Status:
+def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> Status:
     # a wheel that is in as deep as its axle, or deeper, has no entry angle
     if now.theta_1.value >= pi / 2.0:
         return Status.UNCERTAIN
@@ -243,19 +247,37 @@ def _steadiness(now: WheelState, before: WheelState | None) -> Status:
         return Status.UNCERTAIN
     if now.theta_1.d_sinkage * now.sinkage.sigma > ANGLE_SIGMA_MAX * now.theta_1.value:
         return Status.UNCERTAIN
-    if before is None or not all(
-        _steady(a, b)
-        for a, b in (
-            (now.rim_speed, before.rim_speed),
-            (now.travel_speed, before.travel_speed),
-            (now.load, before.load),
-            (now.sinkage, before.sinkage),
-            (now.torque, before.torque),
-        )
-    ):
-        return Status.UNSTEADY
 
-    return Status.TRACKING
+    # what is under the rim was sheared as it is now only once the wheel has turned by θ₁
+    if since is None or not alike(now, since.state):
+        return Status.UNSTEADY
+    turned = abs(wheel_angle - since.wheel_angle)
+    return Status.TRACKING if turned >= now.theta_1.value else Status.UNSTEADY
+
+
+class Steady(NamedTuple):
+    """Since when the wheel has been in steady motion: the first window of it."""
+
+    state: WheelState
+    wheel_angle: float  # [rad]
+
+
+def steady_since(before: Steady | None, now: WheelState, wheel_angle: float) -> Steady:
+    """The same after one more window."""
+    if before is not None and alike(now, before.state):
+        return before
+    return Steady(now, wheel_angle)
+
+
+def alike(now: WheelState, before: WheelState) -> bool:
+    """Whether speeds, load and sinkage of two windows agree."""
+    pairs = (
+        (now.rim_speed, before.rim_speed),
+        (now.travel_speed, before.travel_speed),
+        (now.load, before.load),
+        (now.sinkage, before.sinkage),
+    )
+    return all([_steady(a, b) for a, b in pairs])
 
 
 def moves(speed: Measured) -> bool:
@@ -264,7 +286,5 @@ def moves(speed: Measured) -> bool:
 
 
 def _steady(now: Measured, before: Measured) -> bool:
-    """Whether two windows agree; what is not measured does not disagree."""
-    return isnan(now.value) or abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * hypot(
-        now.sigma, before.sigma
-    )
+    noise = hypot(now.sigma, before.sigma)
+    return abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * noise

@@ -52,9 +52,7 @@ class BedOfRun:
             return f"bed {self.bed.name!r}: this run adds nothing: {reason}"
 
         assert daemon.loop.bank is not None
-        after = bed_file.after(
-            self.bed, self.settings, daemon.loop.bank, self.began, time.time()
-        )
+        after = bed_file.after(self.bed, self.settings, daemon.loop.bank, self.began, time.time())
 
         try:
             bed_file.save(self.folder, after)

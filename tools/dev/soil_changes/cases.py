@@ -12,7 +12,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.readings import NS
-from gritd.estimator.offline.batch import window_ends
+from gritd.estimator.offline.run_window import window_ends
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.stages.situation import Motion

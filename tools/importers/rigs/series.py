@@ -19,6 +19,7 @@ from gritd.tools.importers.segments import START
 from gritd.tools.importers.series import binary, csv_text, written
 from gritd.tools.importers.series.columns import SeriesTable
 from gritd.tools.importers.series.convert import AXES, converted
+from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
 from gritd.tools.importers.series.mapping import SeriesMap, load
 from gritd.tools.importers.series.runs import SeriesRun, runs_of
@@ -82,7 +83,8 @@ def _import(
     """Write the configuration, then a recording a run."""
     interval = max(run.interval for run in runs)
     text, configured = written.base(mapped, given)
-    text = written.slow(text, configured, interval)
+    speeds = any(mapped.named(channel) for channel in SPEEDS)
+    text = written.slow(text, configured, interval, speeds)
     folder = given.resolve().parent if given else None
     settings = config.loads(text, configured.source, folder).settings
 

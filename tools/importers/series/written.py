@@ -50,10 +50,16 @@ def _text(mapped: SeriesMap, given: Path | None) -> tuple[str, str, Path | None]
     return filled, "rig_csv.yaml", None
 
 
-def slow(text: str, settings: config.Configuration, interval: float) -> str:
-    """The text with a filter that is no faster than readings every `interval` [s] allow."""
-    fastest = 1.0 / (WINDOW * interval)
-    if fastest >= settings.settings.rates.update:
+def slow(text: str, settings: config.Configuration, interval: float, speeds: bool) -> str:
+    """The text with a filter that is no faster than readings every `interval` [s] allow.
+
+    speeds: whether an encoder stands for a column of speeds. Its noise holds for windows of one
+    length, so that length is stated. Elsewhere a window that is to be chosen is.
+    """
+    rates, fastest = settings.settings.rates, 1.0 / (WINDOW * interval)
+    if rates.auto and not speeds:
+        return text
+    if fastest >= rates.update and not rates.auto:
         return text
     document = EditedYaml(text, settings.source)
     update = next((rate for rate in UPDATES if rate <= fastest), UPDATES[-1])
@@ -134,8 +140,10 @@ def _set_source(document: EditedYaml, imported: Imported) -> None:
     """The torque is the sensor's where there is one, since a motor's holds what the drive loses."""
     sensed = "torque" in imported.axes and imported.axes["torque"].noise > 0.0
     motor = "motor_shunt" in (*imported.channels, *imported.configured)
-    if sensed or motor:
-        document.set(("drive", "torque_source"), "wrench" if sensed else "motor_shunt")
+    pulls = "drawbar_pull" in imported.axes and imported.axes["drawbar_pull"].noise > 0.0
+    if sensed or motor or pulls:
+        source = "wrench" if sensed else "motor_shunt" if motor else "none"
+        document.set(("drive", "torque_source"), source)
 
 
 def _exact(value: float, sigma: float, unit: str) -> str:

@@ -21,7 +21,7 @@ from gritd.estimator.filter.bank import Bank
 from gritd.estimator.filter.estimate import STATES, Estimate, Vector, made
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.filter.tuning import FORM
-from gritd.estimator.online.bed import Known, after_run, before_run, fingerprint
+from gritd.estimator.online.bed import Known, Start, after_run, before_run, fingerprint
 
 FILE = "bed.json"
 DATE = "%Y-%m-%d %H:%M:%S UTC"
@@ -129,7 +129,7 @@ def useless(bed: Bed, settings: Settings, now: float) -> str:
     return ""
 
 
-def start_of(bed: Bed, settings: Settings, now: float) -> Bank | None:
+def start_of(bed: Bed, settings: Settings, now: float) -> Start | None:
     """What a run begins with; None for the stated prior."""
     if bed.known is None or useless(bed, settings, now):
         return None

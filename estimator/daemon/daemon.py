@@ -24,8 +24,8 @@ from gritd.estimator.daemon.log_sink import LogSink
 from gritd.estimator.daemon.loop import Change, Loop, Source
 from gritd.estimator.daemon.rotation import Rotation
 from gritd.estimator.daemon.scheduling import first, on_one_core, undisturbed
-from gritd.estimator.filter.bank import Bank
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.online.bed import Start
 from gritd.estimator.online.carry import needs_restart
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.topics import LOG_TOPIC, TOPICS
@@ -82,7 +82,7 @@ class Daemon:
         readers: Sequence[ReaderThread],
         source: Source,
         clock: Clock,
-        start: Bank | None = None,
+        start: Start | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self.configuration = configuration

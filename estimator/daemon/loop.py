@@ -9,10 +9,11 @@ from threading import Event
 from typing import NamedTuple, Protocol
 
 from gritd.estimator.daemon.clock import Clock
-from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.track import TrackState
+from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.estimator.messages.tick import LoopRecord, TickRow
-from gritd.estimator.online.bed import begun
+from gritd.estimator.online.bed import Start, begun
 from gritd.estimator.online.carry import carry_over
 from gritd.estimator.online.checkpoint import encode
 from gritd.estimator.online.pipeline import Pipeline, State
@@ -62,7 +63,7 @@ class Loop:
         sink: Sink,
         clock: Clock,
         configuration: str = "",
-        start: Bank | None = None,
+        start: Start | None = None,
     ) -> None:
         """start: what the run begins with in the place of the stated prior."""
         self._pipeline, self._source, self._sink, self._clock = pipeline, source, sink, clock
@@ -76,7 +77,7 @@ class Loop:
         self.latest: tuple[TickRow, LoopRecord] | None = None
         self.ticks = self.missed = 0
         self._start = start
-        self.bank: Bank | None = None  # at the end
+        self.left: TrackState | None = None  # at the end
 
     def ask(self, change: Change) -> None:
         """To be done between two ticks; from any thread."""
@@ -107,7 +108,12 @@ class Loop:
             state = self._between(state, deadline)
             deadline = self._next(deadline)
 
-        self.bank = state.track.bank
+        self.left = self._pipeline.tracker.concluded(state.track)
+
+    @property
+    def tracker(self) -> Tracker:
+        """Of the configuration that holds now."""
+        return self._pipeline.tracker
 
     def _begun(self, stamp: int) -> State:
         """The state before the first tick; logged where it is not the stated prior."""

@@ -44,8 +44,8 @@ def leading(bank: Bank) -> int:
 
 
 def misfit(bank: Bank) -> float:
-    """Probability that the equations miss as much as the largest size says."""
-    return weights(bank)[-1]
+    """Probability that the equations miss more than the smallest size says."""
+    return 1.0 - weights(bank)[0]
 
 
 def _sum(values: Sequence[float]) -> float:

@@ -37,6 +37,11 @@ class Bounds:
         at_bound = trust.at_bound + elapsed if self.improbable(estimate) else 0.0
         return trust if at_bound == trust.at_bound else trust._replace(at_bound=at_bound)
 
+    def reached(self, estimate: Estimate) -> tuple[int, ...]:
+        """Which states stand at a bound."""
+        pairs = zip(estimate.x[:STATES], self._bounds, strict=True)
+        return tuple([at for at, (value, bounds) in enumerate(pairs) if value in bounds])
+
     def improbable(self, estimate: Estimate) -> bool:
         """Whether a state stands at a bound that the prior calls improbable."""
         return any(

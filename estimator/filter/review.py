@@ -30,6 +30,7 @@ from gritd.estimator.filter.track import (
 # prior standard deviations of the soil, or of the shape of the stresses, after which the memory is
 # linearised anew
 MOVED = 0.05
+ROUNDS = 8  # of linearising a record at its end, at most
 
 # What a tick does. A memory of 36 stretches is judged, linearised and passed in 14 of the 24 ticks
 # that lie between two windows at 250 Hz and 10 Hz. A change of the soil takes tangents three times
@@ -112,6 +113,26 @@ class Reviewer:
         x = state.estimate.x
         anew = not same and self._moved(state.linearised, x)
         return state._replace(task=Relining(x, last=True) if anew else None)
+
+    def concluded(self, state: TrackState) -> TrackState:
+        """The whole record linearised at the estimate that it leads to: what a run leaves. No
+        review may be under way.
+        """
+        for _ in range(ROUNDS):
+            x, doubt = state.estimate.x, state.trust.doubt
+            memory = state.memory.along(self._smoother.tangents(state.memory.stretches, x))
+            stretches, bank = self._smoother.over(memory.anchor, memory.stretches, doubt)
+            bank = self._bounds.all_inside(bank)
+            state = state._replace(
+                estimate=told(bank),
+                bank=bank,
+                memory=memory._replace(stretches=stretches),
+                linearised=x,
+                unlinearised=0,
+            )
+            if not self._moved(x, state.estimate.x):
+                break
+        return state
 
     def _moved(self, before: Vector | None, now: Vector) -> bool:
         """Whether the estimate is so far from where the memory was linearised that its Jacobians no

@@ -85,6 +85,7 @@ class TrackState(NamedTuple):
     steady: Steady | None = None  # None where the last window was not ready
     trust: Trust = Trust()
     updates: int = 0
+    doubted: int = 0  # of `updates`, those after which the estimate was not believed
     resets: int = 0
     started: bool = False  # every required channel has filled a window once
     origin: float | None = None  # where the carriage stood in the first full window [m]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.bank import Bank, misfit, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
@@ -71,6 +71,8 @@ class Account(NamedTuple):
 class Tracker:
     """The settings turned into a filter; the state lives with the caller."""
 
+    misfit = FORM.misfit  # probability of an error of form from which on nothing is believed
+
     def __init__(self, settings: Settings, engine: str | None = None) -> None:
         self.settings = settings
         self.measurement = Measurement(settings)
@@ -88,6 +90,10 @@ class Tracker:
         self._bounds = Bounds(settings, self.prior.x[:STATES], self._prior_sigma)
         self.smoother = Smoother(settings, self.measurement, self.engine, self.prior)
         self.reviewer = Reviewer(self.smoother, self._bounds, self._scales())
+
+    def at_bound(self, estimate: Estimate) -> tuple[int, ...]:
+        """Which of c, tan φ and ln k stand at a bound."""
+        return self._bounds.reached(estimate)
 
     def start(self) -> TrackState:
         """The prior."""
@@ -142,6 +148,8 @@ class Tracker:
                 state, aids = self._update(state, now, elapsed)
 
         account = self._account(state, snapshot, now, status, aids)
+        if aids and account.flags & Flag.PRIOR:
+            state = state._replace(doubted=state.doubted + 1)
         if aids and state.resets != state.resets_told:
             state = state._replace(resets_told=state.resets)
         return state, account
@@ -149,6 +157,10 @@ class Tracker:
     def reviewed(self, state: TrackState) -> TrackState:
         """The state with the review that is under way done at once."""
         return self._concluded(self.reviewer.finished(state))
+
+    def concluded(self, state: TrackState) -> TrackState:
+        """What the run leaves: its record linearised at the estimate that it leads to."""
+        return self.reviewer.concluded(self.reviewed(state))
 
     def _concluded(self, state: TrackState) -> TrackState:
         """When the review is complete, what the innovations of its window say of the estimate."""
@@ -167,7 +179,7 @@ class Tracker:
     ) -> Account:
         """What is told: the filter's estimate where it is believed, else the prior and why."""
         separability = self.separability(state.estimate)
-        standing = state.trust.standing(_experienced(state), separability)
+        standing = self.standing(state, separability)
         believed = standing == Status.TRACKING
         told = separability if believed else 1.0
 
@@ -180,6 +192,13 @@ class Tracker:
             state.estimate if believed else self.prior,
             told,
         )
+
+    def standing(self, state: TrackState, separability: float) -> Status:
+        """TRACKING, or why the estimate is not believed."""
+        standing = state.trust.standing(_experienced(state), separability)
+        if standing == Status.TRACKING and misfit(state.bank) > self.misfit:
+            return Status.MISMATCH
+        return standing
 
     def _closed(
         self, state: TrackState, snapshot: Snapshot, now: WheelState, elapsed: float

@@ -97,8 +97,8 @@ class FormTuning:
     # Their probabilities before the run. Judgement: half of the rigs obey their equations.
     odds: tuple[float, ...] = (0.5, 0.25, 0.25)
 
-    # Probability of the largest size from which on the estimate is not believed.
-    misfit: float = 0.5
+    # Probability of a larger size than the smallest beyond which the estimate is not believed.
+    misfit: float = 0.9
 
 
 CHANGE = ChangeTuning()

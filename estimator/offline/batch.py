@@ -20,9 +20,10 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.account import aids, health, measurements, soil_estimate
 from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.reasons import Reason, withheld
+from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Account, Tracker
-from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import (
     TICK_FIELDS,
     Aid,
@@ -35,7 +36,7 @@ from gritd.estimator.messages.tick import (
 from gritd.estimator.offline.run_window import Windows, windows
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.offline.streams import RecordedStreams, recorded_streams
-from gritd.estimator.online.bed import begun
+from gritd.estimator.online.bed import Start, begun
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.wheel.sync import Snapshot
@@ -90,7 +91,13 @@ class Replayed(NamedTuple):
 
     rows: Table  # one a window (n,), fields ESTIMATES, each as in /tick
     bank: Bank  # at the end
-    believed: bool  # at the end: a tick would tell it, and not the stated prior
+    memory: Memory  # likewise
+    reason: Reason  # why what it leaves is not believed
+
+    @property
+    def believed(self) -> bool:
+        """Whether what the run leaves is believed, of all that it showed."""
+        return not self.reason.why
 
     @property
     def estimate(self) -> Estimate:
@@ -109,7 +116,7 @@ def replayed(
     settings: Settings,
     recording: Recording,
     engine: str = "plain",
-    start: Bank | None = None,
+    start: Start | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of a recording, begun with the stated prior or with `start`. See
@@ -124,7 +131,7 @@ def followed(
     settings: Settings,
     streams: RecordedStreams,
     engine: str = "plain",
-    start: Bank | None = None,
+    start: Start | None = None,
     advance: Callable[[int, int], None] = lambda done, total: None,
 ) -> Replayed:
     """What the filter makes of readings, window by window.
@@ -136,7 +143,7 @@ def followed(
     """
     pipeline = Pipeline(settings, engine)
     tracker, settings = pipeline.tracker, pipeline.settings
-    state, flags = tracker.start(), 0
+    state = tracker.start()
     state = state if start is None else begun(state, start)
     tables = [np.empty(0, _WINDOW_DTYPE)]
 
@@ -151,14 +158,15 @@ def followed(
             done += 1
             if done % ROWS == 0 or done == total:
                 tables.append(np.frombuffer(b"".join(rows), _WINDOW_DTYPE))
-                rows, flags = [], account.flags
+                rows = []
             advance(done, total)
 
-    state = tracker.reviewed(state)
+    state = tracker.concluded(state)
     return Replayed(
         np.concatenate(tables),
         state.bank,
-        not flags & Flag.PRIOR,
+        state.memory,
+        withheld(tracker, state),
     )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Repeatability, Settings
 from gritd.estimator.filter.bank import Bank, told
+from gritd.estimator.filter.reasons import Reason
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.offline.batch import Replayed, replayed
 from gritd.estimator.online.bed import Known, after_run, before_run, surprise
@@ -29,8 +30,19 @@ class BedRun(NamedTuple):
 
     @property
     def counts(self) -> bool:
-        """Whether the bed's estimate rests on it too: the filter's own is believed at its end."""
-        return self.carried.believed and bool(self.carried.rows["updates"][-1] > 0)
+        """Whether the bed's estimate rests on it too."""
+        return self.carried.believed
+
+
+def doubted(runs: Sequence[BedRun]) -> Reason:
+    """Why what the runs know together is not believed: more than a third of them are not."""
+    refused = [run for run in runs if not run.counts]
+    if len(refused) == len(runs):
+        return refused[0].carried.reason if len(runs) == 1 else Reason("no run is believed")
+    if 3 * len(refused) <= len(runs):
+        return Reason()
+    why = f"{len(refused)} of {len(runs)} runs are not believed"
+    return Reason(why, refused[0].carried.reason.remedy)
 
 
 def bed_runs(
@@ -62,8 +74,8 @@ def bed_runs(
             prior,
             alone,
             carried,
-            after_run(known, carried.bank, repeatability),
-            surprise(told(start), carried.estimate),
+            after_run(known, carried.bank, repeatability, carried.memory),
+            surprise(told(start.bank), carried.estimate),
         )
         run = run if run.counts else run._replace(known=known)
         known = run.known

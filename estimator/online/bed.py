@@ -39,11 +39,20 @@ class Known(NamedTuple):
 
     bank: Bank  # of the soil that all preparations have in common, and the shared errors
     runs: int  # that it rests on
+    # the record of the runs, where they are of one soil: it can be linearised once more
+    memory: Memory | None = None
 
     @property
     def estimate(self) -> Estimate:
         """What the members of the bank say together."""
         return told(self.bank)
+
+
+class Start(NamedTuple):
+    """What a run begins with in the place of the prior."""
+
+    bank: Bank
+    memory: Memory | None = None
 
 
 def variances_of(repeatability: Repeatability) -> Vector:
@@ -55,21 +64,32 @@ def variances_of(repeatability: Repeatability) -> Vector:
     )
 
 
-def before_run(known: Known, repeatability: Repeatability) -> Bank:
-    """What is known of the soil of the next run."""
+def before_run(known: Known, repeatability: Repeatability) -> Start:
+    """What the next run begins with."""
     if known.runs == 0:  # the prior is of the soil under the wheel
-        return known.bank
-    return tuple([predict(member, variances_of(repeatability)) for member in known.bank])
+        return Start(known.bank)
+    return Start(_widened(known.bank, repeatability), known.memory)
 
 
-def after_run(known: Known, after: Bank, repeatability: Repeatability) -> Known:
-    """What is known of the bed after a run that began with `before_run` and left `after`."""
+def after_run(
+    known: Known, after: Bank, repeatability: Repeatability, memory: Memory | None = None
+) -> Known:
+    """What is known of the bed after a run that began with `before_run` and left `after`; memory:
+    its record, where that may go on in the next run.
+    """
+    runs = known.runs + 1
+    if repeatability == Repeatability():  # the same soil
+        return Known(after, runs, memory)
     if known.runs == 0:
-        spread = variances_of(repeatability)
-        return Known(tuple([predict(member, spread) for member in after]), 1)
+        return Known(_widened(after, repeatability), runs)
 
-    pairs = zip(known.bank, before_run(known, repeatability), after, strict=True)
-    return Known(tuple([_of_bed(*each) for each in pairs]), known.runs + 1)
+    members = zip(known.bank, _widened(known.bank, repeatability), after, strict=True)
+    return Known(tuple([_of_bed(*each) for each in members]), runs)
+
+
+def _widened(bank: Bank, repeatability: Repeatability) -> Bank:
+    """By one preparation."""
+    return tuple([predict(member, variances_of(repeatability)) for member in bank])
 
 
 def _of_bed(bed: Estimate, before: Estimate, after: Estimate) -> Estimate:
@@ -86,9 +106,10 @@ def _of_bed(bed: Estimate, before: Estimate, after: Estimate) -> Estimate:
     return made(tuple(x.tolist()), _symmetric(together), after.log_evidence)
 
 
-def begun(fresh: TrackState, bank: Bank) -> TrackState:
-    """The state that a tracker starts with, with a bank in the place of the prior."""
-    return fresh._replace(estimate=told(bank), bank=bank, memory=Memory(bank))
+def begun(fresh: TrackState, start: Start) -> TrackState:
+    """The state that a tracker starts with, with what is known in the place of the prior."""
+    bank, memory = start
+    return fresh._replace(estimate=told(bank), bank=bank, memory=memory or Memory(bank))
 
 
 def surprise(before: Estimate, after: Estimate) -> float:

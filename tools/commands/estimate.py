@@ -18,7 +18,7 @@ from gritd.estimator.config.configuration import Configuration, load, loads
 from gritd.estimator.config.nearest import did_you_mean
 from gritd.estimator.config.settings import Repeatability, Settings, settings_of_run
 from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
-from gritd.estimator.offline.bed_runs import BedRun, bed_runs
+from gritd.estimator.offline.bed_runs import BedRun, bed_runs, doubted
 from gritd.estimator.offline.playback import without_absent
 from gritd.estimator.offline.streams import STREAMS
 from gritd.estimator.online.bed import Known, fingerprint
@@ -45,7 +45,7 @@ UNUSUAL = 16.27  # chi-square, 3 degrees of freedom: 0.1 % of runs of the same s
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 1 where no run could be used; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
-    recordings = [files.recording(path, STREAMS) for path in arguments.files]
+    recordings = [files.recording(path, STREAMS) for path in _once(arguments.files)]
     configurations = configurations_of(recordings, arguments)
     repeatability = _repeatability(configurations[0].settings.bed.repeatability, arguments)
 
@@ -61,7 +61,18 @@ def main(argv: Sequence[str]) -> int:
         _write(arguments.json, runs, repeatability)
     damage = [f"{r.path}: {line}" for r in recordings for line in r.damage]
     print("".join(f"{visible(line)}\n" for line in damage), end="", file=sys.stderr)
-    return DAMAGED if damage else DONE if any(run.counts for run in runs) else FAILED
+    return DAMAGED if damage else FAILED if doubted(runs).why else DONE
+
+
+def _once(paths: Sequence[Path]) -> list[Path]:
+    """Each file once, whatever it is called; says so where one came twice."""
+    kept: dict[Path, Path] = {}
+    for path in paths:
+        place = path.resolve()
+        if place in kept:
+            print(f"{path}: the same file as {kept[place]}; used once", file=sys.stderr)
+        kept.setdefault(place, path)
+    return list(kept.values())
 
 
 def _estimated(
@@ -149,22 +160,39 @@ def _positive(text: str, unit: str) -> float:
 
 
 def lines(runs: Sequence[BedRun], repeatability: Repeatability) -> Iterator[str]:
-    """A line a run, then what they know together, and whether they are of one bed."""
+    """A line a run, why one is not believed, then what they know together, and whether they are of
+    one bed.
+    """
     width = max(len(_name(run)) for run in runs)
     yield f"{'':{width}}   {'load':>8}   {'alone: c':>14}  {'tan φ':>15}   {'so far: c':>14}  tan φ"
     for run in runs:
-        so_far = _pair(run.known.estimate) if run.counts else ("not used: not believed", "")
+        alone = _pair(run.alone.estimate) if run.alone.believed else ("not believed", "")
+        so_far = _pair(run.known.estimate) if run.counts else ("not used", "")
         yield (
-            f"{_name(run):{width}}   {_load(run):>8}   {_pair(run.alone.estimate)[0]:>14}  "
-            f"{_pair(run.alone.estimate)[1]:>15}   {so_far[0]:>14}  {so_far[1]}"
+            f"{_name(run):{width}}   {_load(run):>8}   {alone[0]:>14}  "
+            f"{alone[1]:>15}   {so_far[0]:>14}  {so_far[1]}"
         ).rstrip()
 
     yield ""
+    yield from _refused(runs)
+    reason = doubted(runs)
     used = [run for run in runs if run.counts]
-    if used:
+    if reason.why:
+        yield f"not sure of c and tan φ: {reason}"
+    elif used:
         yield from _together(used)
     yield _stated(repeatability)
     yield from _strained(used)
+
+
+def _refused(runs: Sequence[BedRun]) -> Iterator[str]:
+    """Why runs are not used, each reason once."""
+    reasons: dict[str, list[str]] = {}
+    for run in runs:
+        if not run.counts:
+            reasons.setdefault(str(run.carried.reason), []).append(_name(run))
+    for reason, names in reasons.items():
+        yield f"{', '.join(names)}: not used: {reason}"
 
 
 def _name(run: BedRun) -> str:
@@ -213,7 +241,9 @@ def _together(runs: Sequence[BedRun]) -> Iterator[str]:
     )
 
     if len(runs) > 1:
-        alone = [_values(run.alone.estimate) for run in runs]
+        alone = [_values(run.alone.estimate) for run in runs if run.alone.believed]
+        if not alone:
+            return
         yield (
             f"σ of the best single run over σ of all: c {min(a[1] for a in alone) / c_sigma:.1f}, "
             f"tan φ {min(a[3] for a in alone) / tan_sigma:.1f}"
@@ -250,6 +280,8 @@ def _write(path: Path, runs: Sequence[BedRun], repeatability: Repeatability) -> 
     told = {
         "repeatability": vars(repeatability),
         "runs": [_run_json(run) for run in runs],
+        "believed": not doubted(runs).why,
+        "reason": str(doubted(runs)),
         "together": _json(runs[-1].known),
     }
     try:
@@ -263,6 +295,7 @@ def _run_json(run: BedRun) -> dict[str, Any]:
         "file": str(run.recording.path),
         "load": run.settings.load.nominal.value,
         "used": run.counts,
+        "reason": str(run.carried.reason),
         "alone": _json(Known(run.alone.bank, 1)),
         "together": _json(run.known),
         "chi_square": run.surprise,

@@ -12,13 +12,9 @@ from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import Bed, BedError
 from gritd.estimator.daemon.daemon import Daemon
-from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.reasons import withheld
 from gritd.estimator.messages.run_info import RunInfo
-from gritd.estimator.messages.status import Flag
-from gritd.estimator.messages.tick import TICK_NAMES
-from gritd.estimator.online.bed import fingerprint
-
-FLAGS, UPDATES = TICK_NAMES.index("flags"), TICK_NAMES.index("updates")
+from gritd.estimator.online.bed import Start, fingerprint
 
 
 @dataclass(frozen=True)
@@ -31,7 +27,7 @@ class BedOfRun:
     began: float  # [s since the epoch]
 
     @property
-    def start(self) -> Bank | None:
+    def start(self) -> Start | None:
         """What the run begins with; None for the stated prior."""
         return bed_file.start_of(self.bed, self.settings, self.began)
 
@@ -51,8 +47,10 @@ class BedOfRun:
         if reason := self._nothing_learnt(daemon):
             return f"bed {self.bed.name!r}: this run adds nothing: {reason}"
 
-        assert daemon.loop.bank is not None
-        after = bed_file.after(self.bed, self.settings, daemon.loop.bank, self.began, time.time())
+        assert daemon.loop.left is not None
+        after = bed_file.after(
+            self.bed, self.settings, daemon.loop.left.bank, self.began, time.time()
+        )
 
         try:
             bed_file.save(self.folder, after)
@@ -61,19 +59,14 @@ class BedOfRun:
         return f"bed {self.bed.name!r}: {after.runs} runs now"
 
     def _nothing_learnt(self, daemon: Daemon) -> str:
-        if daemon.loop.bank is None or daemon.loop.latest is None:
+        if daemon.loop.left is None or daemon.loop.latest is None:
             return "it had no tick"
 
         settings = settings_of_run(daemon.configuration.settings, daemon.run)
         if fingerprint(settings) != fingerprint(self.settings):
             return "prior, calibration, filter or effects changed on the way"
 
-        tick = daemon.loop.latest[0]
-        if not tick[UPDATES]:
-            return "the filter was never updated"
-        if int(tick[FLAGS]) & Flag.PRIOR:
-            return "the filter's estimate was not believed at its end"
-        return ""
+        return str(withheld(daemon.loop.tracker, daemon.loop.left))
 
 
 def bed_of_run(folder: Path, settings: Settings, run: RunInfo) -> BedOfRun | None:

@@ -9,6 +9,7 @@ import numpy as np
 from gritd.estimator.config.settings import (
     Calibration,
     Channel,
+    ConfiguredEffect,
     Drive,
     FilterSettings,
     Load,
@@ -54,6 +55,9 @@ SOIL = SoilPrior(
     modulus_sigma=0.1,
 )
 
+# tests of the filter drive a plant that obeys the closed forms
+TRIANGLES = ConfiguredEffect("stress_linearisation", {"share": Uncertain(0.0)})
+
 SETTINGS = Settings(
     testbed="test",
     wheel=Wheel(0.072, 0.071),
@@ -67,6 +71,7 @@ SETTINGS = Settings(
     rates=Rates(),
     filter=FilterSettings(),
     logging=Logging(),
+    effects=(TRIANGLES,),
 )
 
 WRENCH = Wrench("adc", "wrench", calibration(1.0), calibration(1.0), calibration(1.0), 0.3, 0.02)

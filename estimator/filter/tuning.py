@@ -98,7 +98,7 @@ class FormTuning:
     odds: tuple[float, ...] = (0.5, 0.25, 0.25)
 
     # Probability of a larger size than the smallest beyond which the estimate is not believed.
-    misfit: float = 0.9
+    misfit: float = 0.99
 
 
 CHANGE = ChangeTuning()

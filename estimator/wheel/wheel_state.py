@@ -33,6 +33,9 @@ SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
 # relative change of speed, load or sinkage in steady motion, in which Eqs. 1–22 hold
 STEADY = 0.05
+# share of the contact angle by which the wheel turns in steady motion before a window counts: half
+# of the soil under the rim, and what lags in a force sensor's mounting, has then seen no other
+SETTLED = 0.5
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
 
@@ -248,11 +251,11 @@ def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> St
     if now.theta_1.d_sinkage * now.sinkage.sigma > ANGLE_SIGMA_MAX * now.theta_1.value:
         return Status.UNCERTAIN
 
-    # what is under the rim was sheared as it is now only once the wheel has turned by θ₁
+    # what is under the rim was sheared as it is now once the wheel has turned by θ₁
     if since is None or not alike(now, since.state):
         return Status.UNSTEADY
     turned = abs(wheel_angle - since.wheel_angle)
-    return Status.TRACKING if turned >= now.theta_1.value else Status.UNSTEADY
+    return Status.TRACKING if turned >= SETTLED * now.theta_1.value else Status.UNSTEADY
 
 
 class Steady(NamedTuple):

@@ -37,7 +37,7 @@ def write(
             document["devices"][name]["dbc"] = _copied(Path(device.dbc), folder)
 
     if plant == "linear":
-        document["effects"].pop(LINEARISATION, None)
+        document["effects"][LINEARISATION] = {"share": 0.0}
     document["logging"]["directory"] = str(folder)
 
     path = folder / NAME

@@ -7,24 +7,20 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from gritd.estimator.filter.change import judge
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.estimate import made, rows
 from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.tuning import CHANGE
 
 SIGMA = (0.3, 0.06, 0.1)  # of the prior, and of a change
 NUISANCES = (0.004**2, 0.1**2)  # offsets of torque [N·m] and of drawbar pull [N]
-PRIOR = Estimate(
-    (1.0, 0.577, -3.7),
-    tuple(tuple(np.diag(np.square(SIGMA))[i].tolist()) for i in range(3)),
-    ((0.0, 0.0),) * 3,
-)
+PRIOR = made((1.0, 0.577, -3.7, 0.0, 0.0), np.diag([*np.square(SIGMA), *NUISANCES]))
 NOISE, LASTING = (0.003, 0.06), (0.002, 0.03)  # of a window, and of a stretch [N·m, N]
 LENGTHS = (5, 5, 20, 40, 5, 5, 10, 5)
 
 
 def drawn_lines(rng, change=None, at=4, offset=None, components=2):
     """Stretches at several loads, in a soil from the prior that may change before stretch `at`."""
-    soil = np.array(PRIOR.x) + SIGMA * rng.normal(size=3)
+    soil = np.array(PRIOR.x[:3]) + SIGMA * rng.normal(size=3)
     wrong = np.sqrt(NUISANCES) * rng.normal(size=2) if offset is None else np.array(offset)
     lines = []
     for number, windows in enumerate(LENGTHS):
@@ -35,14 +31,13 @@ def drawn_lines(rng, change=None, at=4, offset=None, components=2):
         noise = np.linalg.cholesky(R / windows + D) @ rng.normal(size=2)
         y = H @ x + np.eye(2) @ wrong + noise
         kept = slice(components)
-        arrays = (H[kept], np.eye(2)[kept], R[kept, kept], D[kept, kept])
-        H_, G_, R_, D_ = (tuple(map(tuple, array.tolist())) for array in arrays)
-        lines.append(Line(tuple(y[kept].tolist()), H_, G_, R_, D_))
+        arrays = (np.hstack((H, np.eye(2)))[kept], R[kept, kept], D[kept, kept])
+        lines.append(Line(tuple(y[kept].tolist()), *map(rows, arrays), (0.0,) * components))
     return lines
 
 
 def judged(lines):
-    return judge(PRIOR, NUISANCES, SIGMA, lines, LENGTHS)
+    return judge(PRIOR, SIGMA, lines, LENGTHS)
 
 
 @pytest.mark.parametrize("components", [1, 2])
@@ -51,17 +46,17 @@ def test_the_evidence_is_the_ratio_of_the_densities(components):
     rng = np.random.default_rng(1)
     lines = drawn_lines(rng, change=(0.2, -0.02, 0.0), components=components)
     y = np.concatenate([line.y for line in lines])
-    H, G = (np.concatenate([getattr(line, name) for line in lines]) for name in ("H", "G"))
+    H = np.concatenate([line.H for line in lines])
     noise = np.zeros((y.size, y.size))
     for number, (line, windows) in enumerate(zip(lines, LENGTHS, strict=True)):
         at = slice(number * components, (number + 1) * components)
         noise[at, at] = np.array(line.R) / windows + np.array(line.D)
-    same = H @ np.array(PRIOR.P) @ H.T + G @ np.diag(NUISANCES) @ G.T + noise
+    same = H @ np.array(PRIOR.P) @ H.T + noise
     mean = H @ np.array(PRIOR.x)
 
     found = judged(lines)
     for at in range(1, len(lines)):
-        since = np.repeat(np.arange(len(lines)) >= at, components)[:, None] * H
+        since = np.repeat(np.arange(len(lines)) >= at, components)[:, None] * H[:, :3]
         changed = same + since @ np.diag(np.square(SIGMA)) @ since.T
         ratio = multivariate_normal(mean, changed).logpdf(y) - multivariate_normal(
             mean, same
@@ -72,18 +67,14 @@ def test_the_evidence_is_the_ratio_of_the_densities(components):
 def test_the_best_fit_of_one_soil_is_that_of_least_squares():
     rng = np.random.default_rng(2)
     lines = drawn_lines(rng)
-    rows, right = (
-        [np.hstack((np.diag(1.0 / np.array(SIGMA)), np.zeros((3, 2))))],
-        [np.array(PRIOR.x) / SIGMA],
-    )
-    rows.append(np.hstack((np.zeros((2, 3)), np.diag(1.0 / np.sqrt(NUISANCES)))))
-    right.append(np.zeros(2))
+    sigma = np.sqrt(np.diag(PRIOR.P))
+    parts, right = [np.diag(1.0 / sigma)], [np.array(PRIOR.x) / sigma]
     for line, windows in zip(lines, LENGTHS, strict=True):
         white = np.linalg.inv(np.linalg.cholesky(np.array(line.R) / windows + np.array(line.D)))
-        rows.append(white @ np.hstack((line.H, line.G)))
+        parts.append(white @ np.array(line.H))
         right.append(white @ np.array(line.y))
-    best = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0]
-    np.testing.assert_allclose(judged(lines).x, best[:3], atol=1e-6)
+    best = np.linalg.lstsq(np.vstack(parts), np.concatenate(right), rcond=None)[0]
+    np.testing.assert_allclose(judged(lines).x, best, atol=1e-6)
 
 
 def test_a_record_without_a_change_is_hardly_ever_said_to_have_one():
@@ -109,14 +100,16 @@ def test_a_change_is_found_where_it_is(change):
 
 def test_one_stretch_alone_cannot_tell_of_a_change():
     lines = drawn_lines(np.random.default_rng(6))[:1]
-    assert judge(PRIOR, NUISANCES, SIGMA, lines, LENGTHS[:1]).change == 0
+    assert judge(PRIOR, SIGMA, lines, LENGTHS[:1]).change == 0
 
 
 def test_what_is_known_exactly_is_no_obstacle():
     """A soil parameter of sigma 0: nothing to learn of it, and no division by it."""
-    exact = Estimate(PRIOR.x, (*PRIOR.P[:2], (0.0, 0.0, 0.0)), PRIOR.cross)
+    P = np.array(PRIOR.P)
+    P[2] = P[:, 2] = 0.0
+    exact = made(PRIOR.x, P)
     lines = drawn_lines(np.random.default_rng(7), change=(0.3, 0.0, 0.0))
-    found = judge(exact, NUISANCES, (*SIGMA[:2], 0.0), lines, LENGTHS)
+    found = judge(exact, (*SIGMA[:2], 0.0), lines, LENGTHS)
     assert found.change == 4 and found.x[2] == pytest.approx(PRIOR.x[2])
     assert CHANGE.alarm < found.evidence[4] < np.inf
 

@@ -15,8 +15,8 @@ from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.status import Flag
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.offline.batch import ESTIMATES, estimates
-from gritd.estimator.offline.run_window import window_ends
 from gritd.estimator.offline.playback import recorded_ticks
+from gritd.estimator.offline.run_window import window_ends
 from gritd.estimator.offline.snapshots import snapshots
 from gritd.estimator.offline.streams import RecordedStreams, Stream
 from gritd.estimator.online.pipeline import Pipeline

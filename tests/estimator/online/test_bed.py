@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.estimator.config.settings import Repeatability, Uncertain
-from gritd.estimator.filter.estimate import Estimate
+from gritd.estimator.filter.engine import make_engine
+from gritd.estimator.filter.estimate import Estimate, Update, made
 from gritd.estimator.online.bed import Array, Known, after_run, before_run, fingerprint, surprise
 from tests.rig import SETTINGS
 
@@ -19,67 +20,57 @@ NUISANCES = (0.04, 0.0025)  # variances
 
 
 def measured(before: Estimate, rng: np.random.Generator) -> tuple[Estimate, Array, float, float]:
-    """One scalar measurement with calibration errors considered: what a run is to the filter."""
-    h, r = rng.normal(size=5), 0.01
-    z = rng.normal()
-    P, X, V = np.array(before.P), np.array(before.cross), np.diag(NUISANCES)
-    joint = np.block([[P, X], [X.T, V]])
-    s = h @ joint @ h + r
-    gain = (joint @ h / s)[:3]
-    x = np.array(before.x) + gain * (z - h[:3] @ np.array(before.x))
-    column = joint[:3] @ h
-    P_after = P - np.outer(gain, column) - np.outer(column, gain) + s * np.outer(gain, gain)
-    X_after = X - np.outer(gain, joint[3:] @ h)
-    rows = lambda matrix: tuple(map(tuple, matrix.tolist()))  # noqa: E731
-    return Estimate(tuple(x.tolist()), rows(P_after), rows(X_after)), h, z, r
+    """One scalar measurement: what a run is to the filter."""
+    h, r, z = rng.normal(size=5), 0.01, float(rng.normal())
+    innovation = (z - float(h @ np.array(before.x)),)
+    update = Update(innovation, (tuple(h.tolist()),), ((r,),))
+    return make_engine("plain").update(before, update), h, z, r
 
 
 def estimate() -> Estimate:
-    rows = tuple(map(tuple, PRIOR.tolist()))
-    return Estimate((1.0, 0.577, -3.7), rows, ((0.0, 0.0),) * 3)
+    P = np.zeros((5, 5))
+    P[:3, :3], P[3:, 3:] = PRIOR, np.diag(NUISANCES)
+    return made((1.0, 0.577, -3.7, 0.0, 0.0), P)
 
 
 @given(st.integers(0, 1000))
 def test_without_scatter_the_posterior_is_handed_on_as_it_is(seed: int) -> None:
     rng, none = np.random.default_rng(seed), Repeatability()
     first, *_ = measured(estimate(), rng)
-    known = after_run(Known(estimate(), 0), first, none, NUISANCES)
-    assert known == Known(first, 1) and before_run(known, none) == first
+    known = after_run(Known((estimate(),), 0), (first,), none)
+    assert known == Known((first,), 1) and before_run(known, none).bank == (first,)
 
     second, *_ = measured(first, rng)
-    after = after_run(known, second, none, NUISANCES)
-    for ours, theirs in zip(after.estimate, second, strict=True):
-        np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
+    assert after_run(known, (second,), none).bank == (second,)
 
 
 @given(st.integers(0, 1000))
 def test_with_scatter_the_bed_is_what_the_direct_solution_says(seed: int) -> None:
     """One run of a bed with scatter: the bed's own posterior by conditioning of all at once."""
     rng, by = np.random.default_rng(seed), Repeatability(200.0, 0.03, 0.05)
-    Q = np.diag([0.2**2, 0.03**2, 0.05**2])
-    known = Known(estimate(), 5)  # the bed, as runs before left it
+    Q = np.zeros((5, 5))
+    Q[:3, :3] = np.diag([0.2**2, 0.03**2, 0.05**2])
+    known = Known((estimate(),), 5)  # the bed, as runs before left it
 
-    before = before_run(known, by)
-    np.testing.assert_allclose(before.P, PRIOR + Q)
+    (before,) = before_run(known, by).bank
+    P = np.array(estimate().P)
+    np.testing.assert_allclose(before.P, P + Q)
     after, h, z, r = measured(before, rng)
-    bed = after_run(known, after, by, NUISANCES).estimate
+    bed = _alone(after_run(known, (after,), by))
 
-    # the joint of bed, run's soil and ν, conditioned on the one measurement as Schmidt does: the
-    # gain of ν is zero, those of bed and soil are optimal
-    P, V = PRIOR, np.diag(NUISANCES)
-    full = np.block([
-        [P, P, np.zeros((3, 2))],
-        [P, P + Q, np.zeros((3, 2))],
-        [np.zeros((2, 6)), V],
-    ])  # fmt: skip
-    row = np.concatenate([np.zeros(3), h])
+    # bed and run's soil, each with the errors that they share, conditioned on the measurement
+    full = np.block([[P, P], [P, P + Q]])
+    row = np.concatenate([np.zeros(5), h])
     s = row @ full @ row + r
     gain = full @ row / s
-    x = np.array([*known.estimate.x, *before.x])
-    moved = gain[:3] * (z - h[:3] @ x[3:])
-    np.testing.assert_allclose(np.array(bed.x) - known.estimate.x, moved, atol=1e-9)
-    expected = full[:3, :3] - s * np.outer(gain[:3], gain[:3])
-    np.testing.assert_allclose(bed.P, expected, atol=1e-9)
+    moved = gain[:5] * (z - h @ np.array(before.x))
+    np.testing.assert_allclose(np.array(bed.x) - estimate().x, moved, atol=1e-9)
+    np.testing.assert_allclose(bed.P, P - s * np.outer(gain[:5], gain[:5]), atol=1e-9)
+
+
+def _alone(known: Known) -> Estimate:
+    (member,) = known.bank
+    return member
 
 
 def test_a_run_of_the_soil_that_is_known_surprises_as_chi_square_does() -> None:
@@ -88,13 +79,14 @@ def test_a_run_of_the_soil_that_is_known_surprises_as_chi_square_does() -> None:
     found = []
     for _ in range(2000):
         before = estimate()
-        truth = rng.multivariate_normal(before.x, PRIOR)
+        truth = rng.multivariate_normal(before.x[:3], PRIOR)
         h, r = rng.normal(size=3), 0.01
         z = h @ truth + np.sqrt(r) * rng.normal()
         gain = PRIOR @ h / (h @ PRIOR @ h + r)
-        x = np.array(before.x) + gain * (z - h @ np.array(before.x))
-        P = PRIOR - np.outer(gain, h @ PRIOR)
-        after = Estimate(tuple(x.tolist()), tuple(map(tuple, P.tolist())), before.cross)
+        x, P = np.array(before.x), np.array(before.P)
+        x[:3] += gain * (z - h @ x[:3])
+        P[:3, :3] -= np.outer(gain, h @ PRIOR)
+        after = made(tuple(x.tolist()), P)
         found.append(surprise(before, after))
     assert np.mean(found) == pytest.approx(1.0, abs=0.1)
 

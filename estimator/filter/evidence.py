@@ -54,7 +54,7 @@ def evidence(
 
 def _whitened(lines: Sequence[Line], windows: Sequence[int]) -> tuple[Array, Array]:
     """H (s, 2, d) and y (s, 2) of unit noise; zeros for a component that is not measured."""
-    y, H, R, D = (np.array(column) for column in list(zip(*map(_full, lines), strict=True))[:4])
+    y, H, R, D = (np.array(column) for column in zip(*map(_full, lines), strict=True))
     noise = R / np.array(windows, float)[:, None, None] + D
     columns = np.concatenate((H, y[:, :, None]), axis=2)
 

@@ -16,8 +16,7 @@ class Line(NamedTuple):
     y: Vector  # (m,) measured, less the tangent of the prediction at x = 0
     H: Matrix  # (m, d)
     R: Matrix  # (m, m) noise of a single window
-    D: Matrix  # (m, m) of what may not average out within a stretch
-    model: Vector = ()  # (m,) variance of what the model itself misses in a stretch
+    D: Matrix  # (m, m) of what does not average out within a stretch
 
     def innovation(self, x: Vector) -> Vector:
         """What the vector x (d,) leaves of it (m,)."""
@@ -25,28 +24,18 @@ class Line(NamedTuple):
 
     def update(self, x: Vector, windows: int) -> Update:
         """The mean of so many windows as a measurement, about the vector x (d,)."""
-        R = tuple(
-            [
-                tuple([r / windows + (own if i == j else 0.0) for j, r in enumerate(row)])
-                for i, (row, own) in enumerate(zip(self.R, self.model, strict=True))
-            ]
-        )
-        return Update(self.innovation(x), self.H, R)
+        noise = [
+            tuple([r / windows + d for r, d in zip(rs, ds, strict=True)])
+            for rs, ds in zip(self.R, self.D, strict=True)
+        ]
+        return Update(self.innovation(x), self.H, tuple(noise))
 
     def mixed(self, other: Line, weight: float) -> Line:
         """The mean of two, `weight` on the other."""
         keep = 1.0 - weight
         y = tuple([keep * a + weight * b for a, b in zip(self.y, other.y, strict=True)])
-        H, R, D, (model,) = (
-            _mixed(a, b, weight)
-            for a, b in (
-                (self.H, other.H),
-                (self.R, other.R),
-                (self.D, other.D),
-                ((self.model,), (other.model,)),
-            )
-        )
-        return Line(y, H, R, D, model)
+        H, R, D = (_mixed(a, b, weight) for a, b in zip(self[1:], other[1:], strict=True))
+        return Line(y, H, R, D)
 
 
 def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
@@ -57,13 +46,14 @@ def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
     y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
 
     thrust = CHANGE.model_error * prediction.torque.value
-    own = (thrust, thrust / measurement.chain.wheel.radius)[: len(y)]
-    slips = [quantity.by_slip * mean.slip.sigma for quantity in prediction[:2]]
-    lasting = _lasting(own, slips[: len(y)])
-    return Line(y, update.H, update.R, lasting, tuple([value * value for value in own]))
+    own = (thrust, thrust / measurement.chain.wheel.radius)
+    slips = [quantity.by_slip * mean.grain for quantity in prediction[:2]]
+    kept = measurement.kept(mean)
+    lasting = _lasting([own[at] for at in kept], [slips[at] for at in kept])
+    return Line(y, update.H, update.R, lasting)
 
 
-def _lasting(own: Vector, shared: list[float]) -> Matrix:
+def _lasting(own: list[float], shared: list[float]) -> Matrix:
     """Covariance (m, m) of errors of each component's own, and of one that all share."""
     return tuple(
         [

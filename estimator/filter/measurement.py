@@ -188,8 +188,12 @@ class Measurement:
             H=((*_state_gradient(torque), *by_torque), (*_state_gradient(pull), *by_pull)),
             R=self._noise(now, sensitivity),
         )
+        return selected(update, self.kept(now))
+
+    def kept(self, now: WheelState) -> tuple[int, ...]:
+        """Which of COMPONENTS a window measures."""
         values = (now.torque.value, now.drawbar_pull.value)
-        return selected(update, tuple([at for at in self.components if not isnan(values[at])]))
+        return tuple([at for at in self.components if not isnan(values[at])])
 
     def _without_stresses(self, x: Vector) -> Vector:
         """The errors (q,) that shift the measurements in proportion to their gradients: not those

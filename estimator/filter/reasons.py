@@ -10,7 +10,6 @@ from __future__ import annotations
 from math import exp, inf
 from typing import NamedTuple
 
-from gritd.estimator.filter.bank import misfit
 from gritd.estimator.filter.estimate import KPA, LN_K, STATES, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS
 from gritd.estimator.filter.segments import Memory, Stretch
@@ -47,7 +46,7 @@ def withheld(tracker: Tracker, state: TrackState) -> Reason:
     standing = tracker.standing(state, separability)
     if standing == Status.AT_BOUND:
         return Reason(_at_bound(tracker, state.estimate), PRIOR)
-    if misfit(state.bank) > tracker.misfit:
+    if state.misfit > tracker.misfit:
         return Reason(_misfit(tracker, state), _remedy(tracker))
     if state.resets:
         return Reason(f"the soil was set back to its prior {_times(state.resets)}", LEARN)

@@ -11,11 +11,11 @@ window is always used with the same memory, however many ticks came before it.
 
 from __future__ import annotations
 
-from gritd.estimator.filter.bank import told
+from gritd.estimator.filter.bank import Bank, misfit, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
-from gritd.estimator.filter.segments import LONGEST, Memory
+from gritd.estimator.filter.segments import LONGEST, Memory, Stretch
 from gritd.estimator.filter.smoother import Smoother
 from gritd.estimator.filter.track import (
     Again,
@@ -74,8 +74,8 @@ class Reviewer:
         return state if task is None else self._passed(state, task)
 
     def _completed(self, state: TrackState, task: Ended) -> TrackState:
-        """The stretch that has ended as a measurement."""
-        memory = self._smoother.completed(state.memory, state.estimate.x, state.trust.doubt)
+        """The stretch that has ended beside the others."""
+        memory = self._smoother.completed(state.memory, state.trust.doubt)
         return state._replace(memory=memory, task=Judging(task.same))
 
     def _judged(self, state: TrackState, task: Judging) -> TrackState:
@@ -111,28 +111,23 @@ class Reviewer:
     def _weighed(self, state: TrackState, same: bool) -> TrackState:
         """On one soil: linearised anew where the condition changes and the estimate has moved."""
         x = state.estimate.x
-        anew = not same and self._moved(state.linearised, x)
-        return state._replace(task=Relining(x, last=True) if anew else None)
+        if not same and self._moved(state.linearised, x):
+            return state._replace(task=Relining(x, last=True))
+        return state._replace(task=None, misfit=misfit(state.bank))
 
     def concluded(self, state: TrackState) -> TrackState:
         """The whole record linearised at the estimate that it leads to: what a run leaves. No
         review may be under way.
         """
+        if not state.memory.stretches:
+            return state
         for _ in range(ROUNDS):
-            x, doubt = state.estimate.x, state.trust.doubt
-            memory = state.memory.along(self._smoother.tangents(state.memory.stretches, x))
-            stretches, bank = self._smoother.over(memory.anchor, memory.stretches, doubt)
-            bank = self._bounds.all_inside(bank)
-            state = state._replace(
-                estimate=told(bank),
-                bank=bank,
-                memory=memory._replace(stretches=stretches),
-                linearised=x,
-                unlinearised=0,
-            )
+            x = state.estimate.x
+            lines = self._smoother.tangents(state.memory.stretches, x)
+            state = self._over_all(state, state.memory.along(lines), x)
             if not self._moved(x, state.estimate.x):
                 break
-        return state
+        return state._replace(misfit=misfit(state.bank))
 
     def _moved(self, before: Vector | None, now: Vector) -> bool:
         """Whether the estimate is so far from where the memory was linearised that its Jacobians no
@@ -157,24 +152,39 @@ class Reviewer:
         return (*lines, *self._smoother.tangents(todo, x))
 
     def _passed(self, state: TrackState, task: Passing) -> TrackState:
-        """The filter over some more stretches; over the last, its bank is the state's."""
-        done = len(task.stretches)
-        todo = state.memory.stretches[done : done + PASSED]
-        stretches, bank = self._smoother.over(task.bank, todo, state.trust.doubt)
+        """The filter over some more of the complete stretches; and over the open one, where its bank
+        becomes the state's.
+        """
+        done, complete = len(task.stretches), len(state.memory.stretches) - 1
+        todo = state.memory.stretches[done : min(done + PASSED, complete)]
+        stretches, base = self._smoother.over(task.bank, todo, state.trust.doubt)
         stretches = (*task.stretches, *stretches)
-        if len(stretches) < len(state.memory.stretches):
-            return state._replace(task=task._replace(bank=bank, stretches=stretches))
+        if len(stretches) < complete:
+            return state._replace(task=task._replace(bank=base, stretches=stretches))
 
-        memory = state.memory._replace(stretches=stretches)
+        state = self._with(state, stretches, base, task.x)._replace(task=None)
+        return self._weighed(state, task.last)
+
+    def _over_all(self, state: TrackState, memory: Memory, x: Vector) -> TrackState:
+        """The filter over a whole memory that was linearised at x (d,)."""
+        *complete, _ = memory.stretches
+        stretches, base = self._smoother.over(memory.anchor, complete, state.trust.doubt)
+        return self._with(state._replace(memory=memory), stretches, base, x)
+
+    def _with(
+        self, state: TrackState, stretches: tuple[Stretch, ...], base: Bank, x: Vector
+    ) -> TrackState:
+        """The state with what its complete stretches leave, and the open one on top."""
+        last = state.memory.stretches[-1:]
+        passed, bank = self._smoother.over(base, last, state.trust.doubt)
         bank = self._bounds.all_inside(bank)
         estimate = told(bank)
-        state = state._replace(
+        return state._replace(
             estimate=estimate,
+            base=base,
             bank=bank,
-            memory=memory,
-            linearised=task.x,
+            memory=state.memory._replace(stretches=(*stretches, *passed)),
+            linearised=x,
             unlinearised=0,
             trust=self._bounds.stood(state.trust, estimate),
-            task=None,
         )
-        return self._weighed(state, task.last)

@@ -120,6 +120,7 @@ class Memory(NamedTuple):
     anchor: Bank
     stretches: tuple[Stretch, ...] = ()
     pending: float = 0.0  # [s] of random walk not yet assigned to a stretch
+    closed: bool = False  # whether the last stretch is complete too: another run follows
 
     @property
     def since(self) -> int:
@@ -141,15 +142,23 @@ class Memory(NamedTuple):
             return self._begun((), Stretch(now, 1, components, elapsed, unrest)), True
 
         *before, last = self.stretches
-        if last.windows < SHORTEST and last.like(now, components):
+        if not self.closed and last.windows < SHORTEST and last.like(now, components):
             return self._begun(before, last.merged(now, radius, elapsed)), False
 
-        kept = [*before, last] if last.judged else before
-        elapsed += 0.0 if last.judged else last.elapsed
+        kept = [*before, last] if last.judged or self.closed else before
+        elapsed += 0.0 if last.judged or self.closed else last.elapsed
         return self._begun(kept, Stretch(now, 1, components, elapsed, unrest)), True
 
     def _begun(self, before: Sequence[Stretch], last: Stretch) -> Memory:
         return Memory(self.anchor, (*before, last))
+
+    def dropped(self, after: Memory) -> bool:
+        """Whether the last stretch was left out when a new one began: it did not tell of the soil."""
+        return len(after.stretches) == len(self.stretches)
+
+    def ended(self) -> Memory:
+        """The record of a run that is over."""
+        return self._replace(closed=True)
 
     def complete(self) -> tuple[Stretch, ...]:
         """The stretches on the present soil that are complete."""

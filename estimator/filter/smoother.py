@@ -46,22 +46,26 @@ class Smoother:
         walk = tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates])
         return tuple([predict(member, walk) for member in bank])
 
-    def completed(self, memory: Memory, x: Vector, doubt: float) -> Memory:
-        """The stretch before the last is complete: a measurement along the tangent at x. The oldest
-        goes to the anchor when there are too many.
+    def with_open(self, memory: Memory, base: Bank, x: Vector, doubt: float) -> tuple[Memory, Bank]:
+        """The memory whose open stretch has its tangent at x (d,), and what it leaves on top of
+        `base`.
         """
-        if len(memory.stretches) < 2:
-            return memory
+        *before, last = memory.stretches
+        last = last._replace(line=line_of(self._measurement, last.mean, x))
+        last, bank = self._absorbed(base, last, doubt)
+        return memory._replace(stretches=(*before, last)), bank
 
-        *before, done, last = memory.stretches
-        done = done._replace(line=line_of(self._measurement, done.mean, x))
-        memory = memory._replace(stretches=(*before, done, last)).aged(self._radius)
+    def completed(self, memory: Memory, doubt: float) -> Memory:
+        """The stretch before the last is complete. The oldest goes to the anchor when there are too
+        many.
+        """
+        memory = memory.aged(self._radius)
         if len(memory.stretches) <= CAPACITY:
             return memory
 
         oldest, *rest = memory.stretches
         _, anchor = self._absorbed(memory.anchor, oldest, doubt)
-        return Memory(anchor, tuple(rest))
+        return memory._replace(anchor=anchor, stretches=tuple(rest))
 
     def judgement(self, memory: Memory, bank: Bank, doubt: float) -> Judgement | None:
         """What the complete stretches on the present soil say of it, by the most probable member of

@@ -71,7 +71,8 @@ class TrackState(NamedTuple):
     """Everything the tracker remembers from window to window."""
 
     estimate: Estimate  # what the members of the bank say together
-    bank: Bank
+    base: Bank  # what the complete stretches leave
+    bank: Bank  # and what they leave with the open one
     memory: Memory
     window: int  # [ns] length of a window
     choosing: bool  # whether that is one from which another length is to be chosen
@@ -83,6 +84,7 @@ class TrackState(NamedTuple):
     window_end: int = -1  # end of the last window looked at [ns]
     before: WheelState | None = None
     steady: Steady | None = None  # None where the last window was not ready
+    misfit: float = 0.0  # probability that the equations miss, when a review was last complete
     trust: Trust = Trust()
     updates: int = 0
     doubted: int = 0  # of `updates`, those after which the estimate was not believed

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import Bank, misfit, told
+from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.engine import make_engine
 from gritd.estimator.filter.estimate import (
@@ -24,12 +24,11 @@ from gritd.estimator.filter.estimate import (
     Estimate,
     Update,
     Vector,
-    dot,
     made,
     variance,
 )
 from gritd.estimator.filter.learnt_soil import with_learnt_soil
-from gritd.estimator.filter.measurement import Measurement, selected, soil
+from gritd.estimator.filter.measurement import Measurement, soil
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother
@@ -43,6 +42,7 @@ from gritd.estimator.wheel.sync import Snapshot, window_at_first
 from gritd.estimator.wheel.wheel_state import (
     WheelState,
     classify,
+    grain,
     required_bits,
     steady_since,
 )
@@ -101,6 +101,7 @@ class Tracker:
         return TrackState(
             self.prior,
             bank,
+            bank,
             Memory(bank),
             window_at_first(self.settings),
             self.settings.rates.auto,
@@ -144,6 +145,7 @@ class Tracker:
         if closes:
             state = self._closed(state, snapshot, now, elapsed)
             if status == Status.TRACKING and not state.choosing:
+                now = now._replace(grain=grain(self.settings, now, state.window / NS))
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state, now, elapsed)
 
@@ -196,7 +198,7 @@ class Tracker:
     def standing(self, state: TrackState, separability: float) -> Status:
         """TRACKING, or why the estimate is not believed."""
         standing = state.trust.standing(_experienced(state), separability)
-        if standing == Status.TRACKING and misfit(state.bank) > self.misfit:
+        if standing == Status.TRACKING and state.misfit > self.misfit:
             return Status.MISMATCH
         return standing
 
@@ -225,26 +227,29 @@ class Tracker:
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float
     ) -> tuple[TrackState, tuple[Aid, ...]]:
-        """Walk over the elapsed time, gate, update, remember; where a stretch ends, begin a review
-        of the record.
+        """Gate a window, add it to its stretch, and update with the stretch; where one ends, begin a
+        review of the record.
         """
         trust = state.trust.passed(elapsed)
-        bank = self.smoother.walked(state.bank, elapsed, trust.unrest)
-        walked = told(bank)
+        walked = told(self.smoother.walked(state.bank, elapsed, trust.unrest))
 
         prediction = self.measurement.predict(walked, now)
-        update = self.measurement.linearise(now, prediction, walked)
-        aids = self._gate(walked, now, update)
+        aids = self._gate(walked, now, self.measurement.linearise(now, prediction, walked))
         taken = tuple([index for index, aid in enumerate(aids) if aid.accepted])
-        estimate = walked
-        if taken:
-            bank = self._bounds.all_inside(self._updated(bank, selected(update, taken), walked.x))
-            estimate = told(bank)
-            trust = self._bounds.stood(trust, estimate, elapsed)
 
-        memory, task = self._remembered(state, now, taken, elapsed, trust.unrest)
+        memory, begun = state.memory.extended(
+            now, taken, self.measurement.chain.wheel.radius, elapsed, trust.unrest
+        )
+        base = state.base if not begun or state.memory.dropped(memory) else state.bank
+        memory, bank = self.smoother.with_open(memory, base, walked.x, trust.doubt)
+        bank = self._bounds.all_inside(bank)
+        estimate = told(bank)
+        trust = self._bounds.stood(trust, estimate, elapsed) if taken else trust
+
+        task = self._task(state, now, taken) if begun else None
         state = state._replace(
             estimate=estimate,
+            base=base,
             bank=bank,
             columns=now.columns,
             memory=memory,
@@ -256,15 +261,12 @@ class Tracker:
         )
         return (self._set_back(state) if task is None else state), aids
 
-    def _updated(self, bank: Bank, update: Update, x: Vector) -> Bank:
-        """Every member with a window, along the tangent at x (d,) for all."""
-        after = []
-        for member in bank:
-            apart = tuple([b - a for a, b in zip(x, member.x, strict=True)])
-            moved = zip(update.innovation, update.H, strict=True)
-            innovation = tuple([y - dot(h, apart) for y, h in moved])
-            after.append(self.engine.update(member, update._replace(innovation=innovation)))
-        return tuple(after)
+    def _task(self, state: TrackState, now: WheelState, taken: tuple[int, ...]) -> Task | None:
+        """The review that begins where a stretch has ended."""
+        if not state.memory.stretches:
+            return None
+        like = state.memory.stretches[-1].like(now, taken)
+        return self.reviewer.begun(like, state.unlinearised + 1)
 
     def _gate(self, estimate: Estimate, now: WheelState, update: Update) -> tuple[Aid, ...]:
         gate = self.settings.filter.gate
@@ -278,22 +280,6 @@ class Tracker:
             aids.append(Aid(measured[index], r, innovation, s, ratio, ratio <= 1.0))
         return tuple(aids)
 
-    def _remembered(
-        self,
-        state: TrackState,
-        now: WheelState,
-        taken: tuple[int, ...],
-        elapsed: float,
-        unrest: float,
-    ) -> tuple[Memory, Task | None]:
-        """The memory with one more window; where a stretch ends, a review of the record begins."""
-        radius, before = self.measurement.chain.wheel.radius, state.memory.stretches[-1:]
-        memory, begun = state.memory.extended(now, taken, radius, elapsed, unrest)
-
-        if not begun or not before:
-            return memory, None
-        return memory, self.reviewer.begun(before[0].like(now, taken), state.unlinearised + 1)
-
     def _set_back(self, state: TrackState) -> TrackState:
         """Back to the prior, or a wider one, when the mean square of the innovations is above the
         reset threshold and no change of the soil explained them.
@@ -305,9 +291,11 @@ class Tracker:
         bank = self._unsure(trust.doubt)
         return state._replace(
             estimate=told(bank),
+            base=bank,
             bank=bank,
             memory=Memory(bank),
             linearised=None,
+            misfit=0.0,
             trust=trust,
             resets=state.resets + 1,
         )

@@ -109,7 +109,8 @@ def _of_bed(bed: Estimate, before: Estimate, after: Estimate) -> Estimate:
 def begun(fresh: TrackState, start: Start) -> TrackState:
     """The state that a tracker starts with, with what is known in the place of the prior."""
     bank, memory = start
-    return fresh._replace(estimate=told(bank), bank=bank, memory=memory or Memory(bank))
+    memory = Memory(bank) if memory is None else memory.ended()
+    return fresh._replace(estimate=told(bank), base=bank, bank=bank, memory=memory)
 
 
 def surprise(before: Estimate, after: Estimate) -> float:

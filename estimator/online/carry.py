@@ -86,4 +86,4 @@ def _kept(track: TrackState, old: TrackState) -> TrackState:
     """The soil as it was estimated, as uncertain as the prior."""
     soil = old.estimate.x[:STATES]
     bank = tuple([member._replace(x=(*soil, *member.x[STATES:])) for member in track.bank])
-    return track._replace(estimate=told(bank), bank=bank, memory=Memory(bank))
+    return track._replace(estimate=told(bank), base=bank, bank=bank, memory=Memory(bank))

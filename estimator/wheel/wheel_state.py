@@ -9,7 +9,7 @@ from math import hypot, isnan, pi
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.messages.readings import MOTION
+from gritd.estimator.messages.readings import ENCODERS, MOTION
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
@@ -36,6 +36,7 @@ STEADY = 0.05
 # share of the contact angle by which the wheel turns in steady motion before a window counts: half
 # of the soil under the rim, and what lags in a force sensor's mounting, has then seen no other
 SETTLED = 0.5
+HALF = 0.5  # counts
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
 
@@ -75,6 +76,7 @@ class WheelState(NamedTuple):
     ] = ()  # change of predicted (T, DP) with each uncertain effect parameter
     situation: Situation | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
+    grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`
     form: FormHere | None = None  # the learnt discrepancy of form; None where there is none
 
 
@@ -281,6 +283,19 @@ def alike(now: WheelState, before: WheelState) -> bool:
         (now.sinkage, before.sinkage),
     )
     return all([_steady(a, b) for a, b in pairs])
+
+
+def grain(settings: Settings, now: WheelState, window: float) -> float:
+    """σ of slip because encoders count, in a window of so many seconds.
+
+    Sampled at even steps, rounding errors of a count are no noise: they beat against the steps, and
+    the slope keeps an error of about half a count over the window for many windows.
+    """
+    encoders = [settings.channels[name].calibration.scale.value for name in ENCODERS]
+    steps = (encoders[0] * settings.wheel.radius, encoders[1] * settings.pulley_radius)
+    speeds = (now.rim_speed.value, now.travel_speed.value)
+    shares = [HALF * a / max(abs(v) * window, a) for a, v in zip(steps, speeds, strict=True)]
+    return (1.0 - abs(now.slip.value)) * hypot(*shares)
 
 
 def moves(speed: Measured) -> bool:

@@ -33,7 +33,7 @@ def changes(prediction):
 @pytest.mark.parametrize("shifted", [False, True])
 @given(condition=conditions, seed=st.integers(0, 1000))
 def test_values_and_gradients_are_those_of_the_linear_model(wheel, shifted, condition, seed):
-    drawn = np.random.default_rng(seed).uniform(-0.02, 0.02, (4, 8)).tolist()
+    drawn = np.random.default_rng(seed).uniform(-0.02, 0.02, (6, 8)).tolist()
     shift = linear.Shift(*[Integrals(*row) for row in drawn]) if shifted else None
     have, want = (
         scalar.predict(wheel, *condition, shift),

@@ -17,7 +17,7 @@ and is joined to its neighbour of the same condition as it ages.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, isnan
+from math import exp
 from typing import Any, NamedTuple
 
 from gritd.estimator.filter.bank import Bank
@@ -55,10 +55,8 @@ class Stretch(NamedTuple):
 
     @property
     def judged(self) -> bool:
-        """Whether it tells of the soil: a window or two that failed a gate are outliers."""
-        values = (self.mean.torque.value, self.mean.drawbar_pull.value)
-        measured = len(values) - sum(map(isnan, values))
-        return self.windows >= STEADY or len(self.components) == measured
+        """Whether it tells of the soil: a window or two are outliers, or part of a transition."""
+        return self.windows >= STEADY
 
     def like(self, now: WheelState, components: tuple[int, ...]) -> bool:
         """Whether a window is of the same condition."""

@@ -102,7 +102,7 @@ class Smoother:
         if stretch.changed is not None:
             bank = tuple([self.renewed(member, doubt) for member in bank])
             stretch = stretch._replace(changed=bank)
-        if not stretch.components:
+        if not stretch.components or not stretch.judged:
             return stretch, bank
 
         line = stretch.line

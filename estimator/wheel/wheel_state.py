@@ -33,9 +33,8 @@ SLIP_SIGMA_MAX = 0.1  # a window that knows slip worse than this is not worth an
 ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
 # relative change of speed, load or sinkage in steady motion, in which Eqs. 1–22 hold
 STEADY = 0.05
-# share of the contact angle by which the wheel turns in steady motion before a window counts: half
-# of the soil under the rim, and what lags in a force sensor's mounting, has then seen no other
-SETTLED = 0.5
+SAME_SLIP = 0.02  # change of slip that is none
+SCATTER = 3.0  # [σ] by which two windows of one condition may differ besides
 HALF = 0.5  # counts
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
@@ -257,7 +256,7 @@ def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> St
     if since is None or not alike(now, since.state):
         return Status.UNSTEADY
     turned = abs(wheel_angle - since.wheel_angle)
-    return Status.TRACKING if turned >= SETTLED * now.theta_1.value else Status.UNSTEADY
+    return Status.TRACKING if turned >= now.theta_1.value else Status.UNSTEADY
 
 
 class Steady(NamedTuple):
@@ -275,14 +274,15 @@ def steady_since(before: Steady | None, now: WheelState, wheel_angle: float) -> 
 
 
 def alike(now: WheelState, before: WheelState) -> bool:
-    """Whether speeds, load and sinkage of two windows agree."""
+    """Whether slip, speed, load and sinkage of two windows agree."""
     pairs = (
         (now.rim_speed, before.rim_speed),
-        (now.travel_speed, before.travel_speed),
         (now.load, before.load),
         (now.sinkage, before.sinkage),
     )
-    return all([_steady(a, b) for a, b in pairs])
+    slips = abs(now.slip.value - before.slip.value)
+    noise = hypot(now.slip.sigma, before.slip.sigma)
+    return slips <= SAME_SLIP + SCATTER * noise and all([_steady(a, b) for a, b in pairs])
 
 
 def grain(settings: Settings, now: WheelState, window: float) -> float:
@@ -305,4 +305,4 @@ def moves(speed: Measured) -> bool:
 
 def _steady(now: Measured, before: Measured) -> bool:
     noise = hypot(now.sigma, before.sigma)
-    return abs(now.value - before.value) <= STEADY * abs(now.value) + 5.0 * noise
+    return abs(now.value - before.value) <= STEADY * abs(now.value) + SCATTER * noise

@@ -92,14 +92,19 @@ class Decoder:
         """When each frame's sample was taken: by the device's clock where it sends one, else the
         receive time. None where the device's time is wrong.
 
-        Each key has a mapping of its own: its frames are in order, and wait equally long.
+        Each key has a mapping of its own: its frames are in order, and wait equally long. Several
+        frames of a key that came in one read are several samples, a nanosecond apart.
         """
         stamps: list[int | None] = [received] * len(frames)
         timed: dict[str, list[int]] = {}
+        untimed: dict[str, list[int]] = {}
 
         for place, frame in enumerate(frames):
-            if frame.device_us is not None:
-                timed.setdefault(frame.key, []).append(place)
+            of = untimed if frame.device_us is None else timed
+            of.setdefault(frame.key, []).append(place)
+        for places in untimed.values():
+            for before, place in enumerate(reversed(places)):
+                stamps[place] = received - before
 
         for key, places in timed.items():
             mapped = self._mapped(key, [frames[i].device_us or 0 for i in places], received)

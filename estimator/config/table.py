@@ -172,8 +172,8 @@ RATES = {
     "tick": Key(Quantity("Hz", low=1, high=2000), "ticks of the estimator", "250 Hz"),
     "update": Key(
         Either(AUTO, Quantity("Hz", low=0.01, high=1000)),
-        "updates of the filter; its window is 1/update. auto: a window of 0.1 to 3.2 s, as short as "
-        "the noise of slip allows",
+        "updates of the filter; its window is 1/update. auto: a window of 0.1 to 3.2 s, as short "
+        "as the noise of slip allows",
         AUTO,
     ),
     "horizon": Key(

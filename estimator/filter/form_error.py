@@ -1,13 +1,13 @@
-"""What the closed forms miss on a rig of which nothing was learnt: a smooth error of torque and pull
-over slip and load, of unknown size.
+"""What the closed forms miss on a rig of which nothing was learnt: a smooth error of torque and
+pull over slip and load, of unknown size.
 
-Every model of a wheel in soil is somewhat wrong. The error of the torque is r W e(i, W), that of the
-drawbar pull W e′(i, W), with e and e′ of the covariance function of model/discrepancy.py. Each is
-held by its values at the nodes of a grid, between which it is linear. The nodes of the load count
-in pressures W/(r b), so that they are the same for every run of a rig.
+Every model of a wheel in soil is somewhat wrong. The error of the torque is r W e(i, W), that of
+the drawbar pull W e′(i, W), with e and e′ of the covariance function of model/discrepancy.py. Each
+is held by its values at the nodes of a grid, between which it is linear. The nodes of the load
+count in pressures W/(r b), so that they are the same for every run of a rig.
 
-How large e is, is not known before the run. So the filter runs once for each of SIZES, and weighs
-them by what they foretold (tracker.py).
+How large e is, is not known before the run. So the filter runs once for each size, and weighs them
+by what they foretold (bank.py).
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import Estimate, Matrix, Update, Vector, dot
@@ -46,10 +47,15 @@ def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
     y = tuple([i + dot(h, x) for i, h in zip(update.innovation, update.H, strict=True)])
 
     thrust = CHANGE.model_error * prediction.torque.value
-    own = (thrust, thrust / measurement.chain.wheel.radius)
-    slips = [quantity.by_slip * mean.grain for quantity in prediction[:2]]
+    misses = (thrust, thrust / measurement.chain.wheel.radius)
+    # what lags is not off by its slip alone: torque and pull each have their own error
+    own = [
+        hypot(miss, quantity.by_slip * mean.doubts[0], quantity.by_load * mean.doubts[1])
+        for miss, quantity in zip(misses, prediction, strict=False)
+    ]
+    shared = [quantity.by_slip * mean.grain for quantity in prediction[:2]]
     kept = measurement.kept(mean)
-    lasting = _lasting([own[at] for at in kept], [slips[at] for at in kept])
+    lasting = _lasting([own[at] for at in kept], [shared[at] for at in kept])
     return Line(y, update.H, update.R, lasting)
 
 

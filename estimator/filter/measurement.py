@@ -48,8 +48,8 @@ Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
 class Measurement:
     """Settings turned into h(x), its Jacobians and R.
 
-    The vector is [c/kPa, tan φ, ln k], then the nuisances (nuisance.py), the uncertain parameters of
-    effects, the directions of the learnt discrepancy, and the errors of form at their nodes
+    The vector is [c/kPa, tan φ, ln k], then the nuisances (nuisance.py), the uncertain parameters
+    of effects, the directions of the learnt discrepancy, and the errors of form at their nodes
     (form_error.py): of the torque, and of the drawbar pull where it is measured.
     """
 

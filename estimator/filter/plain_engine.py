@@ -54,7 +54,7 @@ class PlainEngine:
         for u, score in whitened:
             x = x + u * score
             P = P - u[:, None] * u
-        evidence = estimate.log_evidence - 0.5 * squares - logs
+        evidence = estimate.log_evidence + (-0.5 * squares - logs)
         return made(tuple(x.tolist()), P, evidence)
 
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from gritd.estimator.filter.estimate import KPA, LN_K, STATES, Estimate
 from gritd.estimator.filter.measurement import COMPONENTS
-from gritd.estimator.filter.segments import Memory, Stretch
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.messages.status import Status
@@ -84,29 +83,13 @@ def _at_bound(tracker: Tracker, estimate: Estimate) -> str:
 
 def _misfit(tracker: Tracker, state: TrackState) -> str:
     """Where the equations are farthest from what was measured."""
-    exact = state.bank[0]
-    component, stretch, off = _farthest(state.memory, exact, tracker.measurement.components)
-    where = f"at slip {stretch.mean.slip.value:.2f} under {stretch.mean.load.value:.0f} N"
-    channel = COMPONENTS[component].replace("_", " ")
-    return f"the equations do not fit the {channel}, by {abs(off):.2g} {UNITS[component]} {where}"
-
-
-def _farthest(
-    memory: Memory, estimate: Estimate, components: tuple[int, ...]
-) -> tuple[int, Stretch, float]:
-    """Component, stretch and residual [N·m or N] of the largest one over its noise."""
-    best = (components[0], memory.stretches[-1], 0.0)
-    largest = -1.0
-    for stretch in memory.stretches:
-        line = stretch.line
-        if line is None or stretch.windows < 2:
-            continue
-        update = line.update(estimate.x, stretch.windows)
-        for place, (off, row) in enumerate(zip(update.innovation, update.R, strict=True)):
-            score = off * off / row[place]
-            if score > largest:
-                largest, best = score, (components[place], stretch, off)
-    return best
+    worst = state.memory.farthest(state.bank[0].x)
+    if worst is None:
+        return "the equations do not fit what was measured"
+    component = tracker.measurement.components[worst.component]
+    mean, channel = worst.stretch.mean, COMPONENTS[component].replace("_", " ")
+    where = f"at slip {mean.slip.value:.2f} under {mean.load.value:.0f} N"
+    return f"the equations miss the {channel} by {abs(worst.off):.2g} {UNITS[component]} {where}"
 
 
 def _times(count: int) -> str:

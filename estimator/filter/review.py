@@ -113,7 +113,7 @@ class Reviewer:
         x = state.estimate.x
         if not same and self._moved(state.linearised, x):
             return state._replace(task=Relining(x, last=True))
-        return state._replace(task=None, misfit=misfit(state.bank))
+        return _judged_form(state._replace(task=None))
 
     def concluded(self, state: TrackState) -> TrackState:
         """The whole record linearised at the estimate that it leads to: what a run leaves. No
@@ -127,7 +127,7 @@ class Reviewer:
             state = self._over_all(state, state.memory.along(lines), x)
             if not self._moved(x, state.estimate.x):
                 break
-        return state._replace(misfit=misfit(state.bank))
+        return _judged_form(state)
 
     def _moved(self, before: Vector | None, now: Vector) -> bool:
         """Whether the estimate is so far from where the memory was linearised that its Jacobians no
@@ -152,8 +152,8 @@ class Reviewer:
         return (*lines, *self._smoother.tangents(todo, x))
 
     def _passed(self, state: TrackState, task: Passing) -> TrackState:
-        """The filter over some more of the complete stretches; and over the open one, where its bank
-        becomes the state's.
+        """The filter over some more of the complete stretches; after the last, over the open one:
+        its bank is the state's.
         """
         done, complete = len(task.stretches), len(state.memory.stretches) - 1
         todo = state.memory.stretches[done : min(done + PASSED, complete)]
@@ -188,3 +188,10 @@ class Reviewer:
             unlinearised=0,
             trust=self._bounds.stood(state.trust, estimate),
         )
+
+
+def _judged_form(state: TrackState) -> TrackState:
+    """Whether the equations miss, and where, by a record that was linearised where it leads to."""
+    worst = state.memory.farthest(state.bank[0].x)
+    place = 0 if worst is None else worst.component
+    return state._replace(misfit=misfit(state.bank), misfit_at=place)

@@ -21,6 +21,7 @@ from math import exp
 from typing import Any, NamedTuple
 
 from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.estimate import Vector
 from gritd.estimator.filter.line import Line
 from gritd.estimator.filter.tuning import CHANGE
 from gritd.estimator.messages.replacing import quickly_replaced
@@ -111,6 +112,14 @@ def _blend(old: tuple[float, ...], now: tuple[float, ...], weight: float) -> Any
     return tuple([a + (b - a) * weight for a, b in zip(old, now, strict=True)])
 
 
+class Residual(NamedTuple):
+    """What a stretch measured, less what was predicted of it."""
+
+    stretch: Stretch
+    component: int  # of those that are measured
+    off: float  # [N·m] or [N]
+
+
 @quickly_replaced
 class Memory(NamedTuple):
     """The anchor and what came after it; the last stretch is still open."""
@@ -150,8 +159,20 @@ class Memory(NamedTuple):
     def _begun(self, before: Sequence[Stretch], last: Stretch) -> Memory:
         return Memory(self.anchor, (*before, last))
 
+    def farthest(self, x: Vector) -> Residual | None:
+        """What is farthest, over its noise, from what a vector x (d,) predicts."""
+        worst, largest = None, -1.0
+        for stretch in self.stretches:
+            if stretch.line is None or not stretch.judged:
+                continue
+            update = stretch.line.update(x, stretch.windows)
+            for at, (off, row) in enumerate(zip(update.innovation, update.R, strict=True)):
+                if off * off > largest * row[at]:
+                    largest, worst = off * off / row[at], Residual(stretch, at, off)
+        return worst
+
     def dropped(self, after: Memory) -> bool:
-        """Whether the last stretch was left out when a new one began: it did not tell of the soil."""
+        """Whether the last stretch was left out when a new one began: it was too short."""
         return len(after.stretches) == len(self.stretches)
 
     def ended(self) -> Memory:

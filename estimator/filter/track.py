@@ -85,6 +85,7 @@ class TrackState(NamedTuple):
     before: WheelState | None = None
     steady: Steady | None = None  # None where the last window was not ready
     misfit: float = 0.0  # probability that the equations miss, when a review was last complete
+    misfit_at: int = 0  # which of the measured components was then the farthest off
     trust: Trust = Trust()
     updates: int = 0
     doubted: int = 0  # of `updates`, those after which the estimate was not believed

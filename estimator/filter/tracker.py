@@ -227,8 +227,8 @@ class Tracker:
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float
     ) -> tuple[TrackState, tuple[Aid, ...]]:
-        """Gate a window, add it to its stretch, and update with the stretch; where one ends, begin a
-        review of the record.
+        """Gate a window, add it to its stretch, and update with the stretch; where one ends, a
+        review of the record begins.
         """
         trust = state.trust.passed(elapsed)
         walked = told(self.smoother.walked(state.bank, elapsed, trust.unrest))
@@ -315,9 +315,12 @@ class Tracker:
         return estimate.soil_P[LN_K][LN_K] < (KNOWN * self._prior_sigma[LN_K]) ** 2
 
     def _flags(self, state: TrackState, aids: tuple[Aid, ...], separability: float) -> int:
-        trust = state.trust
-        disagrees = trust.disagrees(_experienced(state))
+        trust, misses = state.trust, state.misfit > self.misfit
+        disagrees = misses or trust.disagrees(_experienced(state))
         torque, drawbar_pull = trust.surprise
+        by_pull = torque < drawbar_pull
+        if misses:
+            by_pull = self.measurement.components[state.misfit_at] == 1
 
         return (
             Flag.NOT_SEPARABLE * (separability > SEPARABLE)
@@ -326,8 +329,8 @@ class Tracker:
             + Flag.RESET * (bool(aids) and state.resets > state.resets_told)
             + Flag.MISMATCH * disagrees
             + Flag.CHANGED * (trust.since_change < CHANGE.settled)
-            + Flag.TORQUE_OFF * (disagrees and torque >= drawbar_pull)
-            + Flag.DRAWBAR_PULL_OFF * (disagrees and torque < drawbar_pull)
+            + Flag.TORQUE_OFF * (disagrees and not by_pull)
+            + Flag.DRAWBAR_PULL_OFF * (disagrees and by_pull)
         )
 
 

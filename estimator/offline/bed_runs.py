@@ -38,7 +38,8 @@ def doubted(runs: Sequence[BedRun]) -> Reason:
     """Why what the runs know together is not believed: more than a third of them are not."""
     refused = [run for run in runs if not run.counts]
     if len(refused) == len(runs):
-        return refused[0].carried.reason if len(runs) == 1 else Reason("no run is believed")
+        first = refused[0].carried.reason
+        return first if len(runs) == 1 else Reason("no run is believed", first.remedy)
     if 3 * len(refused) <= len(runs):
         return Reason()
     why = f"{len(refused)} of {len(runs)} runs are not believed"

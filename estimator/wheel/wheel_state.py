@@ -35,6 +35,9 @@ ANGLE_SIGMA_MAX = 0.2  # likewise, relative error of θ₁
 STEADY = 0.05
 SAME_SLIP = 0.02  # change of slip that is none
 SCATTER = 3.0  # [σ] by which two windows of one condition may differ besides
+# share of the contact angle θ₁ by which the wheel turns in steady motion before a window counts:
+# most of the soil under the rim, and what lags in a force sensor's mounting, has then seen no other
+SETTLED = 0.5
 HALF = 0.5  # counts
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
@@ -76,6 +79,7 @@ class WheelState(NamedTuple):
     situation: Situation | None = None
     read: tuple[float, float] = (0.0, 0.0)  # wheel speed [rad/s] and sinkage [m] as read
     grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`
+    doubts: tuple[float, float] = (0.0, 0.0)  # σ of slip and load [N] by what lags: no noise
     form: FormHere | None = None  # the learnt discrepancy of form; None where there is none
 
 
@@ -133,8 +137,14 @@ def _with_effects(
         load=_doubted(now.load, undone.load, undone.load_doubt),
         here=undone.here,
         situation=undone.situation,
+        doubts=(_slip_doubt(now, undone.travel_doubt), undone.load_doubt),
         read=(snapshot.wheel_speed.value, snapshot.sinkage.value),
     )
+
+
+def _slip_doubt(now: WheelState, travel_doubt: float) -> float:
+    """σ of slip by that of the travel speed [m/s]."""
+    return slip_sigma(slip(now.rim_speed.value, now.travel_speed.value), 0.0, travel_doubt)
 
 
 def _doubted(measured: Measured, value: float, doubt: float) -> Measured:
@@ -197,7 +207,8 @@ def classify(
 ) -> Status:
     """TRACKING, or the first reason that applies why the window is not used.
 
-    since: since when the motion is steady; needed: CHANNEL_BITS; started: whether every required channel has filled a window once.
+    since: since when the motion is steady; needed: CHANNEL_BITS; started: whether every required
+    channel has filled a window once.
     """
     if snapshot.stale & needed or not snapshot.ready or _unread(settings, now):
         return Status.STALE if started else Status.STARTING
@@ -252,11 +263,10 @@ def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> St
     if now.theta_1.d_sinkage * now.sinkage.sigma > ANGLE_SIGMA_MAX * now.theta_1.value:
         return Status.UNCERTAIN
 
-    # what is under the rim was sheared as it is now once the wheel has turned by θ₁
     if since is None or not alike(now, since.state):
         return Status.UNSTEADY
     turned = abs(wheel_angle - since.wheel_angle)
-    return Status.TRACKING if turned >= now.theta_1.value else Status.UNSTEADY
+    return Status.TRACKING if turned >= SETTLED * now.theta_1.value else Status.UNSTEADY
 
 
 class Steady(NamedTuple):

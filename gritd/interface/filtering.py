@@ -20,7 +20,6 @@ from gritd.estimator.offline.streams import streams_of
 from gritd.estimator.online.bed import Start
 from gritd.interface.runs import Place, Run, Table, configured
 
-DOUBTED = " (the prior: the filter's own estimate is not believed at the end)"
 Series = tuple[ArrayLike, ArrayLike]  # times [s] (n,) and raw values (n,), of the wrench (n, 6)
 
 
@@ -62,8 +61,13 @@ class Estimates:
 
     @property
     def believed(self) -> bool:
-        """Whether the filter's own estimate is believed at the end; otherwise the prior is told."""
+        """Whether what the run leaves is believed, of all that it showed."""
         return self.replayed.believed
+
+    @property
+    def reason(self) -> str:
+        """Why it is not believed, and what to do; empty where it is."""
+        return str(self.replayed.reason)
 
     def _last(self, name: str) -> Uncertain:
         return Uncertain(float(self.rows[name][-1]), float(self.rows[f"{name}_sigma"][-1]))
@@ -73,7 +77,7 @@ class Estimates:
         return (
             f"c {c.value:.0f} ± {c.sigma:.0f} Pa, tan φ {tan_phi.value:.4f} ± {tan_phi.sigma:.4f}, "
             f"k {k.value * 1e3:.1f} ± {k.sigma * 1e3:.1f} mm after {len(self.rows)} windows"
-            f"{'' if self.believed else DOUBTED}"
+            f"{'' if self.believed else f' (not believed: {self.reason})'}"
         )
 
 

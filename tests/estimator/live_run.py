@@ -12,8 +12,11 @@ from tests.linear_plant import readings
 
 SETTINGS = load(packaged()).settings
 TRUTH = (720.0, 0.62, 0.025)
-SCHEDULE = [(2.0, 50.0, 0.2), (2.0, 90.0, 0.4), (2.0, 60.0, 0.1), (2.0, 80.0, 0.5)]
-JUMP, MORE_VOLTS = 6.0, 0.05  # [s] from which on the shunt reads so much more: a change of the soil
+SCHEDULE = [(4.0, 50.0, 0.2), (4.0, 90.0, 0.4), (4.0, 60.0, 0.1), (4.0, 80.0, 0.5)]
+JUMP, MORE_VOLTS = (
+    14.0,
+    0.05,
+)  # [s] from which on the shunt reads so much more: a change of the soil
 
 
 def consumed(schedule=SCHEDULE):

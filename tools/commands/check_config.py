@@ -17,6 +17,7 @@ from gritd.estimator.config.settings import (
     Calibration,
     Channel,
     Device,
+    Rates,
     Settings,
     Uncertain,
     Wrench,
@@ -25,6 +26,7 @@ from gritd.estimator.messages.readings import ENCODERS
 from gritd.estimator.wheel import geometry
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser
 from gritd.tools.cli.files import open_to_all
+from gritd.tools.commands.rig_reach import reach
 
 RIM_SPEED = 0.02  # [m/s] at which slip resolution is stated
 SLIP = 0.2
@@ -125,14 +127,10 @@ def _facts(settings: Settings) -> Rows:
         ),
         (
             "rates",
-            f"{rates.tick:g} ticks/s, {rates.update:g} updates/s, "
-            f"horizon {1e3 * rates.horizon:g} ms",
+            f"{rates.tick:g} ticks/s, {_updates(rates)}, horizon {1e3 * rates.horizon:g} ms",
         ),
-        (
-            "filter",
-            f"{settings.filter.engine}, gate {settings.filter.gate:g} σ, k estimated: "
-            f"{settings.filter.estimate_k}",
-        ),
+        ("filter", f"{settings.filter.engine}, gate {settings.filter.gate:g} σ"),
+        ("determines", reach(settings)),
         ("effects", effects),
         (
             "logging",
@@ -141,6 +139,12 @@ def _facts(settings: Settings) -> Rows:
         ),
         *((f"device {device.name}", _device(device)) for device in settings.devices.values()),
     ]
+
+
+def _updates(rates: Rates) -> str:
+    if rates.auto:
+        return "windows of 0.1 to 3.2 s, as the noise of slip asks for"
+    return f"{rates.update:g} updates/s"
 
 
 def _device(device: Device) -> str:

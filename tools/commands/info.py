@@ -21,6 +21,7 @@ from gritd.tools.cli.progress import Progress
 from gritd.tools.commands.demo_targets import punctuality
 from gritd.tools.commands.replay_report import report
 from gritd.tools.commands.replay_verify import lost_of
+from gritd.tools.commands.rig_reach import reach
 from gritd.tools.recordings.summary import RunSummary, summary
 
 INDENT = " " * 15
@@ -118,6 +119,7 @@ def _testbed(settings: Settings) -> Iterator[str]:
         f"tan φ {soil.tan_phi.value:.4g} ± {soil.tan_phi.sigma:.2g}, "
         f"k {soil.shear_modulus.value * 1e3:g} ± {soil.shear_modulus.sigma * 1e3:g} mm"
     )
+    yield f"{INDENT}{reach(settings)}"
 
 
 def _topics(of_run: RunSummary) -> Iterator[str]:

@@ -1,5 +1,5 @@
 """`gritd prove`: blind trials of the diagnosis, sealed, scored, resumable, on this computer or on a
-cluster.
+cluster; and with --online of the filter.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from gritd.tools.proof.blind import batch, page, score, tables, trial
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import STRATA
 from gritd.tools.proof.blind.verdicts import Row, row
+from gritd.tools.proof.online import command as online
+from gritd.tools.proof.online.draw import STRATA as ONLINE
 
 SCORE, PAGE, SEALS = "score.json", "score.html", "seals.txt"
 OUTPUT = Path("proof")
@@ -27,6 +29,8 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     CommandError.
     """
     arguments = _parser().parse_args(argv)
+    if arguments.online:
+        return online.prove(arguments)
     cluster_of(arguments)
     output: Path = arguments.output
     begun = batch.resumed(output) if arguments.resume else _started(arguments)
@@ -106,6 +110,12 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="gritd prove",
         description="Blind trials: an independent plant conceals, `gritd diagnose` names.",
+    )
+    parser.add_argument(
+        "--online",
+        action="store_true",
+        help="the filter instead: benches of strangers as tables, `gritd estimate` finds the soil; "
+        f"--strata: some of {','.join(ONLINE)}",
     )
     parser.add_argument("--cases", type=_positive, default=60, metavar="N", help="default 60")
     parser.add_argument(

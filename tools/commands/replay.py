@@ -14,6 +14,7 @@ import numpy as np
 
 from gritd.estimator.config.configuration import Configuration, load, loads, with_engine
 from gritd.estimator.config.settings import ENGINES
+from gritd.estimator.filter.reasons import Reason
 from gritd.estimator.messages.status import Status
 from gritd.estimator.messages.tick import TICK_FIELDS
 from gritd.estimator.offline.batch import replayed
@@ -96,7 +97,8 @@ def _carried(paths: Sequence[Path], arguments: Namespace) -> int:
         try:
             for run in each:
                 runs.append(run)
-                print(report(run.recording.path, run.carried.rows, "windows"))
+                carried = run.carried
+                print(report(run.recording.path, carried.rows, "windows", carried.reason))
         except RecordingError as error:
             raise CommandError(error, DAMAGED) from None
 
@@ -162,17 +164,17 @@ def _recompute(
     reloaded = first.counts["/checkpoint"] > 1 and not arguments.config
 
     if arguments.output or len(recordings) > 1 or reloaded:
-        rows, each = _every_tick(recordings, configuration, arguments), "ticks"
+        rows, each, reason = _every_tick(recordings, configuration, arguments), "ticks", Reason()
     else:
         settings = told(first, configuration, first)
         with Progress(f"replaying {first.path.name}") as progress:
             made = replayed(settings, first, settings.filter.engine, advance=progress.reached)
-        rows, each = made.rows, "windows"
+        rows, each, reason = made.rows, "windows", made.reason
 
     if not len(rows):
         raise CommandError(f"{first.path}: holds no readings", DAMAGED)
 
-    print(report(first.path, rows, each))
+    print(report(first.path, rows, each, reason))
     if np.all(rows["status"] == Status.STARTING):
         print(
             f"{first.path}: {never_ready(run_settings(first, configuration, first), first)}",

@@ -9,17 +9,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.filter.reasons import Reason
 from gritd.estimator.filter.tuning import TRUST
 from gritd.estimator.messages.status import UPDATED, Flag, Status
 from gritd.tools.cli.wording import honesty
 
+BELIEVED = Reason()
 Rows = NDArray[np.void]  # structured: fields of /tick, one row a tick or one a window
 SIDE_BY_SIDE = (("torque", "N·m"), ("drawbar_pull", "N"), ("load", "N"))
 
 
-def report(path: Path, rows: Rows, each: str) -> str:
-    """rows: fields of /tick (n,). `each` says what a row is, "ticks" or "windows". What the rows
-    lack is left out.
+def report(path: Path, rows: Rows, each: str, reason: Reason = BELIEVED) -> str:
+    """rows: fields of /tick (n,). `each` says what a row is, "ticks" or "windows"; reason: why what
+    the run leaves is not believed. What the rows lack is left out.
     """
     last = {name: rows[name][-1] for name in rows.dtype.names or ()}
     seconds = (int(last["evaluated"]) - int(rows["evaluated"][0])) * 1e-9
@@ -30,7 +32,8 @@ def report(path: Path, rows: Rows, each: str) -> str:
             f"{int(last['resets'])} resets",
             f"  status     {_statuses(rows)}",
             f"  flags      {_flags(rows)}",
-            *_doubted(last),
+            *_window(rows, each),
+            *_doubted(last, reason),
             f"  c          {last['cohesion']:.0f} ± {last['cohesion_sigma']:.0f} Pa",
             f"  tan φ      {last['tan_phi']:.4f} ± {last['tan_phi_sigma']:.4f}   correlation with "
             f"c {_correlation(last):+.3f}; weakest direction {last['separability']:.0%} of the "
@@ -71,8 +74,16 @@ def _flags(rows: Rows) -> str:
     )
 
 
-def _doubted(last: dict[str, float]) -> Iterator[str]:
-    """That the soil at the end is the stated one."""
+def _window(rows: Rows, each: str) -> Iterator[str]:
+    """The length of the windows, from one to the next."""
+    if each == "windows" and len(rows) > 1:
+        yield f"  window     {np.median(np.diff(rows['evaluated'])) * 1e-9:g} s"
+
+
+def _doubted(last: dict[str, float], reason: Reason) -> Iterator[str]:
+    """That the soil at the end is the stated one; why what is there is not believed."""
+    if reason.why:
+        yield f"  belief     not believed: {reason}"
     if int(last["flags"]) & Flag.PRIOR:
         yield "  soil       the prior: the filter's own estimate is not believed at the end"
 

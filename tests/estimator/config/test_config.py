@@ -45,7 +45,11 @@ def test_quantities_become_si() -> None:
 def test_defaults_are_those_of_the_settings() -> None:
     """Two places state defaults, the table and the dataclasses; they agree."""
     read = config.loads(MINIMAL, "rig.yaml").settings
-    assert read.rates == Rates() and read.filter == FilterSettings() and read.logging == Logging()
+    assert (
+        read.rates == Rates(auto=True)
+        and read.filter == FilterSettings()
+        and read.logging == Logging()
+    )
     assert read.load == Load(Uncertain(70.0)) and read.effects == ()
     given = read.channels["wheel_encoder"]
     assert given == Channel(

@@ -200,7 +200,7 @@ APPENDED = [
         "rates.tick",
         "a whole multiple of rates.update (12 Hz)",
     ),
-    ("rates: {tick: 10 Hz}", "rates.tick", "at least twice it"),
+    ("rates: {tick: 10 Hz, update: 10 Hz}", "rates.tick", "at least twice it"),
     ("rates: {horizon: 5 s}", "rates.horizon", "to 1 s"),
     ("rates: {horizon: 0 s}", "rates.horizon", "above 0 s"),
     ("filter: {cohesion_bounds: [9 kPa, 1 kPa]}", "filter.cohesion_bounds", "the low end below"),

@@ -9,6 +9,7 @@ import pytest
 from gritd.estimator.config.settings import BedSettings
 from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import BedError
+from gritd.estimator.filter.estimate import covariance, made
 from gritd.estimator.filter.tracker import Tracker
 from tests.rig import SETTINGS
 
@@ -17,10 +18,12 @@ DAY = 86400.0
 
 def learnt(settings):
     """What a run leaves: the prior with half of c's standard deviation."""
-    prior = Tracker(settings).prior
-    P = [list(row) for row in prior.P]
-    P[0][0] *= 0.25
-    return prior._replace(P=tuple(map(tuple, P)))
+    bank = []
+    for member in Tracker(settings).prior_bank:
+        P = covariance(member).copy()
+        P[0, 0] *= 0.25
+        bank.append(made(member.x, P))
+    return tuple(bank)
 
 
 def test_the_bed_is_kept_to_the_bit_and_the_next_run_begins_with_it(tmp_path):
@@ -35,7 +38,7 @@ def test_the_bed_is_kept_to_the_bit_and_the_next_run_begins_with_it(tmp_path):
     bed_file.save(tmp_path, bed)
     again = bed_file.current(tmp_path, settings, 100.0)
     assert again == bed and again.runs == 1
-    assert bed_file.start_of(again, settings, 100.0) == learnt(settings)
+    assert bed_file.start_of(again, settings, 100.0).bank == learnt(settings)
 
     bed = bed_file.after(again, settings, learnt(settings), 200.0, 300.0)
     assert bed.runs == 2 and bed.updated == 300.0

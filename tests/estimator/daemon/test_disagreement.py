@@ -58,7 +58,7 @@ def test_a_change_of_the_soil_is_said_once() -> None:
     assert any(flag & Flag.CHANGED for flag in flags[BEGINS:])
     assert not any(flag & (Flag.CHANGED | Flag.PRIOR) for flag in flags[:BEGINS])
     number, line = said[0]
-    assert line.startswith("the soil changed") and BEGINS < number <= BEGINS + 20
+    assert line.startswith("the soil changed") and BEGINS < number <= BEGINS + 30
     assert len([line for _, line in said if line.startswith("the soil changed")]) <= 4
     assert watch.present is None
 

@@ -70,8 +70,8 @@ def test_no_tick_between_windows_takes_more_than_its_share_of_tangents(consumed,
         closed = state.track.window_end != before.track.window_end
         (closing if closed else between).append(len(taken))
     assert max(between) == review.LINES
-    assert sum(count > 0 for count in between) > 20
-    assert not any(closing)
+    assert sum(count > 0 for count in between) > 5
+    assert max(closing) == 1  # that of the open stretch
 
 
 def test_the_estimate_stays_what_the_window_left_until_the_review_is_complete(consumed):

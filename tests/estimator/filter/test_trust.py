@@ -10,7 +10,7 @@ import pytest
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.filter.trust import Trust
 from gritd.estimator.filter.tuning import TRUST
-from gritd.estimator.messages.status import Flag, Status
+from gritd.estimator.messages.status import UPDATED, Flag, Status
 from gritd.estimator.messages.tick import Aid
 from tests.estimator.filter.rig import RIG, TRUTH, run
 from tests.linear_plant import THREE_LOADS
@@ -90,10 +90,9 @@ def test_a_torque_that_no_soil_explains_leaves_the_prior_as_the_answer(offset):
     zero = replace(shunt.calibration, offset=Uncertain(offset))
     channels = {**RIG.channels, "motor_shunt": replace(shunt, calibration=zero)}
     _, ticks = run(replace(RIG, channels=channels), TRUTH, THREE_LOADS, plant=RIG)
-    seen = {Status(t["status"]) for t in ticks}
-    assert {Status.AT_BOUND, Status.DIVERGED} <= seen
-    assert sum(t["status"] == Status.TRACKING for t in ticks) < 0.1 * len(ticks)
-    assert any(t["flags"] & Flag.MISMATCH for t in ticks)
+    updated = [t for t in ticks if t["status"] in UPDATED]
+    assert ticks[-1]["flags"] & Flag.PRIOR
+    assert len(told(updated)) > 0.5 * len(updated)
     for tick in told(ticks):
         assert tick["cohesion"] == RIG.soil.cohesion.value
         assert tick["cohesion_sigma"] == pytest.approx(RIG.soil.cohesion.sigma)

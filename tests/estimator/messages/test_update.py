@@ -19,7 +19,7 @@ from tests.rig import SETTINGS
 def ticks():
     pipeline = Pipeline(SETTINGS)
     state, rows = pipeline.start(), []
-    sent = readings(SETTINGS, (900.0, 0.6, 0.02), [(3.0, 60.0, 0.2)], seed=1, rate=250)
+    sent = readings(SETTINGS, (900.0, 0.6, 0.02), [(5.0, 60.0, 0.2)], seed=1, rate=250)
     for _, batch in sent:
         for stamp, group in groupby(batch, key=lambda reading: reading.stamp):
             state, row = pipeline.step(state, list(group), stamp)

@@ -24,11 +24,11 @@ def test_the_same_readings_give_the_same_ticks_until_the_revision_is_raised():
     assert kept["revision"] == computed["revision"], ANEW
     for name in kept.keys() - {"revision"}:
         for was, now in zip(kept[name], computed[name], strict=True):
-            assert now == pytest.approx(was, rel=1e-6, abs=1e-12), f"{name}: {ANEW}"
+            assert now == pytest.approx(was, rel=1e-6, abs=1e-12, nan_ok=True), f"{name}: {ANEW}"
 
 
 def test_they_hold_a_change_of_the_soil():
-    flags = [int(tick["flags"]) for tick in golden.computed()["more torque from 12 s on"]]
+    flags = [int(tick["flags"]) for tick in golden.computed()["another soil from 12 s on"]]
     assert any(flag & Flag.CHANGED for flag in flags)
 
 

@@ -192,7 +192,11 @@ def test_gradients_agree_with_differences(x: tuple[float, ...], wheel: Wheel) ->
     ]
     assert len(gradients[0]) == len(GRADIENT)
     assert_jacobian(
-        outputs, gradients, state, step=[100, 0.002, 0.002, 0.002, 0.002, 1.0, 0.1, 0.002], rtol=1e-5
+        outputs,
+        gradients,
+        state,
+        step=[100, 0.002, 0.002, 0.002, 0.002, 1.0, 0.1, 0.002],
+        rtol=1e-5,
     )
 
 

@@ -21,7 +21,9 @@ conditions = st.tuples(
 )
 
 
-STEPS = np.array([300.0, 0.1, 0.1, 0.1, 0.1, 10.0])  # a change of each variable that matters
+STEPS = np.array(
+    [300.0, 0.1, 0.1, 0.1, 0.1, 10.0, 0.1, 0.1]
+)  # a change of each variable that matters
 
 
 def changes(prediction):

@@ -1,4 +1,4 @@
-"""A bench that nobody has seen: wheel, soil, sensors, rates, noise, motion, and what is stated of it.
+"""A bench that nobody has seen: wheel, soil, sensors, rates, noise, motion, what is stated of it.
 
 Everything true of a bench follows from its stratum and its seed. The literature behind the ranges:
 c₁ ≈ 0.4 and 0 ≤ c₂ ≤ 0.3 of Eq. (5), Wong and Reece (1967), Ishigami et al. (2007); soils of
@@ -200,5 +200,5 @@ def _changing(stratum: str, loads: list[float], rng: np.random.Generator) -> Run
 
     begin = float(rng.uniform(60.0, 80.0))
     seconds = {"step": 0.0, "ramp": 20.0, "patch": float(rng.uniform(8.0, 20.0))}[stratum]
-    factors = [float(1.0 + rng.uniform(-most, most)) for most in CHANGE]
-    return Run(tuple(parts), Course(stratum, *factors, begin, begin + seconds))
+    cohesion, tan_phi = (float(1.0 + rng.uniform(-most, most)) for most in CHANGE)
+    return Run(tuple(parts), Course(stratum, cohesion, tan_phi, begin, begin + seconds))

@@ -73,9 +73,9 @@ WHEEL = {
     "c1": Key(
         uncertain("", low=0, high=1),
         "c₁ of θₘ = (c₁ + c₂ i) θ₁, Eq. (5); the default covers what was measured in sands",
-        "{value: 0.43, sigma: 0.07}",
+        "{value: 0.5, sigma: 0.1}",
     ),
-    "c2": Key(uncertain("", low=-1, high=1), "c₂ of Eq. (5)", "{value: 0.15, sigma: 0.12}"),
+    "c2": Key(uncertain("", low=-1, high=1), "c₂ of Eq. (5)", "{value: 0.0, sigma: 0.2}"),
 }
 
 SOIL = {

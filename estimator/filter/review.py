@@ -53,6 +53,10 @@ class Reviewer:
         """
         return Ended(like and unlinearised < LONGEST)
 
+    def anew(self, x: Vector) -> Task:
+        """The record is to be passed once more, from another anchor."""
+        return Relining(x, last=False)
+
     def finished(self, state: TrackState) -> TrackState:
         """The whole rest of a review at once."""
         while state.task is not None:

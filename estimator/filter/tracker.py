@@ -158,7 +158,9 @@ class Tracker:
 
     def reviewed(self, state: TrackState) -> TrackState:
         """The state with the review that is under way done at once."""
-        return self._concluded(self.reviewer.finished(state))
+        while state.task is not None:
+            state = self._concluded(self.reviewer.finished(state))
+        return state
 
     def concluded(self, state: TrackState) -> TrackState:
         """What the run leaves: its record linearised at the estimate that it leads to."""
@@ -169,7 +171,23 @@ class Tracker:
         if state.task is not None or state.withheld is None:
             return state
         trust = state.trust.surprised(*state.withheld, self.measurement.components[0])
-        return self._set_back(state._replace(trust=trust, withheld=None))
+        return self._doubting(self._set_back(state._replace(trust=trust, withheld=None)))
+
+    def _doubting(self, state: TrackState) -> TrackState:
+        """Where the equations miss the record, the prior of the soil may have been too sure: the
+        same record from a wider one.
+        """
+        trust = state.trust
+        if trust.missing < TRUST.patience or trust.doubts >= TRUST.diverged:
+            return state
+
+        trust = trust.reset()._replace(doubts=trust.doubts + 1)
+        bank = self._unsure(trust.doubt)
+        memory = state.memory._replace(anchor=bank)
+        task = self.reviewer.anew(state.estimate.x)
+        return state._replace(
+            memory=memory, trust=trust, resets=state.resets + 1, task=task, misfit=0.0
+        )
 
     def _account(
         self,
@@ -230,7 +248,7 @@ class Tracker:
         """Gate a window, add it to its stretch, and update with the stretch; where one ends, a
         review of the record begins.
         """
-        trust = state.trust.passed(elapsed)
+        trust = state.trust.passed(elapsed, state.misfit > self.misfit)
         walked = told(self.smoother.walked(state.bank, elapsed, trust.unrest))
 
         prediction = self.measurement.predict(walked, now)

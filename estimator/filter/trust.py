@@ -28,6 +28,8 @@ class Trust(NamedTuple):
     changes: float = 0.0  # number of them, exponentially forgotten
     since_reset: float = inf  # [s]
     streak: int = 0  # resets in a row
+    doubts: int = 0  # of them, because the equations missed the record
+    missing: float = 0.0  # [s] for which the equations have missed it
     at_bound: float = 0.0  # [s] for which the estimate has stood at an improbable bound
 
     @property
@@ -38,11 +40,12 @@ class Trust(NamedTuple):
         torque, drawbar_pull = self.surprise
         return (torque + drawbar_pull) / self.components if self.components > 0.0 else nan
 
-    def passed(self, elapsed: float) -> Trust:
-        """An update later."""
+    def passed(self, elapsed: float, missing: bool = False) -> Trust:
+        """An update later; missing: whether the equations miss the record."""
         return self._replace(
             since_change=self.since_change + elapsed,
             since_reset=self.since_reset + elapsed,
+            missing=self.missing + elapsed if missing else 0.0,
             changes=self.changes * exp(-elapsed / TRUST.restless_memory),
         )
 
@@ -63,7 +66,7 @@ class Trust(NamedTuple):
     def reset(self) -> Trust:
         """σ was set back."""
         streak = self.streak + 1 if self.relapsing else 1
-        return Trust(since_reset=0.0, streak=streak, changes=self.changes)
+        return Trust(since_reset=0.0, streak=streak, doubts=self.doubts, changes=self.changes)
 
     @property
     def relapsing(self) -> bool:

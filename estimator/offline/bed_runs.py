@@ -9,6 +9,7 @@ from gritd.estimator.config.settings import Repeatability, Settings
 from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.reasons import Reason
 from gritd.estimator.filter.tracker import Tracker
+from gritd.estimator.messages.status import Flag
 from gritd.estimator.offline.batch import Replayed, replayed
 from gritd.estimator.online.bed import Known, after_run, before_run, surprise
 from gritd.estimator.recording.mcapfile import RecordingError
@@ -29,21 +30,38 @@ class BedRun(NamedTuple):
     surprise: float  # by which it moved what was known: chi-square, 3 degrees of freedom
 
     @property
+    def another_soil(self) -> bool:
+        """Whether the soil changed beside the runs before it, and not by itself."""
+        together, alone = (
+            (run.rows["flags"] & Flag.CHANGED) > 0 for run in (self.carried, self.alone)
+        )
+        return bool(together.any() and not alone.any())
+
+    @property
+    def reason(self) -> Reason:
+        """Why the bed's estimate does not rest on it."""
+        if self.another_soil:
+            return Reason(
+                "does not fit the runs before it", "prepare the bed anew, or leave it out"
+            )
+        return self.carried.reason
+
+    @property
     def counts(self) -> bool:
         """Whether the bed's estimate rests on it too."""
-        return self.carried.believed
+        return not self.reason.why
 
 
 def doubted(runs: Sequence[BedRun]) -> Reason:
     """Why what the runs know together is not believed: more than a third of them are not."""
     refused = [run for run in runs if not run.counts]
     if len(refused) == len(runs):
-        first = refused[0].carried.reason
+        first = refused[0].reason
         return first if len(runs) == 1 else Reason("no run is believed", first.remedy)
     if 3 * len(refused) <= len(runs):
         return Reason()
     why = f"{len(refused)} of {len(runs)} runs are not believed"
-    return Reason(why, refused[0].carried.reason.remedy)
+    return Reason(why, refused[0].reason.remedy)
 
 
 def bed_runs(

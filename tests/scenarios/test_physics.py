@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gritd.estimator.config.settings import Uncertain
-from gritd.estimator.messages.status import Status
+from gritd.estimator.messages.status import Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.online.pipeline import Pipeline
 from gritd.estimator.terramechanics import linear
@@ -197,7 +197,7 @@ def test_filter_divergence(seed, figure):
         tan_phi=Uncertain(rng.uniform(0.33, 0.40), 0.02),
     )
     _, ticks = run(replace(RIG, soil=wrong), TRUTH, THREE_LOADS, seed)
-    first = next(t for t in ticks if t["resets"])
+    first = next(t for t in ticks if t["flags"] & (Flag.MISMATCH | Flag.RESET))
     began = next(t for t in ticks if t["torque_s"] > 0.0)
     error = abs(ticks[-1]["tan_phi"] - TRUTH[1]) / TRUTH[1]
     figure(

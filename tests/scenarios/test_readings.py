@@ -209,7 +209,7 @@ def test_an_encoder_that_is_silent_while_its_counter_wraps(seed, silence, said, 
 @pytest.mark.parametrize("largest", [1 << 32, 1 << 16, 5000, 400])
 def test_a_random_counter_of_the_wheel(seed, largest, figure):
     """From the middle of a run on, every count is drawn anew; 400 is within max_rate."""
-    rng, clean = random.Random(seed), shifted(driven(8.0, seed))
+    rng, clean = random.Random(seed), shifted(driven(16.0, seed))
     at = clean[len(clean) // 2].stamp
     wild = [
         r._replace(value=rng.randrange(largest))
@@ -290,7 +290,7 @@ def test_not_a_number_infinity_and_out_of_range(seed, figure):
     device = SETTINGS.devices["bus"]
     wire, decoder = CanWire(device), build_decoder(SETTINGS, device)
     readings, refused, numbers, wires = [], 0, 0, 0
-    clean = shifted(driven(5.0, seed))
+    clean = shifted(driven(16.0, seed))
     places = dict(
         zip(sorted(rng.sample(range(1000, len(clean) - 100), len(cases))), cases, strict=True)
     )

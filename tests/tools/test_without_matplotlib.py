@@ -77,7 +77,7 @@ def test_what_draws_says_what_it_needs(folder: Path) -> None:
 
 
 def test_the_daemon_runs(tmp_path: Path) -> None:
-    with service(tmp_path, driven(8.0, 1), prelude=BLOCKED) as (_, daemon):
+    with service(tmp_path, driven(20.0, 1), prelude=BLOCKED) as (_, daemon):
         daemon.wait_status(lambda report: report["status"] == "TRACKING")
         daemon.stop()
 

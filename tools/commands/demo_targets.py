@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gritd.estimator.config.configuration import loads
+from gritd.estimator.config.settings import ConfiguredEffect, Uncertain
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.offline.playback import recorded_ticks
 from gritd.estimator.online.pipeline import Pipeline
@@ -85,11 +86,13 @@ def without_correction(recording: Recording, truth: Mapping[str, float]) -> list
     they were used.
     """
     settings = loads(recording.config_yaml or "", str(recording.path)).settings
-    others = tuple(effect for effect in settings.effects if effect.name != LINEARISATION)
-    if len(others) == len(settings.effects):
+    corrections = [effect for effect in settings.effects if effect.name == LINEARISATION]
+    if any(effect.parameters["share"].value == 0.0 for effect in corrections):
         return []
 
-    pipeline = Pipeline(replace(settings, effects=others), "plain")
+    others = [effect for effect in settings.effects if effect.name != LINEARISATION]
+    triangles = ConfiguredEffect(LINEARISATION, {"share": Uncertain(0.0)})
+    pipeline = Pipeline(replace(settings, effects=(*others, triangles)), "plain")
     state, tick = pipeline.start(), None
 
     with Progress("once more without the correction", recording.counts["/tick"]) as progress:

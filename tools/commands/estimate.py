@@ -190,7 +190,7 @@ def _refused(runs: Sequence[BedRun]) -> Iterator[str]:
     reasons: dict[str, list[str]] = {}
     for run in runs:
         if not run.counts:
-            reasons.setdefault(str(run.carried.reason), []).append(_name(run))
+            reasons.setdefault(str(run.reason), []).append(_name(run))
     for reason, names in reasons.items():
         yield f"{', '.join(names)}: not used: {reason}"
 
@@ -295,7 +295,7 @@ def _run_json(run: BedRun) -> dict[str, Any]:
         "file": str(run.recording.path),
         "load": run.settings.load.nominal.value,
         "used": run.counts,
-        "reason": str(run.carried.reason),
+        "reason": str(run.reason),
         "alone": _json(Known(run.alone.bank, 1)),
         "together": _json(run.known),
         "chi_square": run.surprise,

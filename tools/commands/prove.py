@@ -17,7 +17,6 @@ from gritd.tools.proof.blind import batch, page, score, tables, trial
 from gritd.tools.proof.blind.plant.worlds import FOREIGN, PAPER, WORLDS
 from gritd.tools.proof.blind.strata import STRATA
 from gritd.tools.proof.blind.verdicts import Row, row
-from gritd.tools.proof.online import command as online
 from gritd.tools.proof.online.draw import STRATA as ONLINE
 
 SCORE, PAGE, SEALS = "score.json", "score.html", "seals.txt"
@@ -30,7 +29,10 @@ def main(argv: Sequence[str], diagnose: tuple[str, ...] = trial.DIAGNOSE) -> int
     """
     arguments = _parser().parse_args(argv)
     if arguments.online:
-        return online.prove(arguments)
+        # it loads what is judged, which the trials of the diagnosis must not
+        from gritd.tools.proof.online import command
+
+        return command.prove(arguments)
     cluster_of(arguments)
     output: Path = arguments.output
     begun = batch.resumed(output) if arguments.resume else _started(arguments)

@@ -17,14 +17,18 @@ SHUNT = RIG.channels["motor_shunt"].calibration.scale.value
 BEGINS, ENDS = 80, 200  # ticks, ten a second
 
 
-def watched(loss: float) -> tuple[Watch, list[tuple[int, str]], list[int]]:
-    """A run whose motor consumes more torque between two ticks; the lines said, with their tick,
-    and all flags.
+def watched(
+    loss: float, changed: tuple[float, float, float] = TRUTH
+) -> tuple[Watch, list[tuple[int, str]], list[int]]:
+    """A run whose motor consumes more torque between two ticks, and whose soil changes at the first
+    of them; the lines said, with their tick, and all flags.
     """
     pipeline, watch = Pipeline(RIG, "plain"), Watch()
     state, said, flags = pipeline.start(), [], []
     more = loss / RIG.drive.torque_constant.value / SHUNT
-    for number, (t, batch) in enumerate(readings(RIG, TRUTH, THREE_LOADS, seed=3)):
+    both = (readings(RIG, soil, THREE_LOADS, seed=3) for soil in (TRUTH, changed))
+    for number, (before, after) in enumerate(zip(*both, strict=True)):
+        t, batch = before if number < BEGINS else after
         if BEGINS <= number < ENDS:
             batch = [_more(reading, more) for reading in batch]
         state, tick = pipeline.step(state, batch, t)
@@ -53,8 +57,7 @@ def test_a_motor_that_suddenly_drags_is_said_with_channel_and_time() -> None:
 
 
 def test_a_change_of_the_soil_is_said_once() -> None:
-    """A motor that drags a little is a change of the soil to the filter: said, and then learnt."""
-    watch, said, flags = watched(0.05)
+    watch, said, flags = watched(0.0, (740.0, 0.66, 0.025))
     assert any(flag & Flag.CHANGED for flag in flags[BEGINS:])
     assert not any(flag & (Flag.CHANGED | Flag.PRIOR) for flag in flags[:BEGINS])
     number, line = said[0]

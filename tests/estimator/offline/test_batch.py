@@ -47,7 +47,7 @@ RIG = replace(
 )
 TICK_ONLY = Flag.LATE_READINGS | Flag.COUNTER_JUMP
 TRUTH = (720.0, 0.62, 0.025)
-SCHEDULE = [(1.0, 70.0, 0.2), (1.0, 70.0, 0.4), (1.0, 100.0, 0.4), (1.0, 100.0, 1.0)]
+SCHEDULE = [(3.0, 70.0, 0.2), (3.0, 70.0, 0.4), (3.0, 100.0, 0.4), (1.0, 100.0, 1.0)]
 
 
 def rough(rng, seconds=1.2):

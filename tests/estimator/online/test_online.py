@@ -54,7 +54,9 @@ def test_a_configured_effect_leaves_c_and_tan_phi_where_they_are(name, undisturb
         sigma = max(each[f"{quantity}_sigma"] for each in (known, undisturbed))
         away = abs(known[quantity] - undisturbed[quantity]) / sigma
         assert away < (1.0 if effect.stage in ("drivetrain", "sensor") else 2.0), quantity
-    assert not known["resets"] and not int(known["flags"]) & Flag.PRIOR
+    assert not int(known["flags"]) & Flag.PRIOR
+    # a contact that relaxes begins with a transient that nobody knows the history of
+    assert not known["resets"] or name == "contact_relaxation"
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "force_crosstalk", "rear_contact"])

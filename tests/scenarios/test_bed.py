@@ -10,9 +10,11 @@ from tests.scenarios.rig import driven, rows, service, verified
 UPDATES = 20  # more of them in every run; how many more, the computer's load decides
 
 
-def run(folder, seed):
-    """One run of the daemon until its filter has been updated often; its process, ended."""
-    with service(folder, driven(40.0, seed), bed={"name": "box"}) as (_, daemon):
+def run(folder, skip):
+    """One run of the daemon until its filter has been updated often; its process, ended. All are
+    on one soil, and begin `skip` [s] into the same drive.
+    """
+    with service(folder, driven(40.0, 1, skip), bed={"name": "box"}) as (_, daemon):
         daemon.wait_status(lambda report: report["tick"] and report["tick"]["updates"] > UPDATES)
         daemon.stop()
     return daemon
@@ -23,9 +25,9 @@ def test_a_run_begins_with_what_the_run_before_it_knows(tmp_path):
     for folder in folders:
         folder.mkdir()
 
-    first = run(folders[0], 1)
+    first = run(folders[0], 0.0)
     shutil.copyfile(bed_file.path_of(folders[0]), bed_file.path_of(folders[1]))
-    second = run(folders[1], 2)
+    second = run(folders[1], 5.0)
 
     assert "bed 'box': begins with the stated prior: no run on it yet" in first.text
     assert "bed 'box': begins with what 1 runs know" in second.text

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,7 +80,8 @@ def test_each_replay_runs_the_engine_it_names(tmp_path, monkeypatch):
     monkeypatch.setattr(
         FilterpyEngine, "update", lambda *given: applied.append(1) or honest(*given)
     )
-    subject = measure._subject(SMALL, tmp_path)
+    longer = replace(SMALL, seconds=60.0)  # the filter waits until the wheel is steady
+    subject = measure._subject(longer, tmp_path)
     monkeypatch.setattr(measure, "ENGINES", ("plain",))
     assert {"plain_speed", "with_ticks_speed"} <= measure.replay(subject).keys() and not applied
     monkeypatch.setattr(measure, "ENGINES", ("filterpy",))

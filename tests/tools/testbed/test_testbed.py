@@ -149,7 +149,8 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
         with Daemon(path) as daemon:
             start = time.monotonic()
             print("play", file=process.stdin, flush=True)
-            assert process.wait(300) == 0
+            assert wait_until(lambda: daemon.take() and process.poll() is not None, 300.0)
+            assert process.returncode == 0
             elapsed = time.monotonic() - start
             wait_until(lambda: daemon.take() == daemon.take(), 1.0)
 
@@ -158,7 +159,7 @@ def test_a_process_of_its_own_plays_in_real_time_and_the_filter_learns_the_soil(
             f"this computer was held up for {pause:.2f} s, which overflows the wires: "
             "nothing to learn from it"
         )
-    prepared = experiment(TESTBED, 5.0, "linear", 3)
+    prepared = experiment(TESTBED, 20.0, "linear", 3)
     assert elapsed >= prepared.run.motion.time[-1]
     assert_nearly_all_and_nothing_else(
         by_channel(prepared.run.readings), by_channel(daemon.readings)

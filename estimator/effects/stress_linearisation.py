@@ -15,9 +15,10 @@ class StressLinearisation(Effect):
     Δ(θ₁, i, k, n) = the integral over the stresses of (3), (4), (7)
                      less that over the triangles of (11)-(14) with the exponent of (19)
 
-    Acts in the on-line filter alone, through estimator/filter/shift.py: simulator and diagnosis
-    integrate (3), (4), (7) themselves. Source: (8)-(10) against (20)-(22), Shibly, Iagnemma,
-    Dubowsky (2005), J. Terramechanics 42, 1-13.
+    Acts in the on-line filter alone, through estimator/filter/shift.py, also where it is not
+    configured (share 0 turns it off): simulator and diagnosis integrate (3), (4), (7) themselves.
+    Source: (8)-(10) against (20)-(22), Shibly, Iagnemma, Dubowsky (2005), J. Terramechanics 42,
+    1-13.
     """
 
     share: float = strength(

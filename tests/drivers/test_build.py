@@ -69,6 +69,24 @@ def test_any_sensor_on_a_can_bus_by_configuration_alone(name):
     assert reading.value == (VALUES[name] if name == "wrench" else VALUES[name][0])
 
 
+@pytest.mark.parametrize("cycles", [2, 5])
+def test_what_came_in_one_read_without_a_time_is_several_samples(cycles):
+    """A late read holds several cycles of a sensor without a clock: the last is not the only one
+    that counts, and none is later than its receipt.
+    """
+    device = can_device()
+    decoder, wire = build_decoder(settings_for("wrench", device), device), CanWire(device)
+    messages = [
+        wire.encode(key, VALUES["wrench"][part])
+        for _ in range(cycles)
+        for key, part in WRENCH_MESSAGES.items()
+    ]
+    readings = decoder.decode(10**18, b"".join(chunk(message) for message in messages))
+    stamps = [reading.stamp for reading in readings]
+    assert len(readings) == cycles and stamps == sorted(set(stamps))
+    assert all(10**18 - 1000 < stamp <= 10**18 for stamp in stamps)
+
+
 def test_one_reader_for_each_device_in_use():
     devices = [serial_device(name="a"), can_device(name="b"), serial_device(name="unused")]
     channels = [channel("wheel_encoder", "a"), channel("sinkage_pot", "b", "SinkagePot.Volts")]

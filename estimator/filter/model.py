@@ -5,6 +5,7 @@ to them.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from math import cos, hypot, log, sin
 from typing import NamedTuple
 
@@ -167,4 +168,8 @@ def _shift(settings: Settings, chain: Chain) -> IntegralShift | None:
         soil.pressure_sinkage.modulus(settings.wheel.width),
     )
 
-    return IntegralShift(chain.wheel, prior, shaping, share)
+    return _tabulated(chain.wheel, prior, shaping, share)
+
+
+# one of a wheel, soil and effects: a run makes several trackers, and its table takes 0.1 s
+_tabulated = lru_cache(8)(IntegralShift)

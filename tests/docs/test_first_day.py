@@ -24,7 +24,8 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]
         done = subprocess.run(
             ["bash", "-c", line], cwd=folder, env=environment(), capture_output=True, text=True
         )
-        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+        unsure = line.startswith("gritd estimate")  # before the friction is known: exit code 1
+        assert done.returncode == (1 if unsure else 0), f"{line}\n{done.stdout}{done.stderr}"
         said[line] = done.stdout
     return folder, said
 
@@ -65,7 +66,7 @@ def test_the_import_keeps_who_and_what(day: tuple[Path, dict[str, str]]) -> None
 @pytest.mark.slow
 def test_the_estimate_says_which_runs_are_not_believed(day: tuple[Path, dict[str, str]]) -> None:
     (said,) = of(day[1], "gritd estimate")
-    assert "not used: not believed" in said and "runs together: c " in said
+    assert "not sure of c and tan φ: " in said and "not used: " in said
 
 
 @pytest.mark.slow

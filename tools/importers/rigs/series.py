@@ -134,14 +134,16 @@ def _row(run: SeriesRun) -> str:
     gaps = int(np.sum(steps > GAP * run.interval))
     load = "" if run.info.nominal_load is None else f"{run.info.nominal_load:.1f}"
     return (
-        f"{run.info.name:<20} {run.seconds.size:>8} {run.seconds[-1] - run.seconds[0]:>8.1f} "
+        f"{run.info.name:<20} {run.seconds.size:>8} {run.seconds[-1]:>8.1f} "
         f"{1.0 / run.interval:>6.1f} {gaps:>5} {load:>8}"
     )
 
 
 def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[str]:
     """What the user should know of what was not given."""
-    notes = [
+    left_out = (line for run in runs for line in (*run.table.notes, *run.notes))
+    notes = [f"note: {line}" for line in dict.fromkeys(left_out)]
+    notes += [
         f"note: {run.info.name}: {run.repeated} rows that repeat the row before are left out"
         for run in runs
         if run.repeated

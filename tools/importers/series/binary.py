@@ -12,8 +12,9 @@ import numpy as np
 
 from gritd.estimator.limits import limits, raised
 from gritd.tools.cli.optional import require
-from gritd.tools.importers.files import LARGEST, Array, RigFileError
+from gritd.tools.importers.files import LARGEST, RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable
+from gritd.tools.importers.series.times import NONE, Nanoseconds
 
 
 def read_parquet(path: Path) -> SeriesTable:
@@ -103,7 +104,8 @@ def _column(path: Path, name: str, values: Any) -> Column:
     """Numbers and instants as numbers, everything else as words."""
     values = np.asarray(values)
     if values.dtype.kind == "M":
-        return Column(_instants(values))
+        instants = _instants(values)
+        return Column(np.where(instants == NONE, np.nan, instants * 1e-9), instants=instants)
     if values.dtype.kind in "biuf":
         numbers = values.astype(np.float64)
         if np.any(np.abs(numbers[np.isfinite(numbers)]) > LARGEST):
@@ -112,7 +114,7 @@ def _column(path: Path, name: str, values: Any) -> Column:
     return Column(np.full(values.size, np.nan), [str(value) for value in values])
 
 
-def _instants(values: Any) -> Array:
-    """Seconds since the epoch (n,), NaN where there is none."""
-    seconds = values.astype("datetime64[ns]").astype(np.int64) * 1e-9
-    return np.where(np.isnat(values), np.nan, seconds)
+def _instants(values: Any) -> Nanoseconds:
+    """Since 1970 [ns], shape (n,), NONE where there is none."""
+    instants = values.astype("datetime64[ns]").astype(np.int64)
+    return np.where(np.isnat(values), NONE, instants)

@@ -10,6 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gritd.tools.importers.files import Array, RigFileError
+from gritd.tools.importers.series.times import Nanoseconds
+
+SHOWN = 40  # characters of a name in a message
+ROOM = 120  # of several
+FEW = 5  # rows that are told one by one
 
 
 @dataclass(frozen=True)
@@ -17,32 +22,39 @@ class Column:
     """One column: numbers, shape (n,), NaN where the file has none; or words, shape (n,).
 
     resolution: the last digit that the file writes, in the column's unit; 0 where it is unknown.
+    instants: of a column of time, [ns], shape (n,), NONE where there is none; else None.
+    period: after how many ns the instants begin again, as times of day do; 0 where they do not.
     """
 
     numbers: Array
     words: Sequence[str] | None = None
     resolution: float = 0.0
+    instants: Nanoseconds | None = None
+    period: int = 0
 
     def at(self, chosen: NDArray[np.bool_]) -> Column:
         """The rows that are marked (n,)."""
         words = None
         if self.words is not None:
             words = [word for word, keep in zip(self.words, chosen, strict=True) if keep]
-        return Column(self.numbers[chosen], words, self.resolution)
+        instants = None if self.instants is None else self.instants[chosen]
+        return Column(self.numbers[chosen], words, self.resolution, instants, self.period)
 
 
 @dataclass(frozen=True)
 class SeriesTable:
     """The columns of one file by name, all of n rows, in the file's order.
 
-    first: number of the file's row that holds the first values, for messages.
     units: what a row of units, or the file's own description, says of a column; may lack some.
+    lines: number of each row in the file (n,), for messages; None where they count from 1.
+    notes: what was not read, one line each.
     """
 
     path: Path
     columns: Mapping[str, Column]
-    first: int = 1
     units: Mapping[str, str] | None = None
+    lines: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -52,9 +64,13 @@ class SeriesTable:
         """A column by name. Raises RigFileError."""
         if name not in self.columns:
             raise RigFileError(
-                f"{self.path}: found no column {name!r}; expected one of {self.names()}"
+                f"{self.path}: found no column {name[:SHOWN]!r}; expected one of {self.names()}"
             )
         return self.columns[name]
+
+    def line(self, at: int) -> int:
+        """The number that a row has in its file."""
+        return at + 1 if self.lines is None else int(self.lines[at])
 
     def repeated(self) -> NDArray[np.bool_]:
         """Marks rows (n,) that are the row before once more, in every column."""
@@ -72,9 +88,32 @@ class SeriesTable:
         return again
 
     def names(self) -> str:
-        return ", ".join(self.columns)
+        """Of all columns, as many as a line has room for."""
+        return shortened(list(self.columns))
 
     def at(self, chosen: NDArray[np.bool_]) -> SeriesTable:
         """The rows that are marked (n,)."""
         columns = {name: column.at(chosen) for name, column in self.columns.items()}
-        return SeriesTable(self.path, columns, self.first, self.units)
+        lines = None if self.lines is None else self.lines[chosen]
+        return SeriesTable(self.path, columns, self.units, lines, self.notes)
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Names with commas, as many as a line has room for."""
+    told: list[str] = []
+    length = 0
+    for name in names:
+        length += len(name) + 2
+        if length > ROOM:
+            return f"{', '.join(told)} … ({len(names)} in all)"
+        told.append(name[:SHOWN])
+    return ", ".join(told)
+
+
+def told_rows(numbers: Sequence[int]) -> str:
+    """Numbers of rows in words, the first few."""
+    few = ", ".join(map(str, numbers[:FEW]))
+    if len(numbers) > FEW and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return f"rows {numbers[0]} to {numbers[-1]}"
+    more = f" … {numbers[-1]} ({len(numbers)} in all)" if len(numbers) > FEW else ""
+    return f"row{'s' if len(numbers) > 1 else ''} {few}{more}"

@@ -22,7 +22,7 @@ from gritd.tools.importers.series import encoders
 from gritd.tools.importers.series.calibrated import Calibrated
 from gritd.tools.importers.series.mapping import AS_CONFIGURED, Mapped, SeriesMap
 from gritd.tools.importers.series.noise import scatter
-from gritd.tools.importers.series.runs import EPOCH, SeriesRun
+from gritd.tools.importers.series.runs import SeriesRun
 
 ANALOGUE = {
     "sinkage_pot": ("sinkage", "sinkage_volts"),
@@ -104,9 +104,8 @@ def _starts(runs: Sequence[SeriesRun], start: int) -> list[int]:
     """
     starts = []
     for run in runs:
-        told = run.seconds[0] > EPOCH
-        starts.append(round(run.seconds[0] * 1e6) * 1000 if told else start)
-        start += round((run.seconds[-1] - run.seconds[0] + 60.0) * 1e9)
+        starts.append(start if run.start is None else run.start)
+        start += round((run.seconds[-1] + 60.0) * 1e9)
     return starts
 
 
@@ -191,7 +190,7 @@ def _streams(
     settings: Settings,
 ) -> list[Stream]:
     """The readings of one run; where a cell is empty there is none."""
-    at = stamps(start, run.seconds - run.seconds[0])
+    at = stamps(start, run.seconds)
     streams = []
     for channel, name in used.items():
         column, numbers = mapped.columns[name], run.table.column(name).numbers

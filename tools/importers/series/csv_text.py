@@ -15,9 +15,9 @@ import numpy as np
 from gritd.estimator.limits import limits, raised
 from gritd.tools.importers.files import LARGEST, RigFileError, lines
 from gritd.tools.importers.series.columns import Column, SeriesTable
+from gritd.tools.importers.series.times import is_gap
 
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 SEPARATORS = (",", ";", "\t")
 PREAMBLE = 50  # lines among which the header is looked for
 
@@ -43,7 +43,7 @@ def read(path: Path) -> SeriesTable:
         name: _column(path, name, [row[at].strip() for row in body], decimal, first)
         for at, name in named.items()
     }
-    return SeriesTable(path, columns, first, units)
+    return SeriesTable(path, columns, units, np.arange(first, first + len(body)))
 
 
 def _layout(path: Path, text: Sequence[str]) -> tuple[str, int]:
@@ -145,7 +145,7 @@ def _column(path: Path, name: str, cells: list[str], decimal: str, first: int) -
     odd = [
         at
         for at, (cell, match) in enumerate(zip(cells, matches, strict=True))
-        if match is None and cell.lower() not in MISSING
+        if match is None and not is_gap(cell)
     ]
     if odd and not any(matches):
         return Column(np.full(len(cells), math.nan), cells)

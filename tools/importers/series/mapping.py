@@ -25,6 +25,7 @@ from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.config.yamltree import Mapping as Tree
 from gritd.estimator.config.yamltree import Node, compose, read_text
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.tools.importers.series.times import ORDERS, TimeFormatError, clock
 
 # channel of the map -> SI unit and meaning
 MEASURED = {
@@ -53,7 +54,17 @@ OF_THE_RUN = {
     "pass": ("", "number of the pass over the bed"),
 }
 CLOCK = "clock"  # the unit of a time that is written as a date or as a time of day
-SPELLINGS = {"Nm": "N*m", "N.m": "N*m", "N-m": "N*m", "°": "deg", "°C": "degC", "sec": "s"}
+SPELLINGS = {
+    "Nm": "N*m",
+    "N.m": "N*m",
+    "N-m": "N*m",
+    "°": "deg",
+    "°C": "degC",
+    "sec": "s",
+    "msec": "ms",
+    "usec": "us",
+    "nsec": "ns",
+}
 
 
 @dataclass(frozen=True)
@@ -61,6 +72,8 @@ class Mapped:
     """One column: physical = column · unit · factor + offset.
 
     noise: standard deviation of one reading, SI; None where it is to be estimated.
+    order: of a date, one of ORDERS; '' where the file tells.
+    epoch: day [ns since 1970] from which a number of time counts.
     """
 
     channel: str
@@ -68,6 +81,8 @@ class Mapped:
     factor: Uncertain = field(default_factory=lambda: Uncertain(1.0))
     offset: Uncertain = field(default_factory=lambda: Uncertain(0.0))
     noise: float | None = None
+    order: str = ""
+    epoch: int = 0
 
     @property
     def per_unit(self) -> float:
@@ -81,7 +96,7 @@ class SeriesMap:
 
     columns: Mapping[str, Mapped]
     runs: Mapping[str, RunInfo]
-    rate: float | None  # [Hz] of the rows, where there is no column of time
+    rate: float | None  # [Hz] of the rows; a column of time then tells only when they begin
     resample: float | None  # [Hz] of the readings, where not every row is to be one
     radius: float | None  # [m]
     width: float | None  # [m]
@@ -184,7 +199,17 @@ def _channels() -> dict[str, Section]:
         for name, (si, _) in MEASURED.items()
     }
     run = Section(_choice("run"), Mapped)
-    return {"time": _plain("time", "s"), "run": run, **plain, **measured}
+    order = Key(Choice(ORDERS), "of a date in numbers", ABSENT)
+    time = {"order": order, "epoch": Key(Text("a date"), "day that numbers count from", ABSENT)}
+    return {
+        "time": Section(
+            _choice("time") | {"unit": Key(UnitOf("s"), "of the column")} | time, _time
+        ),
+        "date": Section(_choice("date") | {"order": order}, _time),
+        "run": run,
+        **plain,
+        **measured,
+    }
 
 
 def _choice(channel: str) -> dict[str, Key]:
@@ -207,6 +232,14 @@ def _measured(name: str, si: str) -> Section:
     return Section(_choice(name) | keys, _mapped)
 
 
+def _time(order: str | None = None, epoch: str | None = None, **values: Any) -> Mapped:
+    try:
+        day = int(clock([epoch]).read([epoch])[0]) if epoch else 0
+    except TimeFormatError as error:
+        raise Impossible("epoch", f"a day such as 1904-01-01 ({error})", epoch or "") from None
+    return Mapped(**{"unit": CLOCK} | values, order=order or "", epoch=day)
+
+
 def _mapped(unit: str | None = None, **values: Any) -> Mapped:
     if "factor" in values and values["factor"].value == 0.0:
         raise Impossible("factor", "a factor other than 0", "0")
@@ -225,7 +258,7 @@ def _whole(wheel: dict[str, float] | None, **values: Any) -> SeriesMap:
 TABLE = Section(
     {
         "columns": Key(Columns(), "the columns that are used"),
-        "rate": Key(Quantity("Hz", above=0), "of the rows, without a column of time", ABSENT),
+        "rate": Key(Quantity("Hz", above=0), "of the rows, where no time tells it", ABSENT),
         "resample": Key(Quantity("Hz", above=0), "means over as many rows", ABSENT),
         "wheel": Key(Section(WHEEL, dict), "the wheel, without --config", ABSENT),
         "torque_constant": Key(uncertain("N*m/A", above=0), "of the drive", ABSENT),

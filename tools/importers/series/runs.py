@@ -5,39 +5,51 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.estimator.config.names import is_file_name
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.offline.windows import Ints, group_means
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import Array, RigFileError
-from gritd.tools.importers.series.columns import Column, SeriesTable
-from gritd.tools.importers.series.mapping import CLOCK, SeriesMap
+from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
+from gritd.tools.importers.series.mapping import SeriesMap
 from gritd.tools.importers.series.noise import spacing
+from gritd.tools.importers.series.stamps import (
+    LEAST,
+    Order,
+    check_fine,
+    instants,
+    left_out,
+    ordered,
+)
+from gritd.tools.importers.series.times import NONE, NS, Nanoseconds
 
-OF_DAY = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)")
-DAY = 86400.0  # [s]
-LEAST = 10  # rows of a run
-EPOCH = 1e8  # [s] later times count from 1970
+EPOCH = 10**8 * NS  # later times count from 1970
+ENDINGS = r"(\.(csv|txt|tsv|tab|dat|asc|log|lvm|parquet|mat))?(\.(gz|zst|zip|xz|bz2))?$"
+Rows = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class SeriesRun:
     """One run: its rows in the order of time.
 
-    seconds: (n,) of the rows, rising; since 1970 where the file says so.
+    seconds: (n,) of the rows since the first, rising.
+    start: of the first row [ns since 1970]; None where the file does not say.
     resampled: rows behind each row of the table.
     repeated: rows of the file that were the row before once more, and are left out.
+    notes: what else is left out, one line each.
     """
 
     info: RunInfo
     table: SeriesTable
     seconds: Array
+    start: int | None = None
     resampled: float = 1.0
     repeated: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def interval(self) -> float:
@@ -53,7 +65,8 @@ def runs_of(tables: Sequence[SeriesTable], mapped: SeriesMap) -> list[SeriesRun]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise RigFileError(f"found two runs {twice!r}; expected each with a name of its own")
-    unknown = next((name for name in mapped.runs if _stem(name) not in names), None)
+    known = {re.sub(r"-\d+$", "", name) for name in names} | set(names)
+    unknown = next((name for name in mapped.runs if _stem(name) not in known), None)
     if unknown is not None:
         raise RigFileError(
             f"runs: found {unknown!r}, which is no run; expected one of {', '.join(names)}", USAGE
@@ -65,22 +78,22 @@ def _of_table(table: SeriesTable, mapped: SeriesMap) -> Iterator[SeriesRun]:
     """One run a file, or one for each value of the column of runs."""
     for name in mapped.columns:
         table.column(name)
-    seconds = _seconds(table, mapped)
+    times = instants(table, mapped)
 
     column = mapped.named("run")
     if column is None:
-        yield _run(table, seconds, _stem(table.path.name), mapped)
+        yield from _parts(table, times, _stem(table.path.name), mapped)
         return
 
     labels = np.array(_labels(table.column(column)))
     for label in dict.fromkeys(labels.tolist()):
         chosen = labels == label
-        yield _run(table.at(chosen), seconds[chosen], label, mapped)
+        yield from _parts(table.at(chosen), times[chosen], label, mapped)
 
 
 def _stem(name: str) -> str:
     """A file's name without what says its kind."""
-    return re.sub(r"\.(csv|txt|tsv|dat|parquet|mat)(\.gz)?$", "", name, flags=re.IGNORECASE)
+    return re.sub(ENDINGS, "", name, flags=re.IGNORECASE)
 
 
 def _labels(column: Column) -> list[str]:
@@ -89,30 +102,63 @@ def _labels(column: Column) -> list[str]:
     return [f"{value:g}" for value in column.numbers.tolist()]
 
 
-def _run(table: SeriesTable, seconds: Array, name: str, mapped: SeriesMap) -> SeriesRun:
-    """A run with what the map says of it. Raises RigFileError."""
+def _parts(
+    table: SeriesTable, times: Nanoseconds, name: str, mapped: SeriesMap
+) -> Iterator[SeriesRun]:
+    """A run with what the map says of it; several, NAME-1, NAME-2 …, where its time began again.
+    Raises RigFileError.
+    """
     if not is_file_name(name):
         raise RigFileError(f"{table.path}: found the run {name[:40]!r}; expected a file's name")
-    if seconds.size < LEAST:
-        raise RigFileError(
-            f"{table.path}: {name}: found {seconds.size} rows; expected {LEAST} or more"
+
+    timeless = times == NONE
+    notes = left_out(table, timeless, "without a time")
+    table, times = table.at(~timeless), times[~timeless]
+
+    again = np.zeros(times.size, dtype=bool)
+    if mapped.rate is None:
+        again[1:] = table.repeated()[1:] & (np.diff(times) == 0)
+    table, times = table.at(~again), times[~again]
+    check_fine(table, times)
+
+    order = ordered(times)
+    notes += left_out(table, ~order.kept, "the time does not rise")
+    parts = _long(table, order, name, notes)
+    for number, rows in enumerate(parts, start=1):
+        called = name if len(parts) == 1 else f"{name}-{number}"
+        info = replace(_info(table.at(rows), name, mapped), name=called)
+        run = SeriesRun(
+            info,
+            table.at(rows),
+            (times[rows] - times[rows][0]) / NS,
+            int(times[rows][0]) if times[rows][0] > EPOCH else None,
+            repeated=int(again.sum()) if number == 1 else 0,
+            notes=tuple(notes) if number == 1 else (),
         )
-
-    again = table.repeated()
-    table, seconds = table.at(~again), seconds[~again]
-    if np.any(np.diff(seconds) <= 0.0):
-        at = int(np.argmax(np.diff(seconds) <= 0.0))
-        raise RigFileError(f"{table.path}: {name}: {_fallen(seconds[at], seconds[at + 1])}")
-
-    run = SeriesRun(_info(table, name, mapped), table, seconds, repeated=int(again.sum()))
-    return run if mapped.resample is None else _resampled(run, mapped.resample)
+        yield run if mapped.resample is None else _resampled(run, mapped.resample)
 
 
-def _fallen(before: float, after: float) -> str:
-    """What is wrong with a time [s] that does not lie behind the one before it."""
-    if after == before:
-        return f"found two rows of {before:.15g} s with different values; expected one row a time"
-    return f"found {after:.15g} s after {before:.15g} s; expected times that rise"
+def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list[Rows]:
+    """The rows (n,) of each part that is long enough for a run, with notes on the others. Raises
+    RigFileError where none is.
+    """
+    part = np.searchsorted(order.begins, np.arange(table.rows), side="right")
+    marks = [order.kept & (part == number) for number in range(1, len(order.begins) + 1)]
+    long = [rows for rows in marks if rows.sum() >= LEAST]
+    if not long:
+        most = max((int(rows.sum()) for rows in marks), default=0)
+        raise RigFileError(f"{table.path}: {name}: found {most} rows; expected {LEAST} or more")
+
+    for rows in marks:
+        if rows.sum() < LEAST:
+            notes += left_out(table, rows, f"fewer than {LEAST} between times that fall")
+    if len(long) > 1:
+        first = [table.line(int(np.argmax(rows))) for rows in long[1:]]
+        notes.append(
+            f"{table.path.name}: the time begins again at {told_rows(first)}, a new run each; "
+            "state rate: in the map where it is one run"
+        )
+    return long
 
 
 def _info(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
@@ -150,55 +196,6 @@ def _constant(table: SeriesTable, mapped: SeriesMap, channel: str) -> float | No
     return float(known[0]) * mapped.columns[name].per_unit
 
 
-# --- time ---
-
-
-def _seconds(table: SeriesTable, mapped: SeriesMap) -> Array:
-    """Time of each row [s], (n,). Raises RigFileError."""
-    name = mapped.named("time")
-    if name is None:
-        assert mapped.rate is not None
-        return np.arange(table.rows) / mapped.rate
-
-    column, unit = table.column(name), mapped.columns[name].unit
-    if column.words is not None:
-        if unit != CLOCK:
-            raise RigFileError(
-                f"{table.path}: {name}: found {column.words[0][:40]!r}; expected numbers in "
-                f"{unit}, or unit: {CLOCK} for dates and times of day"
-            )
-        return _clock(table, name, column.words)
-
-    if not np.all(np.isfinite(column.numbers)):
-        row = table.first + int(np.argmin(np.isfinite(column.numbers)))
-        raise RigFileError(f"{table.path}: row {row}: {name}: found no time; expected one a row")
-    return column.numbers * (1.0 if unit == CLOCK else mapped.columns[name].per_unit)
-
-
-def _clock(table: SeriesTable, name: str, words: Sequence[str]) -> Array:
-    """Seconds of dates, as UTC where they name no zone, or of times of day."""
-    instants = np.empty(len(words))
-
-    for at, word in enumerate(words):
-        try:
-            instants[at] = _instant(word.strip())
-        except ValueError:
-            raise RigFileError(
-                f"{table.path}: row {table.first + at}: {name}: found {word[:40]!r}; "
-                "expected a date such as 2026-11-22T14:03:05.250 or a time such as 14:03:05.250"
-            ) from None
-
-    past_midnight = np.concatenate(([0.0], np.cumsum(np.diff(instants) < -0.5 * DAY)))
-    return instants + DAY * past_midnight
-
-
-def _instant(word: str) -> float:
-    if match := OF_DAY.fullmatch(word):
-        return int(match[1]) * 3600.0 + int(match[2]) * 60.0 + float(match[3])
-    when = datetime.fromisoformat(word)
-    return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
-
-
 # --- resampling ---
 
 
@@ -214,12 +211,13 @@ def _resampled(run: SeriesRun, rate: float) -> SeriesRun:
     _, block = np.unique(slot, return_inverse=True)
 
     seconds, _ = group_means(block, run.seconds, block.max() + 1)
+    start = None if run.start is None else run.start + round(float(seconds[0]) * NS)
     columns = {
         name: _mean(column, block, seconds.size) for name, column in run.table.columns.items()
     }
+    table = SeriesTable(run.table.path, columns, run.table.units)
     behind = run.seconds.size / seconds.size
-    table = SeriesTable(run.table.path, columns, run.table.first, run.table.units)
-    return SeriesRun(run.info, table, seconds, behind, run.repeated)
+    return replace(run, table=table, seconds=seconds - seconds[0], start=start, resampled=behind)
 
 
 def _mean(column: Column, block: Ints, n: int) -> Column:

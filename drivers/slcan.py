@@ -4,8 +4,9 @@ python-can opens and closes the adapter. It asks the system twice for every byte
 4,000 messages a second takes two thirds of a core; here all that has come is read at once.
 
 A line is `t`, 3 hexadecimal digits of the identifier, a digit of the length, the data in
-hexadecimal, and \\r. `T` has 8 digits of an extended identifier, `r` and `R` are remote frames,
-`d` `b` and `D` `B` those of CAN FD. Other lines are answers of the adapter.
+hexadecimal, and \\r; some adapters end it with \\r\\n or \\n. `T` has 8 digits of an extended
+identifier, `r` and `R` are remote frames, `d` `b` and `D` `B` those of CAN FD. What the adapter
+answers to a command is no message; any other line is damaged.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from can.util import CAN_FD_DLC
 from gritd.drivers.framing_can import EXTENDED, REMOTE, pack
 
 LONGEST_LINE = 4096  # [bytes] kept of a line that does not end; a message takes 32
-_ENDS = re.compile(rb"[\r\a]")  # done; the adapter reports an error
+_ENDS = re.compile(rb"[\r\n\a]")  # done; the adapter reports an error
+_ANSWERS = ("z", "Z", "V", "v", "N", "F", "A")  # sent; versions, serial number, status, polled all
 _KINDS = {  # what a line begins with -> digits of the identifier, flags
     "t": (3, 0),
     "d": (3, 0),
@@ -57,7 +59,7 @@ class SlcanLines:
         if len(self._pending) > LONGEST_LINE:  # as of a wrong baud rate
             damaged, self._pending = 1, b""
 
-        for line in lines:
+        for line in filter(None, lines):
             try:
                 can_id, data = _parsed(line.decode("ascii"))
             except ValueError:
@@ -70,10 +72,12 @@ class SlcanLines:
 
 
 def _parsed(line: str) -> tuple[int, bytes]:
-    """Identifier with its flags, and data; -1 for a line that is no message. Raises ValueError
-    where a message is damaged.
+    """Identifier with its flags, and data; -1 for an answer of the adapter. Raises ValueError for a
+    damaged line.
     """
-    digits, flags = _KINDS.get(line[:1], (0, 0))
+    digits, flags = _KINDS.get(line[0], (0, 0))
+    if not line.isalnum() or not (digits or line[0] in _ANSWERS):
+        raise ValueError(line)
     if not digits:
         return -1, b""
 

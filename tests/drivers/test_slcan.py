@@ -54,9 +54,9 @@ def line_of(message):
 
 
 @FUZZ
-@given(st.lists(a_message(), max_size=6), st.data())
-def test_lines_of_python_can_give_its_messages_however_they_are_cut(messages, data):
-    stream = b"".join(map(line_of, messages))
+@given(st.lists(a_message(), max_size=6), st.sampled_from([b"\r", b"\r\n", b"\n"]), st.data())
+def test_lines_of_python_can_give_its_messages_however_they_end_and_are_cut(messages, end, data):
+    stream = b"".join(line_of(message).replace(b"\r", end) for message in messages)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=4)))
     lines = SlcanLines(Everything())
     pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
@@ -76,7 +76,16 @@ def test_any_bytes_are_taken_and_the_next_line_is_whole(junk):
 
 @pytest.mark.parametrize(
     ("line", "damaged"),
-    [(b"\xff\xfe\r", 1), (b"t1\r", 1), (b"tXYZ8\r", 1), (b"t1008AB\r", 1), (b"z\x07", 0)],
+    [
+        (b"\xff\xfe\r", 1),
+        (b"t1\r", 1),
+        (b"tXYZ8\r", 1),
+        (b"t1008AB\r", 1),
+        (b"t1_011AA\n", 1),
+        (b"hello\r\n", 1),
+        (b"z\x07", 0),
+        (b"V1013\r\n\r\n", 0),
+    ],
 )
 def test_a_damaged_line_is_counted_an_answer_of_the_adapter_is_not(line, damaged):
     assert SlcanLines(Everything()).decode(line) == (b"", damaged)

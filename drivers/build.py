@@ -65,18 +65,18 @@ def used_devices(settings: Settings) -> list[Device]:
 
 def build_decoder(settings: Settings, device: Device) -> Decoder:
     """Framing and sensors of one device; serves live readers and recorded wires alike."""
-    sensors = [
-        _sensor(name, of)
-        for name, of in _sensor_settings(settings).items()
-        if of.device == device.name
-    ]
-
-    framing = _framing(device, sensors)
+    sensors = _sensors(settings, device)
+    framing = _framing(device, _keys(sensors))
     if isinstance(framing, CanFraming):
         _check_signals(framing, sensors)
     else:
         _check_keys(sensors)
     return Decoder(framing, sensors)
+
+
+def keys_of(settings: Settings, device: Device) -> list[str]:
+    """The signals that channels take from a device."""
+    return _keys(_sensors(settings, device))
 
 
 def build_link(device: Device, framing: Framing, clock: Clock) -> Link:
@@ -98,6 +98,14 @@ def _sensor_settings(settings: Settings) -> dict[str, SensorSettings]:
     return {**settings.channels, **wrench}
 
 
+def _sensors(settings: Settings, device: Device) -> list[Sensor]:
+    return [
+        _sensor(name, of)
+        for name, of in _sensor_settings(settings).items()
+        if of.device == device.name
+    ]
+
+
 def _sensor(channel: str, settings: SensorSettings) -> Sensor:
     kinds = sensor_kinds()
     if channel not in kinds:
@@ -107,11 +115,13 @@ def _sensor(channel: str, settings: SensorSettings) -> Sensor:
     return kinds[channel](settings)  # type: ignore[arg-type]
 
 
-def _framing(device: Device, sensors: list[Sensor]) -> Framing:
+def _keys(sensors: list[Sensor]) -> list[str]:
+    return [key for sensor in sensors for key in sensor.keys]
+
+
+def _framing(device: Device, keys: list[str]) -> Framing:
     if device.kind == "can":
-        return CanFraming(
-            device.name, database(device), [key for sensor in sensors for key in sensor.keys]
-        )
+        return CanFraming(device.name, database(device, keys), keys)
     return AsciiFraming() if device.framing == "ascii" else CobsFraming()
 
 

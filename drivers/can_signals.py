@@ -4,7 +4,8 @@ database for both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import cantools
@@ -12,12 +13,11 @@ from cantools.database import Database
 from cantools.database.can import Message, Signal
 from cantools.database.conversion import BaseConversion
 
+from gritd.drivers.dbc import MAX_MESSAGE, DbcError, DbcFile
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.estimator.config.settings import Device
 
-MAX_DBC_BYTES = 4 << 20
 MAX_INLINE = 256  # signals of one device
-MAX_MESSAGE = 64  # [bytes] of CAN FD
 
 Definition = Mapping[str, object]
 
@@ -40,9 +40,10 @@ RULES: dict[str, _Rule] = {
 }
 
 
-def database(device: Device) -> Database:
-    """The message database of a CAN device. Raises DeviceSettingsError where file or definitions
-    are wrong.
+def database(device: Device, keys: Iterable[str] | None = None) -> Database:
+    """The message database of a CAN device. keys: what is listened to, `Message` or
+    `Message.Signal`; a file is read as far as they need it. Raises DeviceSettingsError where file
+    or definitions are wrong.
     """
     if device.dbc and device.signals:
         raise DeviceSettingsError(
@@ -52,34 +53,38 @@ def database(device: Device) -> Database:
     if device.signals:
         return _inline(device)
     if device.dbc:
-        return _from_file(device)
+        return _from_file(device, None if keys is None else _messages(keys))
     raise DeviceSettingsError(
         f"device {device.name}", "neither dbc nor signals is given, expected one of them"
     )
 
 
-def _from_file(device: Device) -> Database:
-    try:
-        with open(device.dbc, encoding="cp1252") as file:
-            text = file.read(MAX_DBC_BYTES + 1)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DeviceSettingsError(
-            f"device {device.name}", f"cannot read {device.dbc}: {reason}"
-        ) from None
+def amiss_elsewhere(device: Device, keys: Iterable[str]) -> str:
+    """What is wrong in a device's file with messages that nobody listens to; ''. Raises
+    DeviceSettingsError.
+    """
+    with _named(device):
+        file = DbcFile(device.dbc, _messages(keys), elsewhere=True) if device.dbc else None
+        wrong = file.amiss_elsewhere() if file else ""
+    return f"{device.dbc}: {wrong}" if wrong else ""
 
-    if len(text) > MAX_DBC_BYTES:
-        raise DeviceSettingsError(
-            f"device {device.name}", f"{device.dbc} is larger than {MAX_DBC_BYTES} bytes"
-        )
 
+def _messages(keys: Iterable[str]) -> set[str]:
+    return {key.partition(".")[0] for key in keys}
+
+
+def _from_file(device: Device, names: Collection[str] | None) -> Database:
+    with _named(device):
+        return DbcFile(device.dbc, names).database()
+
+
+@contextmanager
+def _named(device: Device) -> Iterator[None]:
+    """A fault of the file with the names of device and file."""
     try:
-        return cantools.database.load_string(  # type: ignore[return-value]
-            text, database_format="dbc"
-        )
-    except Exception as error:  # the parser's own errors share no class but this one
-        reason = f"{device.dbc} is not a DBC file: {error}"
-        raise DeviceSettingsError(f"device {device.name}", reason) from None
+        yield
+    except DbcError as error:
+        raise DeviceSettingsError(f"device {device.name}", f"{device.dbc}: {error}") from None
 
 
 def _inline(device: Device) -> Database:

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 import can
-from cantools.database import Database
 from cantools.database.can import Message, Signal
 
 from gritd.drivers import framing_ascii, framing_cobs
@@ -39,7 +38,8 @@ class CanWire:
     """Messages of a CAN device, each kind numbered for itself."""
 
     def __init__(self, device: Device) -> None:
-        self._database: Database = database(device)
+        self._device = device
+        self._messages: dict[str, Message] = {}
         self._sequence: Counter[str] = Counter()
 
     def encode(
@@ -51,7 +51,7 @@ class CanWire:
         Raises an error of cantools or bitstruct if it does not fit the bits.
         """
         name, _, signal = key.partition(".")
-        message = self._database.get_message_by_name(name)
+        message = self._messages.get(name) or self._read(name)
         data = [s.name for s in message.signals if s.name.lower() not in (*COUNTERS, DEVICE_TIME)]
         given = dict(zip([signal] if signal else data, values, strict=True))
         fields = {s.name: given.get(s.name, 0) for s in message.signals} | self._counters(
@@ -64,6 +64,11 @@ class CanWire:
             is_fd=message.length > 8,
             data=message.encode(fields, strict=False),
         )
+
+    def _read(self, name: str) -> Message:
+        message = database(self._device, [name]).get_message_by_name(name)
+        self._messages[name] = message
+        return message
 
     def _counters(self, message: Message, device_us: int) -> dict[str, FieldValue]:
         """Values of the message counter and of the device time, where the message has them."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gritd.drivers.build import build_decoder, build_readers, used_devices
-from gritd.drivers.can_signals import MAX_DBC_BYTES
+from gritd.drivers.dbc import MAX_DBC_BYTES
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.wire import CanWire, SerialWire
@@ -138,7 +138,7 @@ def test_a_device_that_restarts_does_not_turn_the_wheel():
         ),
         (
             wiring([can_device()], [channel("wheel_encoder", "bus", "Nope.Count")]),
-            "device bus: no message Nope",
+            "no message Nope in its database",
         ),
         (
             wiring(
@@ -170,7 +170,7 @@ def test_a_device_that_restarts_does_not_turn_the_wheel():
         ),
         (
             wiring([can_device(dbc="/nope.dbc")], [channel("sinkage_pot", "bus", "A.B")]),
-            "cannot read /nope.dbc: No",
+            "/nope.dbc: cannot be read: no such",
         ),
     ],
 )
@@ -185,7 +185,7 @@ def test_what_is_no_database_is_one_clear_line(tmp_path):
     large.write_bytes(b"\n" * (MAX_DBC_BYTES + 1))
     named = replace(can_device(), dbc="", signals={"Volts": {"id": 1, "start": 0, "length": 8}})
     for device, expected in (
-        (can_device(dbc=str(large)), f"{large} is larger than {MAX_DBC_BYTES} bytes"),
+        (can_device(dbc=str(large)), f"{large}: is larger than {MAX_DBC_BYTES} bytes"),
         (named, "signal Volts: expected a name of the form Message.Signal"),
     ):
         with pytest.raises(DeviceSettingsError, match=re.escape(expected)) as error:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.tables import NOTHING, Fields
@@ -43,15 +44,25 @@ def unread(path: Path, error: RecordingError) -> CommandError:
     return CommandError(error, DAMAGED if path.exists() else USAGE)
 
 
-def open_to_all(path: Path) -> str:
-    """One line where anybody may change a file that is trusted; '' otherwise."""
+def open_to_all(source: Path, settings: Settings) -> list[str]:
+    """A line for each trusted file that anybody may change: the configuration, and the databases of
+    its CAN buses.
+    """
+    databases = {Path(device.dbc) for device in settings.devices.values() if device.dbc}
+    told = [_open_to_all(source, "which devices are opened and where files go")]
+    told += [_open_to_all(path, "what the messages mean") for path in sorted(databases)]
+    return [line for line in told if line]
+
+
+def _open_to_all(path: Path, power: str) -> str:
+    """One line where anybody may change a file; '' otherwise."""
     for place in (path, path.resolve().parent):
         with suppress(OSError):
             mode = place.stat().st_mode
             if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
                 return (
                     f"{path}: anybody may change it, by the permissions of {place};"
-                    " whoever does decides which devices are opened and where files go"
+                    f" whoever does decides {power}"
                 )
     return ""
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gritd.config import packaged
-from gritd.drivers.build import build_decoder, build_link, used_devices
+from gritd.drivers.build import build_decoder, build_link, keys_of, used_devices
+from gritd.drivers.can_signals import amiss_elsewhere
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.channels import UNITS
@@ -57,8 +58,8 @@ def main(argv: Sequence[str]) -> int:
     except DeviceSettingsError as error:
         raise CommandError(f"{arguments.file}: {error}", USAGE) from None
 
-    if warning := open_to_all(Path(arguments.file)):
-        print(warning, file=sys.stderr)
+    for line in (*open_to_all(Path(arguments.file), read.settings), *notes(read.settings)):
+        print(line, file=sys.stderr)
 
     if arguments.effective:
         sys.stdout.write(read.text)
@@ -75,6 +76,13 @@ def check_devices(settings: Settings) -> None:
     """
     for device in used_devices(settings):
         build_link(device, build_decoder(settings, device).framing, time.monotonic_ns)
+
+
+def notes(settings: Settings) -> Iterator[str]:
+    """What is wrong in a CAN database with messages that nobody listens to."""
+    for device in used_devices(settings):
+        if wrong := amiss_elsewhere(device, keys_of(settings, device)):
+            yield f"note: {wrong}"
 
 
 # --- the summary ---

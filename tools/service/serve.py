@@ -117,8 +117,9 @@ def _listen_to_signals(daemon: Daemon, watcher: Watcher) -> None:
 def _announce(daemon: Daemon, path: Path, notice: str) -> None:
     """Where the log is, and what may be amiss from the start."""
     say(f"logging to {path}")
-    readable = open_to_all(Path(daemon.configuration.source))
-    for warning in filter(None, (daemon.clock.notice, notice, readable)):
+    configuration = daemon.configuration
+    readable = open_to_all(Path(configuration.source), configuration.settings)
+    for warning in filter(None, (daemon.clock.notice, notice, *readable)):
         say(warning, sys.stderr)
         daemon.say(WARNING, warning)
 

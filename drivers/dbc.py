@@ -22,6 +22,7 @@ from gritd.estimator.config.nearest import did_you_mean
 
 MAX_DBC_BYTES = 8 << 20
 MAX_MESSAGE = 64  # [bytes] of CAN FD
+MAX_MESSAGES = 50_000
 MAX_SIGNALS = 4096  # of one message
 BYTE_ORDER_MARK = "\xef\xbb\xbf"  # of UTF-8, a character a byte
 EXTENDED_ID = 1 << 31
@@ -133,7 +134,8 @@ class DbcFile:
         self._ids: dict[int, list[str]] = {}  # names of its first two messages
         self._numbers: set[int] = set()  # of the wanted messages
         self._more: list[str] = []  # further statements about them
-        self._wrong: list[DbcMessage] = []
+        self._wrong = ""  # the first of the other messages that is, and why
+        self._count = self._count_wrong = 0
         self._j1939: set[int] = set()
         self._all_j1939 = False
         self._head, self._signals = ("", "", ""), list[str]()  # of the message that is being read
@@ -167,13 +169,10 @@ class DbcFile:
 
     def amiss_elsewhere(self) -> str:
         """What is wrong with messages that are not wanted, in a few words; ''."""
-        doubtful = [m for m in self._wrong if self._amiss(m)]
-        if not doubtful:
+        if not self._wrong:
             return ""
-        first, rest = doubtful[0], len(doubtful) - 1
-        more = f", and {rest} more" if rest else ""
-        reason = self._amiss(first)
-        return f"{first.name} cannot be decoded ({reason}){more}; no channel listens to it"
+        more = f", and {self._count_wrong - 1} more" if self._count_wrong > 1 else ""
+        return f"{self._wrong}{more}; no channel listens to it"
 
     def _take(self, line: str) -> None:
         """One line of the file."""
@@ -200,6 +199,9 @@ class DbcFile:
             return
 
         message = DbcMessage(int(number), name, int(length), tuple(signals))
+        self._count += 1
+        if self._count > MAX_MESSAGES:
+            raise DbcError(f"has more than {MAX_MESSAGES} messages")
         self._names[name] += 1
         same = self._ids.setdefault(message.number, [])
         if len(same) < 2:
@@ -207,8 +209,14 @@ class DbcFile:
         if self._wanted is None or name in self._wanted:
             self._messages.append(message)
             self._numbers.add(message.number)
-        elif self._check_others and message.number != UNASSIGNED and self._amiss(message):
-            self._wrong.append(message)
+        elif self._check_others and message.number != UNASSIGNED:
+            self._check(message)
+
+    def _check(self, message: DbcMessage) -> None:
+        """One that is not wanted."""
+        if reason := self._amiss(message):
+            self._count_wrong += 1
+            self._wrong = self._wrong or f"{message.name} cannot be decoded ({reason})"
 
     def _attribute(self, line: str) -> None:
         self._all_j1939 |= bool(_J1939.match(line))

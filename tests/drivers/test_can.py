@@ -18,6 +18,7 @@ import pytest
 from gritd.drivers import can_link
 from gritd.drivers.build import build_readers
 from gritd.drivers.can_link import CanLink, packed
+from gritd.drivers.can_signals import database
 from gritd.drivers.errors import DeviceError
 from gritd.drivers.framing_can import CanFraming
 from gritd.drivers.queue import ReadingQueue
@@ -395,7 +396,7 @@ def test_socketcan_gets_the_filters_and_ignores_configuration_files(monkeypatch)
         lambda *args, **kwargs: asked.update(kwargs, args=args) or FailingBus(None, None),
     )
     device = can_device("socketcan", "can3", bitrate=250_000, options={"local_loopback": False})
-    framing = CanFraming("bus", CanWire(device)._database, ["WheelEncoder.Count"])
+    framing = CanFraming("bus", database(device), ["WheelEncoder.Count"])
     CanLink(device, framing.filters(), Ticking()).open()
     assert asked["args"] == ("can3", "socketcan") and asked["ignore_config"] is True
     assert asked["can_filters"] == [{"can_id": 0x100, "can_mask": 0x1FFFFFFF, "extended": False}]

@@ -8,6 +8,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from gritd.estimator.messages.readings import NS
 from gritd.estimator.recording.mcapfile import McapFile, RecordingError
 from gritd.estimator.recording.metadata import RECOVERED, sealed
 from gritd.estimator.recording.salvage import Recording, read
@@ -38,29 +41,31 @@ def main(argv: Sequence[str]) -> int:
 
     target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
     try:
-        saved = recover(recording, vacant(target))
+        span = recover(recording, vacant(target))
     except RecordingError as error:
         raise unwritten(error) from None
 
     for line in recording.damage:
         print(visible(f"{source}: {line}"), file=sys.stderr)
-    if not saved:
+    if span is None:
         raise CommandError(f"{source}: found nothing to recover; no file is written", DAMAGED)
 
-    print(f"{target}: {summary(recording)}")
+    print(f"{target}: {summary(recording, span)}")
     return DONE if recording.saved and not recording.attachments else DAMAGED
 
 
-def recover(recording: Recording, target: Path) -> bool:
+def recover(recording: Recording, target: Path) -> float | None:
     """Write every intact message, in file order, and every intact metadata record to a new file.
-    Returns False, and makes no file, where a recording that is not whole has neither.
+    Returns the time from the first message to the last [s]; None, and makes no file, where a
+    recording that is not whole has neither.
 
     Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises
     RecordingError where the file cannot be written. Whatever stops it, no part of a file is left.
     """
     if not (recording.complete or recording.counts.total() or recording.metadata):
-        return False
+        return None
 
+    first, last = np.iinfo(np.uint64).max, 0  # [ns]
     file = McapFile(target, library=LIBRARY)
     with file.beginning():
         for source in recording.sources.values():
@@ -74,25 +79,31 @@ def recover(recording: Recording, target: Path) -> bool:
         with Progress("recovering messages", recording.counts.total()) as progress:
             for chunk in recording.chunks():
                 file.add_chunk(*chunk.records())
+                if (times := chunk.heads["log_time"]).size:
+                    first, last = min(first, int(times.min())), max(last, int(times.max()))
                 progress.advance(len(chunk.starts))
         file.close()
-    return True
+    return max(last - first, 0) / NS
 
 
-def summary(recording: Recording) -> str:
-    """One line: what was saved, and what is known to be lost."""
+def summary(recording: Recording, span: float) -> str:
+    """One line: what was saved, and what is known to be lost. span: from the first message to the
+    last [s].
+    """
     saved = f"saved {recording.counts.total()} messages of {len(recording.counts)} topics"
     if recording.complete:
         return f"{saved}; the recording was complete"
 
-    ending = "closed" if recording.closed else "not closed"
+    end = f"not closed: it ends {span:.3f} s after its beginning, what came later is not in it"
+    ending = "closed" if recording.closed else end
     if recording.misplaced:
         ending += f", {recording.misplaced} chunks in a wrong place or twice"
 
     if recording.saved:
-        return f"{saved}; it was {ending}, nothing in it is lost"
+        what = "in it" if recording.closed else "before that"
+        return f"{saved}; it was {ending}; nothing {what} is lost"
     count = f"{recording.lost}" if recording.counted else f"{recording.lost} or more"
-    return f"{saved}; it was {ending}, {count} messages are lost"
+    return f"{saved}; it was {ending}; {count} messages are lost"
 
 
 def _note(recording: Recording) -> dict[str, str]:

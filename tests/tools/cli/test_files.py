@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from gritd.config import packaged
+from gritd.estimator.config.configuration import load
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.cli.files import vacant, writable
+from gritd.tools.cli.files import open_to_all, vacant, writable
 
 
 @pytest.mark.parametrize(
@@ -48,3 +50,17 @@ def test_a_check_changes_nothing(tmp_path: Path) -> None:
     assert writable(Path("/dev/stdout")) == Path("/dev/stdout")
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
     assert (tmp_path / "old").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("writable_one", ["testbed.yaml", "testbed.dbc", None])
+def test_a_trusted_file_that_anybody_may_change_is_told(
+    tmp_path: Path, writable_one: str | None
+) -> None:
+    for name in ("testbed.yaml", "testbed.dbc"):
+        (tmp_path / name).write_bytes(packaged(name).read_bytes())
+        (tmp_path / name).chmod(0o666 if name == writable_one else 0o644)
+    source = tmp_path / "testbed.yaml"
+    told = open_to_all(source, load(source).settings)
+    assert [line.partition(":")[0] for line in told] == [
+        str(tmp_path / name) for name in (writable_one,) if name
+    ]

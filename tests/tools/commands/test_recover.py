@@ -24,10 +24,10 @@ def test_an_unclosed_recording_becomes_a_closed_one_and_nothing_is_lost(
 
     said = capsys.readouterr()
     assert said.err == "" and said.out.count("\n") == 1
-    assert (
-        f"saved {len(written)} messages of 8 topics; it was not closed, nothing in it is lost"
-        in said.out
-    )
+    assert f"saved {len(written)} messages of 8 topics; it was not closed" in said.out
+    times = [time for _, time, _ in written]
+    assert f"it ends {(max(times) - min(times)) * 1e-9:.3f} s after its beginning" in said.out
+    assert "what came later is not in it; nothing before that is lost" in said.out
 
     recovered = read(tmp_path / "a.recovered.mcap")
     assert recovered.complete and list(recovered.messages()) == written
@@ -62,7 +62,7 @@ def test_a_damaged_recording_is_saved_in_part(
 
     assert 0 < lost <= 2 * 36 and recovered.complete
     assert (
-        f"it was closed, {lost} messages are lost" in said.out
+        f"it was closed; {lost} messages are lost" in said.out
         and "checksum does not hold" in said.err
     )
     assert recovered.recovered["lost"] == str(lost)
@@ -89,8 +89,11 @@ def test_a_cut_recording_is_saved_in_part(
     written = write_sample(tmp_path / "a.mcap", every=5, compression="none")
     os.truncate(tmp_path / "a.mcap", (tmp_path / "a.mcap").stat().st_size // 2)
     assert main([str(tmp_path / "a.mcap")]) == 3
-    assert "it was not closed, 0 or more messages are lost" in capsys.readouterr().out
+    said = capsys.readouterr().out
     found = list(read(tmp_path / "a.recovered.mcap").messages())
+    span = (max(time for _, time, _ in found) - min(time for _, time, _ in found)) * 1e-9
+    assert f"not closed: it ends {span:.3f} s after its beginning" in said
+    assert "0 or more messages are lost" in said
     assert found and found == written[: len(found)]
 
 

@@ -26,6 +26,7 @@ ROOMS = (
     ("estimator.offline", "estimator.daemon"),
     ("drivers",),
     ("tools.cli",),
+    ("tools.messages",),
     (
         "tools.testbed",
         "tools.service",

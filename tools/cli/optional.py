@@ -6,10 +6,13 @@ from importlib.util import find_spec
 
 from gritd.tools.cli.command import USAGE, CommandError
 
+FORMATS = "'gritd[formats]'"
 INSTALL = {
     "matplotlib": "matplotlib",
     "distributed": "'gritd[cluster]'",
     "pyarrow": "'gritd[parquet]'",
+    "asammdf": "'gritd[mdf]'",
+    **dict.fromkeys(("h5py", "nptdms", "pyulog", "python_calamine", "rosbags"), FORMATS),
 }
 
 

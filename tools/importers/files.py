@@ -42,13 +42,14 @@ def find(paths: Iterable[Path], pattern: re.Pattern[str]) -> list[tuple[Path, re
     RigFileError.
     """
     files = sorted(
-        {file for path in paths for file in _below(path)}, key=lambda file: (file.name, str(file))
+        {file for path in paths for file in below(path)}, key=lambda file: (file.name, str(file))
     )
     matches = ((file, pattern.fullmatch(file.name)) for file in files)
     return [(file, match) for file, match in matches if match]
 
 
-def _below(path: Path) -> Iterator[Path]:
+def below(path: Path) -> Iterator[Path]:
+    """A file, or everything in a folder. Raises RigFileError."""
     try:
         if not path.exists():
             raise RigFileError(f"{path}: found nothing there; expected a file or a folder", USAGE)

@@ -32,10 +32,10 @@ from gritd.tools.importers.files import (
     read_table,
     read_text,
 )
+from gritd.tools.importers.formats.mat import struct_lists
 from gritd.tools.importers.recording import NS, Stream, configuration, counts, stamps, write
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import Condition, Counting, check_few, scatter_of_mean, streams
-from gritd.tools.importers.series.binary import struct_lists
 
 NAME = "cmu"
 SUMMARY = "smooth and grousered wheel in dry sand: motion, sinkage, load, drawbar pull; no torque"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,22 +16,21 @@ from gritd.tools.importers.files import RigFileError
 from gritd.tools.importers.recording import write
 from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import START
-from gritd.tools.importers.series import binary, csv_text, written
-from gritd.tools.importers.series.columns import SeriesTable
+from gritd.tools.importers.series import written
+from gritd.tools.importers.series.clocks import runs_of
+from gritd.tools.importers.series.columns import SeriesTable, Wanted
 from gritd.tools.importers.series.convert import AXES, converted
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
 from gritd.tools.importers.series.mapping import SeriesMap, load
-from gritd.tools.importers.series.runs import SeriesRun, runs_of
+from gritd.tools.importers.series.runs import SeriesRun, check
+from gritd.tools.importers.series.sources import RunFiles, read, runs_files, series_files
 
 NAME = "csv"
-SUMMARY = "time series of any rig, CSV, Parquet or MATLAB, by a map of columns to channels"
+SUMMARY = "time series of any rig, tables, bags and logs, by a map of columns to channels"
 GAP = 3.0  # usual intervals without a row are a gap
 
-READERS: dict[str, Callable[[Path], SeriesTable]] = {
-    ".parquet": binary.read_parquet,
-    ".mat": binary.read_mat,
-}
+ENOUGH = 20_000  # rows of each table of a bag that a proposal is made from
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,13 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
     """One recording a run, one configuration. Raises RigFileError, ConfigError, RecordingError."""
-    with Progress("reading", len(args.paths)) as progress:
-        tables: list[SeriesTable] = []
-        for path in args.paths:
-            progress.at(path.name, len(tables) / len(args.paths))
-            tables.append(read(path))
     if args.guess:
-        tell(guessed(tables).rstrip("\n"))
+        tell(guessed(_all(args.paths)).rstrip("\n"))
         return []
     if args.map is None:
         raise RigFileError("expected --map MAP.yaml, or --guess to propose one", USAGE)
@@ -62,15 +56,30 @@ def run(args: argparse.Namespace, tell: Tell) -> list[Path]:
         raise RigFileError("expected -o OUTDIR", USAGE)
 
     mapped = load(args.map)
-    runs = runs_of(tables, mapped)
+    runs = _read(runs_files(args.paths, mapped), mapped)
     return _import(runs, mapped, args.config, args.output, tell)
 
 
-def read(path: Path) -> SeriesTable:
-    """One file, by its name. Raises RigFileError."""
-    if not path.exists():
-        raise RigFileError(f"{path}: found nothing there; expected a file", USAGE)
-    return READERS.get(path.suffix.lower(), csv_text.read)(path)
+def _all(paths: Sequence[Path]) -> list[SeriesTable]:
+    """Every table of the files. Raises RigFileError."""
+    files = series_files(paths)
+    tables: list[SeriesTable] = []
+    with Progress("reading", len(files)) as progress:
+        for number, path in enumerate(files):
+            progress.at(path.name, number / len(files))
+            tables += read(path, Wanted(rows=ENOUGH))
+    return tables
+
+
+def _read(files: Sequence[RunFiles], mapped: SeriesMap) -> list[SeriesRun]:
+    """The runs of all files. Raises RigFileError."""
+    runs: list[SeriesRun] = []
+    with Progress("reading", len(files)) as progress:
+        for number, each in enumerate(files):
+            progress.at(each.name, number / len(files))
+            runs += runs_of(each, mapped)
+    check(runs, mapped)
+    return runs
 
 
 def _import(
@@ -89,7 +98,7 @@ def _import(
     settings = config.loads(text, configured.source, folder).settings
 
     imported = converted(runs, mapped, settings, START)
-    text = written.written(text, configured.source, imported, interval)
+    text = written.written(text, configured.source, imported)
     configured = _configuration(text, given, output / "csv.yaml")
 
     paths = [output / "csv.yaml"]

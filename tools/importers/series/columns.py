@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +47,10 @@ class SeriesTable:
 
     units: what a row of units, or the file's own description, says of a column; may lack some.
     lines: number of each row in the file (n,), for messages; None where they count from 1.
-    notes: what was not read, one line each.
+    notes: what was not read, or what the user should know otherwise, one line each.
+    group: what stands with a dot before the name of every column; a file may hold several tables.
+    clock: when the rows were taken [ns], shape (n,), NONE where that is not known; None where the
+        file itself does not tell.
     """
 
     path: Path
@@ -55,10 +58,16 @@ class SeriesTable:
     units: Mapping[str, str] | None = None
     lines: NDArray[np.int64] | None = None
     notes: tuple[str, ...] = ()
+    group: str = ""
+    clock: Nanoseconds | None = None
 
     @property
     def rows(self) -> int:
         return len(next(iter(self.columns.values())).numbers)
+
+    def short(self, name: str) -> str:
+        """A column's name without that of its group."""
+        return name.removeprefix(f"{self.group}.") if self.group else name
 
     def column(self, name: str) -> Column:
         """A column by name. Raises RigFileError."""
@@ -95,7 +104,35 @@ class SeriesTable:
         """The rows that are marked (n,)."""
         columns = {name: column.at(chosen) for name, column in self.columns.items()}
         lines = None if self.lines is None else self.lines[chosen]
-        return SeriesTable(self.path, columns, self.units, lines, self.notes)
+        clock = None if self.clock is None else self.clock[chosen]
+        return replace(self, columns=columns, lines=lines, clock=clock)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which columns are to be read, by their names with or without that of the group.
+
+    names: None for all. rows: so many of each group are enough; None for all.
+    """
+
+    names: frozenset[str] | None = None
+    rows: int | None = None
+
+    def has(self, name: str, group: str = "") -> bool:
+        """Whether a column is wanted; `name` begins with the group's."""
+        if self.names is None:
+            return True
+        short = name.removeprefix(f"{group}.") if group else name
+        return name in self.names or short in self.names
+
+    def touches(self, whole: str) -> bool:
+        """Whether a thing is wanted, or a part of it: `x` where `x[0]` or `x.y` is."""
+        if self.names is None or whole in self.names:
+            return True
+        return any(name.startswith((f"{whole}.", f"{whole}[")) for name in self.names)
+
+
+EVERYTHING = Wanted()
 
 
 def shortened(names: Sequence[str]) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.messages.readings import WRENCH_FIELDS
 from gritd.tools.cli.command import USAGE
-from gritd.tools.importers.files import RigFileError
+from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.recording import UNKNOWN, Stream, stamps
 from gritd.tools.importers.series import encoders
 from gritd.tools.importers.series.calibrated import Calibrated
@@ -29,6 +29,8 @@ ANALOGUE = {
     "motor_shunt": ("current", "motor_torque", "shunt_volts"),
     "motor_temperature": ("motor_temperature",),
 }
+TOGETHER = 0.5  # share of the rows of the slowest axis that axes of one clock have in common
+NEAR = 3.0  # usual intervals between two readings that a third may lie between
 AXES = {"drawbar_pull": "fx", "lateral_force": "fy", "load": "fz", "torque": "ty"}
 
 
@@ -38,12 +40,14 @@ class Imported:
 
     configured: noise [raw] of the channels that keep the calibration of the configuration.
     axes: those of the wrench; none where no force was measured.
+    intervals: time between two readings of each channel [s].
     """
 
     streams: tuple[tuple[Stream, ...], ...]
     channels: dict[str, Calibrated]
     configured: dict[str, float]
     axes: dict[str, Calibrated]
+    intervals: dict[str, float]
 
 
 def converted(
@@ -54,13 +58,16 @@ def converted(
     """
     used = _used(mapped)
     noise = {name: _noise(runs, mapped, name) for name in used.values()}
+    intervals = {channel: _interval(runs, [name]) for channel, name in used.items()}
     quanta = {
         channel: encoders.quantum(runs, name, mapped.columns[name])
         for channel, name in used.items()
         if channel in encoders.CHANNELS
     }
     every = {
-        channel: _calibrated(mapped.columns[name], quanta.get(channel), noise[name], runs, settings)
+        channel: _calibrated(
+            mapped.columns[name], quanta.get(channel), noise[name], intervals[channel], settings
+        )
         for channel, name in used.items()
     }
     channels = {
@@ -74,7 +81,14 @@ def converted(
         tuple(_streams(run, first, mapped, used, quanta, settings))
         for run, first in zip(runs, _starts(runs, start), strict=True)
     )
-    return Imported(streams, channels, configured, _axes(runs, mapped, settings))
+    measured = [name for name in map(mapped.named, AXES) if name is not None]
+    intervals |= {"wrench": _interval(runs, measured)} if measured else {}
+    return Imported(streams, channels, configured, _axes(runs, mapped, settings), intervals)
+
+
+def _interval(runs: Sequence[SeriesRun], names: Sequence[str]) -> float:
+    """Time between two readings [s] of columns that are read together."""
+    return max(float(np.median([run.interval_of(name) for run in runs])) for name in names)
 
 
 def _used(mapped: SeriesMap) -> dict[str, str]:
@@ -138,12 +152,11 @@ def _calibrated(
     column: Mapped,
     quantum: float | None,
     noise: float,
-    runs: Sequence[SeriesRun],
+    interval: float,
     settings: Settings,
 ) -> Calibrated:
     """Of one channel: an encoder's counts, or a column's numbers as volts."""
     if quantum is not None:
-        interval = float(np.median([run.interval for run in runs]))
         return encoders.calibrated(column, quantum, noise, interval, settings)
 
     torque = column.channel == "motor_torque"
@@ -210,13 +223,45 @@ def _streams(
 
 def _wrench(run: SeriesRun, at: NDArray[np.int64], mapped: SeriesMap, weights: float) -> Stream:
     """Rows in which every measured axis has a number; N and N·m as the file's units say."""
+    measured = {field: name for axis, field in AXES.items() if (name := mapped.named(axis))}
+    columns = [run.table.column(name).numbers for name in measured.values()]
+    columns = _of_one_clock(run.seconds, columns)
+
     six = np.zeros((at.size, len(WRENCH_FIELDS)))
     six[:, WRENCH_FIELDS.index("fz")] = weights
-
-    for axis, field in AXES.items():
-        if (name := mapped.named(axis)) is not None:
-            numbers = run.table.column(name).numbers * mapped.columns[name].per_unit
-            six[:, WRENCH_FIELDS.index(field)] = numbers
+    for (field, name), numbers in zip(measured.items(), columns, strict=True):
+        six[:, WRENCH_FIELDS.index(field)] = numbers * mapped.columns[name].per_unit
 
     known = np.all(np.isfinite(six), axis=1)
     return Stream("wrench", at[known], six[known])
+
+
+def _of_one_clock(seconds: Array, columns: list[Array]) -> list[Array]:
+    """Axes (n,) that several sensors read: each at the times of the slowest, on the line between
+    its neighbours where these are close. Axes of one clock stay as they are.
+    """
+    counts = [int(np.isfinite(column).sum()) for column in columns]
+    together = int(np.all(np.isfinite(columns), axis=0).sum())
+    if together > TOGETHER * min(counts):
+        return columns
+
+    slowest = np.isfinite(columns[int(np.argmin(counts))])
+    return [_between(seconds, column, slowest) for column in columns]
+
+
+def _between(seconds: Array, column: Array, wanted: NDArray[np.bool_]) -> Array:
+    """Numbers (n,) at the rows that are wanted, NaN elsewhere and where a neighbour is far."""
+    known = np.flatnonzero(np.isfinite(column))
+    made = np.full(column.size, np.nan)
+    rows = np.flatnonzero(wanted)
+    after = np.searchsorted(known, rows)
+    inside = (after < known.size) & (
+        (after > 0) | (known[np.minimum(after, known.size - 1)] == rows)
+    )
+    rows, after = rows[inside], after[inside]
+
+    right = known[after]
+    left = np.where(right == rows, right, known[np.maximum(after - 1, 0)])
+    close = seconds[right] - seconds[left] <= NEAR * float(np.median(np.diff(seconds[known])))
+    made[rows[close]] = np.interp(seconds[rows[close]], seconds[known], column[known])
+    return made

@@ -36,7 +36,7 @@ def quantum(runs: Sequence[SeriesRun], name: str, column: Mapped) -> float:
     for run in runs:
         values = run.table.column(name)
         step = values.resolution or spacing(values.numbers)
-        time = run.interval if column.channel in SPEEDS else 1.0
+        time = run.interval_of(name) if column.channel in SPEEDS else 1.0
         span = float(np.nanmax(np.abs(values.numbers), initial=0.0)) * time
         steps.append(max(step * time, span * FINEST, LEAST_COUNT / column.per_unit))
 

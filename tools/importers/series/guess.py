@@ -57,28 +57,34 @@ class Guess:
 
 
 def guessed(tables: Sequence[SeriesTable]) -> str:
-    """YAML text of a map for tables with the columns of the first."""
-    table = tables[0]
+    """YAML text of a map for files with the columns of the first; a file may hold several tables,
+    each with a clock of its own.
+    """
+    first = [table for table in tables if table.path == tables[0].path]
     taken: set[str] = set()
     lines = [HEAD + "columns:"]
-    for name, column in table.columns.items():
-        guess = _guess(table, name, column, several=len(tables) > 1)
-        if guess is None or guess.channel in taken:
-            lines.append(f"  # {_quoted(name)}: not used, {_range(column)}")
-            continue
-        taken.add(guess.channel)
-        lines.append(guess.line(name))
+    for table in first:
+        taken.discard("time")
+        for name, column in table.columns.items():
+            guess = _guess(table, name, column, several=len(tables) > len(first))
+            if guess is None or guess.channel in taken:
+                lines.append(f"  # {_quoted(name)}: not used, {_range(column)}")
+                continue
+            taken.add(guess.channel)
+            lines.append(guess.line(name))
 
-    lines += ["", "rate: 100 Hz # of the rows: no column of time was found"] * ("time" not in taken)
+    timeless = "time" not in taken and any(table.clock is None for table in first)
+    lines += ["", "rate: 100 Hz # of the rows: no column of time was found"] * timeless
     lines += ["", WHEEL_LINES + "# torque_constant: {value: 2.0 N*m/A, sigma: 0.02 N*m/A}"]
     if not taken & {"load", "nominal_load"}:
         lines += ["", "# load: 70 N # weights of every run; or for each:"]
-    lines += ["# runs:", *(f"#   {_quoted(t.path.name)}: {{load: 70 N, pass: 1}}" for t in tables)]
+    names = dict.fromkeys(table.path.name for table in tables)
+    lines += ["# runs:", *(f"#   {_quoted(name)}: {{load: 70 N, pass: 1}}" for name in names)]
     return "\n".join(lines) + "\n"
 
 
 def _guess(table: SeriesTable, name: str, column: Column, several: bool) -> Guess | None:
-    words, unit = _words(name), _unit(table, name)
+    words, unit = _words(table.short(name)), _unit(table, name)
     channel = _channel(words, unit)
     if channel is None:
         return None

@@ -4,7 +4,7 @@ line for a mistake.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,7 @@ OF_THE_RUN = {
     "start": ("m", "starting position on the bed"),
     "pass": ("", "number of the pass over the bed"),
 }
+DATE, TIME = "date", "time"  # the channels of columns that tell when a row was taken
 CLOCK = "clock"  # the unit of a time that is written as a date or as a time of day
 SPELLINGS = {
     "Nm": "N*m",
@@ -74,6 +75,7 @@ class Mapped:
     noise: standard deviation of one reading, SI; None where it is to be estimated.
     order: of a date, one of ORDERS; '' where the file tells.
     epoch: day [ns since 1970] from which a number of time counts.
+    rate: [Hz] of the column's rows, where it has no time; None where the map does not say.
     """
 
     channel: str
@@ -83,6 +85,7 @@ class Mapped:
     noise: float | None = None
     order: str = ""
     epoch: int = 0
+    rate: float | None = None
 
     @property
     def per_unit(self) -> float:
@@ -91,10 +94,31 @@ class Mapped:
 
 
 @dataclass(frozen=True)
+class MapSource:
+    """The files that a pattern names, and what is used of them.
+
+    pattern: of a file's name; a `*` stands for the name of the run. '' for every file.
+    columns: by the file's names for them. labels: what SeriesMap.columns calls each.
+    rate: [Hz] of the rows, where there is no column of time.
+    shift: [s] is added to the times.
+    """
+
+    pattern: str
+    columns: Mapping[str, Mapped]
+    rate: float | None = None
+    shift: float = 0.0
+
+    def label(self, name: str) -> str:
+        """What SeriesMap.columns calls a column: by its file where there are several."""
+        return f"{self.pattern}: {name}" if self.pattern else name
+
+
+@dataclass(frozen=True)
 class SeriesMap:
-    """What a map says; the columns by name."""
+    """What a map says; the columns by name, of all sources."""
 
     columns: Mapping[str, Mapped]
+    sources: tuple[MapSource, ...]
     runs: Mapping[str, RunInfo]
     rate: float | None  # [Hz] of the rows; a column of time then tells only when they begin
     resample: float | None  # [Hz] of the readings, where not every row is to be one
@@ -150,15 +174,40 @@ class Columns:
         given = entries(node, self.expected)
         read = {name: kind.read(item)[0] for name, item in given.items()}
 
-        seen: dict[str, str] = {}
-        for name, mapped in read.items():
-            if mapped.channel in seen:
-                raise given[name].place.error(
-                    f"{mapped.channel} again, which is {seen[mapped.channel]} already",
-                    "each channel once",
-                )
-            seen[mapped.channel] = name
+        check_once([(name, mapped, given[name]) for name, mapped in read.items()])
         return read, Tree(node.place, dict(given))
+
+
+def check_once(columns: Iterable[tuple[str, Mapped, Node]]) -> None:
+    """Every channel has one column; each table may have a time of its own. Raises ConfigError."""
+    seen: dict[str, str] = {}
+    for name, mapped, node in columns:
+        if mapped.channel in seen and mapped.channel not in (DATE, TIME):
+            raise node.place.error(
+                f"{mapped.channel} again, which is {seen[mapped.channel]} already",
+                "each channel once",
+            )
+        seen[mapped.channel] = name
+
+
+@dataclass(frozen=True)
+class Files:
+    """Several files of each run, each with a clock of its own, by a pattern of their names."""
+
+    expected: str = "a mapping of files"
+
+    def read(self, node: Node) -> tuple[tuple[MapSource, ...], Node]:
+        kind = Section(OF_FILE, dict)
+        given = entries(node, self.expected)
+        made = {pattern: kind.read(item)[0] for pattern, item in given.items()}
+        check_once(
+            [
+                (name, mapped, given[pattern])
+                for pattern, values in made.items()
+                for name, mapped in values["columns"].items()
+            ]
+        )
+        return tuple(MapSource(pattern, **values) for pattern, values in made.items()), node
 
 
 @dataclass(frozen=True)
@@ -186,6 +235,13 @@ WHEEL = {
 }
 
 
+OF_FILE = {
+    "columns": Key(Columns(), "the columns that are used"),
+    "rate": Key(Quantity("Hz", above=0), "of the rows, where no time tells it", ABSENT),
+    "shift": Key(Quantity("s"), "is added to the times", "0 s"),
+}
+
+
 def _run(load: float | None, start: float, **values: Any) -> RunInfo:
     told = {name: values[name] for name in ("operator", "notes")}
     return RunInfo("", load, values["pass"], start, **told)
@@ -202,10 +258,8 @@ def _channels() -> dict[str, Section]:
     order = Key(Choice(ORDERS), "of a date in numbers", ABSENT)
     time = {"order": order, "epoch": Key(Text("a date"), "day that numbers count from", ABSENT)}
     return {
-        "time": Section(
-            _choice("time") | {"unit": Key(UnitOf("s"), "of the column")} | time, _time
-        ),
-        "date": Section(_choice("date") | {"order": order}, _time),
+        TIME: Section(_choice(TIME) | {"unit": Key(UnitOf("s"), "of the column")} | time, _time),
+        DATE: Section(_choice(DATE) | {"order": order}, _time),
         "run": run,
         **plain,
         **measured,
@@ -228,6 +282,7 @@ def _measured(name: str, si: str) -> Section:
         "factor": Key(uncertain(""), "multiplies the column; -1 turns its sign", "1.0"),
         "offset": Key(uncertain(difference), "is added", f"0 {difference}"),
         "noise": Key(Quantity(difference, above=0), "of one reading; else estimated", ABSENT),
+        "rate": Key(Quantity("Hz", above=0), "of its rows, where they have no time", ABSENT),
     }
     return Section(_choice(name) | keys, _mapped)
 
@@ -246,19 +301,31 @@ def _mapped(unit: str | None = None, **values: Any) -> Mapped:
     return Mapped(unit=unit or "", **values)
 
 
-def _whole(wheel: dict[str, float] | None, **values: Any) -> SeriesMap:
-    if values["rate"] is None and not any(
-        mapped.channel == "time" for mapped in values["columns"].values()
-    ):
-        raise Impossible("rate", "a column with channel: time, or the rate of the rows in Hz")
+def _whole(
+    wheel: dict[str, float] | None,
+    columns: dict[str, Mapped] | None,
+    files: tuple[MapSource, ...] | None,
+    rate: float | None,
+    **values: Any,
+) -> SeriesMap:
+    if not columns and not files:
+        raise Impossible("columns", "the columns that are used; or files:, each with its columns")
+    if columns and files:
+        raise Impossible("files", "either columns: or files:, each of which has columns")
+
+    sources = files or (MapSource("", columns or {}, rate),)
+    labelled = {s.label(name): mapped for s in sources for name, mapped in s.columns.items()}
     known = wheel or {}
-    return SeriesMap(radius=known.get("radius"), width=known.get("width"), **values)
+    return SeriesMap(
+        labelled, sources, rate=rate, radius=known.get("radius"), width=known.get("width"), **values
+    )
 
 
 TABLE = Section(
     {
-        "columns": Key(Columns(), "the columns that are used"),
-        "rate": Key(Quantity("Hz", above=0), "of the rows, where no time tells it", ABSENT),
+        "columns": Key(Columns(), "the columns that are used", ABSENT),
+        "rate": OF_FILE["rate"],
+        "files": Key(Files(), "several files of each run, with their columns", ABSENT),
         "resample": Key(Quantity("Hz", above=0), "means over as many rows", ABSENT),
         "wheel": Key(Section(WHEEL, dict), "the wheel, without --config", ABSENT),
         "torque_constant": Key(uncertain("N*m/A", above=0), "of the drive", ABSENT),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.columns import Column, SeriesTable, told_rows
 from gritd.tools.importers.series.mapping import SeriesMap
 from gritd.tools.importers.series.noise import spacing
+from gritd.tools.importers.series.sources import stem
 from gritd.tools.importers.series.stamps import (
     LEAST,
     Order,
@@ -28,7 +29,6 @@ from gritd.tools.importers.series.stamps import (
 from gritd.tools.importers.series.times import NONE, NS, Nanoseconds
 
 EPOCH = 10**8 * NS  # later times count from 1970
-ENDINGS = r"(\.(csv|txt|tsv|tab|dat|asc|log|lvm|parquet|mat))?(\.(gz|zst|zip|xz|bz2))?$"
 Rows = NDArray[np.bool_]
 
 
@@ -38,9 +38,11 @@ class SeriesRun:
 
     seconds: (n,) of the rows since the first, rising.
     start: of the first row [ns since 1970]; None where the file does not say.
+    began: of the first row [ns] by the clock of the file.
     resampled: rows behind each row of the table.
     repeated: rows of the file that were the row before once more, and are left out.
     notes: what else is left out, one line each.
+    intervals: time between two rows [s] of each column, where they differ.
     """
 
     info: RunInfo
@@ -50,31 +52,35 @@ class SeriesRun:
     resampled: float = 1.0
     repeated: int = 0
     notes: tuple[str, ...] = ()
+    began: int = 0
+    intervals: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def interval(self) -> float:
-        """Time between two rows [s], the median."""
-        return float(np.median(np.diff(self.seconds)))
+        """Time between two rows [s], the median; the longest of those that differ."""
+        return max(self.intervals.values(), default=float(np.median(np.diff(self.seconds))))
+
+    def interval_of(self, name: str) -> float:
+        """Time between two rows [s] of a column, the median."""
+        return self.intervals.get(name, self.interval)
 
 
-def runs_of(tables: Sequence[SeriesTable], mapped: SeriesMap) -> list[SeriesRun]:
-    """All runs of the files. Raises RigFileError."""
-    runs = [run for table in tables for run in _of_table(table, mapped)]
+def check(runs: Sequence[SeriesRun], mapped: SeriesMap) -> None:
+    """Raises RigFileError where two runs have one name, or the map names one that is none."""
     names = [run.info.name for run in runs]
 
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise RigFileError(f"found two runs {twice!r}; expected each with a name of its own")
     known = {re.sub(r"-\d+$", "", name) for name in names} | set(names)
-    unknown = next((name for name in mapped.runs if _stem(name) not in known), None)
+    unknown = next((name for name in mapped.runs if stem(name) not in known), None)
     if unknown is not None:
         raise RigFileError(
             f"runs: found {unknown!r}, which is no run; expected one of {', '.join(names)}", USAGE
         )
-    return runs
 
 
-def _of_table(table: SeriesTable, mapped: SeriesMap) -> Iterator[SeriesRun]:
+def of_table(table: SeriesTable, mapped: SeriesMap, named: str) -> Iterator[SeriesRun]:
     """One run a file, or one for each value of the column of runs."""
     for name in mapped.columns:
         table.column(name)
@@ -82,18 +88,13 @@ def _of_table(table: SeriesTable, mapped: SeriesMap) -> Iterator[SeriesRun]:
 
     column = mapped.named("run")
     if column is None:
-        yield from _parts(table, times, _stem(table.path.name), mapped)
+        yield from _parts(table, times, named, mapped)
         return
 
     labels = np.array(_labels(table.column(column)))
     for label in dict.fromkeys(labels.tolist()):
         chosen = labels == label
         yield from _parts(table.at(chosen), times[chosen], label, mapped)
-
-
-def _stem(name: str) -> str:
-    """A file's name without what says its kind."""
-    return re.sub(ENDINGS, "", name, flags=re.IGNORECASE)
 
 
 def _labels(column: Column) -> list[str]:
@@ -126,7 +127,7 @@ def _parts(
     parts = _long(table, order, name, notes)
     for number, rows in enumerate(parts, start=1):
         called = name if len(parts) == 1 else f"{name}-{number}"
-        info = replace(_info(table.at(rows), name, mapped), name=called)
+        info = replace(info_of(table.at(rows), name, mapped), name=called)
         run = SeriesRun(
             info,
             table.at(rows),
@@ -134,8 +135,9 @@ def _parts(
             int(times[rows][0]) if times[rows][0] > EPOCH else None,
             repeated=int(again.sum()) if number == 1 else 0,
             notes=tuple(notes) if number == 1 else (),
+            began=int(times[rows][0]),
         )
-        yield run if mapped.resample is None else _resampled(run, mapped.resample)
+        yield run if mapped.resample is None else resampled(run, mapped.resample)
 
 
 def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list[Rows]:
@@ -161,9 +163,9 @@ def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list
     return long
 
 
-def _info(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
+def info_of(table: SeriesTable, name: str, mapped: SeriesMap) -> RunInfo:
     """What the columns say of the run, then the map."""
-    told = {_stem(key): info for key, info in mapped.runs.items()}.get(name, RunInfo())
+    told = {stem(key): info for key, info in mapped.runs.items()}.get(name, RunInfo())
     load = told.nominal_load or _constant(table, mapped, "nominal_load") or mapped.load
     start, number = (_constant(table, mapped, key) for key in ("start", "pass"))
 
@@ -199,7 +201,7 @@ def _constant(table: SeriesTable, mapped: SeriesMap, channel: str) -> float | No
 # --- resampling ---
 
 
-def _resampled(run: SeriesRun, rate: float) -> SeriesRun:
+def resampled(run: SeriesRun, rate: float) -> SeriesRun:
     """Means of the rows in intervals of 1/rate; where there are no rows there is no mean."""
     if rate * run.interval > 1.0:
         raise RigFileError(

@@ -67,20 +67,21 @@ def slow(text: str, settings: config.Configuration, interval: float, speeds: boo
     return document.text()
 
 
-def written(text: str, source: str, imported: Imported, interval: float) -> str:
+def written(text: str, source: str, imported: Imported) -> str:
     """The text with what the import knows of each channel."""
+    intervals = imported.intervals
     document = EditedYaml(text, source)
     for channel, calibrated in imported.channels.items():
         _ensure(document, channel)
-        _set_channel(document, channel, calibrated, interval)
+        _set_channel(document, channel, calibrated, intervals[channel])
 
     for channel, noise in imported.configured.items():
         path = ("channels", channel)
         document.set((*path, "noise"), _noise(noise, UNITS[channel][2]))
-        document.set((*path, "stale_after"), _stale_after(interval))
+        document.set((*path, "stale_after"), _stale_after(intervals[channel]))
 
     if imported.axes:
-        _set_wrench(document, imported.axes, interval)
+        _set_wrench(document, imported.axes, intervals["wrench"])
     _set_source(document, imported)
     return document.text()
 

@@ -71,15 +71,16 @@ def test_revolutions_a_minute() -> None:
         ("columns: {t: {channel: time, unit: mm}}", "expected a unit of the same kind as s"),
         (f"columns: {{{TIME}, x: {{channel: load, units: N}}}}", "(did you mean unit?)"),
         ("columns: {t: {channel: time}}", "t.unit: found nothing"),
-        (f"columns: {{{TIME}, t: {{channel: time, unit: s}}}}", "expected each channel once"),
+        (
+            f"columns: {{{TIME}, x: {{channel: load, unit: N}}, y: {{channel: load, unit: N}}}}",
+            "expected each channel once",
+        ),
         (
             f"columns: {{{TIME}, x: {{channel: load, unit: N, factor: 0}}}}",
             "expected a factor other than 0",
         ),
-        (
-            "columns: {x: {channel: load, unit: N}}",
-            "expected a column with channel: time, or the rate",
-        ),
+        ("load: 3 N", "columns: found nothing"),
+        (f"columns: {{{TIME}}}\nfiles: {{a.csv: {{columns: {{{TIME}}}}}}}", "files"),
         (f"columns: {{{TIME}}}\nruns: {{a: {{load: 3 m}}}}", "runs.a.load"),
         ("", "found nothing"),
     ],

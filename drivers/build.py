@@ -140,9 +140,12 @@ def _check_signals(framing: CanFraming, sensors: list[Sensor]) -> None:
             reason = f"{' and '.join(sensor.keys)} make one value, expected a Cycle signal in each"
             raise DeviceSettingsError(sensor.channel, reason)
         signals = [signal for key in sensor.keys for signal in framing.signals(key)]
-        sensor.check_signals([SignalShape(s.name, s.length, _is_integer(s)) for s in signals])
+        sensor.check_signals(list(map(_shape, signals)))
 
 
-def _is_integer(signal: Signal) -> bool:
-    """Whether the signal's values are integers, exactly as counted."""
-    return not signal.conversion.is_float and signal.scale == 1 and signal.offset == 0
+def _shape(signal: Signal) -> SignalShape:
+    is_float, scale, offset = signal.conversion.is_float, signal.scale, signal.offset
+    counted = not is_float and scale == 1 and offset == 0  # integers, exactly as counted
+    return SignalShape(
+        signal.name, signal.length, counted, signal.is_signed, is_float, float(scale), float(offset)
+    )

@@ -29,6 +29,10 @@ class SignalShape(NamedTuple):
     name: str
     bits: int
     integer: bool  # values are integers, unscaled
+    signed: bool = False
+    is_float: bool = False
+    scale: float = 1.0  # value = bits · scale + offset
+    offset: float = 0.0
 
 
 class Sensor(ABC):
@@ -55,14 +59,21 @@ class Sensor(ABC):
     def check_signals(self, signals: Sequence[SignalShape]) -> None:  # noqa: B027 - most take any
         """Raise DeviceSettingsError if these CAN signals cannot be this sensor's."""
 
+    def sent(self, value: Value) -> tuple[FieldValue, ...]:
+        """What a device sends for a value: the other way round, for a simulated testbed."""
+        return value if isinstance(value, tuple) else (value,)
+
     def refuse(self) -> None:
         """Count a value as impossible."""
         self.quarantined += 1
 
 
 class Encoder(Sensor):
-    """An incremental encoder: a counter of `bits` width that wraps both ways, unwrapped to an exact
-    integer.
+    """An incremental or absolute encoder: a count that wraps both ways at `modulus`, unwrapped to
+    an exact integer.
+
+    Where the device sends turns, degrees or a scaled number, one count is `resolution` of it, or
+    one bit of a scaled signal.
 
     The first count is taken as read. After a reset of the device the total goes on from where it
     was. After a silence in which the counter may have gone half round, nobody knows how far it
@@ -72,25 +83,44 @@ class Encoder(Sensor):
     def __init__(self, settings: Channel) -> None:
         super().__init__(settings.signal)
         self.bits = settings.bits
-        self._half = (1 << (settings.bits - 1)) / settings.max_rate  # [s] it takes to go half round
+        self.modulus = settings.modulus or 1 << settings.bits
+        self._half = 0.5 * self.modulus / settings.max_rate  # [s] it takes to go half round
+        self._stated = settings.modulus is not None
+        self._step, self._zero = settings.resolution or 0.0, 0.0  # of the number sent
+        self._signed = False
         self._total: int | None = None
         self._last: int | None = None
 
     def value(self, frame: Frame) -> int | None:
-        count = frame.values[0]
-        if len(frame.values) != 1 or not isinstance(count, int) or not self._fits(count):
+        count = self._count(frame.values[0]) if len(frame.values) == 1 else None
+        if count is None or not self._fits(count):
             self.refuse()
             return None
         if self._total is None:
             self._total = count
         elif self._last is not None:
-            self._total += modular_difference(count, self._last, self.bits)
+            self._total += modular_difference(count, self._last, self.modulus)
         self._last = count
         return self._total
 
+    def sent(self, value: Value) -> tuple[FieldValue, ...]:
+        assert isinstance(value, int)
+        half = self.modulus // 2 if self._signed else 0
+        count = (value + half) % self.modulus - half
+        return (count * self._step + self._zero if self._step else count,)
+
+    def _count(self, sent: FieldValue) -> int | None:
+        """What was sent as a whole count; None where it is none."""
+        if not self._step:
+            return sent if isinstance(sent, int) else None
+        steps = (sent - self._zero) / self._step
+        return round(steps) if isfinite(steps) else None
+
     def _fits(self, count: int) -> bool:
-        """Whether a counter of this width, signed or not, can show this count."""
-        return -(1 << (self.bits - 1)) <= count < 1 << self.bits
+        """Whether such a counter, signed or not, can show this count. A number that is sent rounded
+        may show the modulus for zero.
+        """
+        return -(self.modulus // 2) <= count < self.modulus + bool(self._step)
 
     def elapsed(self, seconds: float) -> None:
         self.turns_unknown += self._last is not None and seconds >= self._half > 0.0
@@ -99,15 +129,26 @@ class Encoder(Sensor):
         self._last = None
 
     def check_signals(self, signals: Sequence[SignalShape]) -> None:
-        name, bits, integer = signals[0]
-        if len(signals) != 1 or not integer:
-            raise DeviceSettingsError(
-                f"channel {self.channel}", f"signal {name} is not one unscaled integer"
+        shape = signals[0]
+        if len(signals) != 1:
+            raise self._wrong(f"{len(signals)} signals, expected one")
+        if shape.is_float and not self._step:
+            raise self._wrong(
+                f"signal {shape.name} is a float; expected `resolution`, what one count is of it"
             )
-        if bits != self.bits:
-            raise DeviceSettingsError(
-                f"channel {self.channel}", f"bits is {self.bits}, but signal {name} has {bits}"
+
+        self._signed = shape.signed or (shape.is_float and not self._stated)
+        if not shape.integer and not self._step:
+            self._step, self._zero = shape.scale, shape.offset
+        if self._stated and not shape.is_float and self.modulus > 1 << shape.bits:
+            raise self._wrong(
+                f"modulus is {self.modulus}, but signal {shape.name} has {shape.bits} bits"
             )
+        if not self._stated and not shape.is_float and shape.bits != self.bits:
+            raise self._wrong(f"bits is {self.bits}, but signal {shape.name} has {shape.bits}")
+
+    def _wrong(self, reason: str) -> DeviceSettingsError:
+        return DeviceSettingsError(f"channel {self.channel}", reason)
 
 
 class Analog(Sensor):
@@ -135,10 +176,10 @@ class Analog(Sensor):
         return float(value)
 
 
-def modular_difference(count: int, last: int, bits: int) -> int:
-    """count − last of a counter that wraps at 2^bits, as the step of smallest size."""
-    half = 1 << (bits - 1)
-    return (count - last + half) % (1 << bits) - half
+def modular_difference(count: int, last: int, modulus: int) -> int:
+    """count − last of a counter that wraps at `modulus`, as the step of smallest size."""
+    half = modulus // 2
+    return (count - last + half) % modulus - half
 
 
 def within(value: FieldValue, low: float, high: float) -> bool:

@@ -56,7 +56,7 @@ class Wrench(Sensor):
         self._cycle = None
 
     def check_signals(self, signals: Sequence[SignalShape]) -> None:
-        names = [name.rpartition(".")[2].lower() for name, _, _ in signals]
+        names = [signal.name.rpartition(".")[2].lower() for signal in signals]
         if names != list(WRENCH_FIELDS):
             reason = f"its signals are {' '.join(names)}, expected {' '.join(WRENCH_FIELDS)}"
             raise DeviceSettingsError("wrench", reason)

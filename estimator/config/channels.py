@@ -115,6 +115,14 @@ def _channel(name: str) -> Section:
             UNLIMITED,
         )
         keys["bits"] = Key(Integer(8, 64), "width of the counter on the wire", "32")
+        keys["modulus"] = Key(
+            Integer(2, 1 << 64), "counts at which it wraps, where that is not 2^bits", ABSENT
+        )
+        keys["resolution"] = Key(
+            Quantity("", above=0),
+            "what one count is in the number sent, where turns, degrees or a scaled number are",
+            ABSENT,
+        )
         keys["max_rate"] = Key(
             max_rate, "fastest believable change; a faster one is a counter jump", UNLIMITED
         )

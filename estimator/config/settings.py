@@ -71,6 +71,8 @@ class Channel:
     latency: float = 0.0  # [s] the sample is older than its stamp by this much
     stale_after: float = 0.04  # [s] silence after which the channel is STALE
     bits: int = 32  # width of an encoder's counter on the wire
+    modulus: int | None = None  # [count] at which it wraps, where that is not 2^bits
+    resolution: float | None = None  # one count in the number that is sent, where that is no count
     # fastest believable change [raw/s]; a faster one is a counter jump
     max_rate: float = inf
 

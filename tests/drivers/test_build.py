@@ -148,11 +148,11 @@ def test_a_device_that_restarts_does_not_turn_the_wheel():
         ),
         (
             wiring([can_device()], [channel("wheel_encoder", "bus", "SinkagePot.Volts")]),
-            "not one unscaled integer",
+            "Volts is a float; expected `resolution`",
         ),
         (
             wiring([can_device()], [channel("wheel_encoder", "bus", "WrenchForce")]),
-            "not one unscaled integer",
+            "channel wheel_encoder: 3 signals, expected one",
         ),
         (
             wiring([can_device()], [channel("sinkage_pot", "bus", "WrenchForce")]),
@@ -178,6 +178,43 @@ def test_wiring_that_cannot_work_is_one_clear_line(settings, expected):
     with pytest.raises(DeviceSettingsError) as error:
         build(settings)
     assert expected in str(error.value) and "\n" not in str(error.value)
+
+
+SCALED = {"E.Angle": {"id": 5, "start": 0, "length": 16, "scale": 0.1, "offset": -180.0}}
+FLOATS = {"E.Angle": {"id": 5, "start": 0, "length": 32, "is_float": True}}
+SIGNED = {"E.Angle": {"id": 5, "start": 0, "length": 16, "signed": True}}
+
+
+@pytest.mark.parametrize(
+    ("signals", "settings"),
+    [
+        (SCALED, {"bits": 16, "modulus": 3600}),
+        (SCALED, {"bits": 16}),
+        (SIGNED, {"bits": 16}),
+        (SIGNED, {"modulus": 9000}),
+        (FLOATS, {"modulus": 36000, "resolution": 0.01}),
+        (FLOATS, {"resolution": 0.001}),
+    ],
+)
+def test_an_encoder_sends_degrees_turns_or_scaled_numbers(signals, settings):
+    """Over a turn and a half, both ways, what is sent and read are the same counts."""
+    device = can_device(dbc="", signals=signals)
+    encoder = replace(channel("wheel_encoder", "bus", "E.Angle"), **settings)
+    decoder = build_decoder(wiring([device], [encoder]), device)
+    (sensor,), wire = decoder.sensors, CanWire(device)
+    turned = [*range(0, 1500, 31), *range(1500, -5000, -77)]
+    counts = []
+    for n, total in enumerate(turned):
+        message = wire.encode("E.Angle", sensor.sent(total))
+        counts += [r.value for r in decoder.decode(10**18 + n * 10**7, chunk(message))]
+    assert counts == turned and isinstance(counts[0], int)
+
+
+def test_an_encoder_that_cannot_count_so_far_is_one_line():
+    device = can_device(dbc="", signals=SIGNED)
+    encoder = replace(channel("wheel_encoder", "bus", "E.Angle"), modulus=70_000)
+    with pytest.raises(DeviceSettingsError, match="modulus is 70000, but signal Angle has 16 bits"):
+        build(wiring([device], [encoder]))
 
 
 def test_what_is_no_database_is_one_clear_line(tmp_path):

@@ -74,24 +74,41 @@ def test_a_frame_with_the_wrong_number_of_values_is_quarantined(name):
 
 @FUZZ
 @given(
-    st.sampled_from([8, 16, 24, 32, 64]),
+    st.sampled_from([1 << bits for bits in (8, 16, 24, 32, 64)]) | st.integers(8, 1 << 40),
     st.integers(-(1 << 70), 1 << 70),
     st.lists(st.floats(-1.0, 1.0), max_size=50),
     st.booleans(),
 )
-def test_counts_are_exact_across_every_wrap_in_both_directions(bits, start, moves, signed):
+def test_counts_are_exact_across_every_wrap_in_both_directions(modulus, start, moves, signed):
     """Steps of up to half the range, a counter shown signed or unsigned, starting anywhere."""
-    half = 1 << (bits - 1)
-    sensor = Encoder(channel("wheel_encoder", "dev", bits=bits))
+    half = modulus // 2
+    sensor = Encoder(replace(channel("wheel_encoder", "dev"), modulus=modulus))
 
     def shown(count):
-        return (count + half) % (2 * half) - half if signed else count % (2 * half)
+        return (count + half) % modulus - half if signed else count % modulus
 
     total = start
     first = sensor.value(frame(shown(total)))
     for move in moves:
         total += int(move * (half - 1))
         assert sensor.value(frame(shown(total))) - first == total - start
+
+
+@FUZZ
+@given(st.lists(st.floats(-170.0, 170.0), min_size=1, max_size=50), st.floats(0.0, 360.0))
+def test_degrees_that_wrap_are_unwrapped_to_half_a_count(moves, start):
+    sensor = Encoder(replace(channel("wheel_encoder", "dev"), modulus=36_000, resolution=0.01))
+    angle, first = start, sensor.value(frame(start % 360.0))
+    for move in moves:
+        angle += move
+        read = sensor.value(frame(angle % 360.0))
+        assert abs(0.01 * (read - first) - (angle - start)) <= 0.011
+
+
+@pytest.mark.parametrize("sent", [math.nan, math.inf, -400.0, 360.1])
+def test_an_angle_that_cannot_be_is_quarantined(sent):
+    sensor = Encoder(replace(channel("wheel_encoder", "dev"), modulus=36_000, resolution=0.01))
+    assert sensor.value(frame(sent)) is None and sensor.quarantined == 1
 
 
 @pytest.mark.parametrize("bits", [16, 32])
@@ -105,9 +122,10 @@ def test_constant_speed_through_the_rollover_has_no_step(bits, direction):
 
 
 def test_modular_difference_at_the_edges():
-    assert modular_difference(0, 65535, 16) == 1
-    assert modular_difference(65535, 0, 16) == -1
-    assert modular_difference(0, (1 << 32) - 1, 32) == 1
+    assert modular_difference(0, 65535, 1 << 16) == 1
+    assert modular_difference(65535, 0, 1 << 16) == -1
+    assert modular_difference(0, (1 << 32) - 1, 1 << 32) == 1
+    assert modular_difference(0, 8999, 9000) == 1
 
 
 def test_after_a_reset_the_total_goes_on_without_a_jump():

@@ -18,6 +18,7 @@ from typing import Literal, Protocol
 
 import can
 
+from gritd.drivers.build import build_decoder, used_devices
 from gritd.drivers.framing import FieldValue
 from gritd.drivers.wire import CanWire, SerialWire
 from gritd.estimator.config.settings import Channel, Device, Settings, Wrench
@@ -205,6 +206,11 @@ class Rig:
         used = {source.device for source in sources.values()}
         self._ends = {name: connect(settings.devices[name], bus) for name in sorted(used)}
         self._sources = sources
+        self._sensors = {
+            sensor.channel: sensor
+            for device in used_devices(settings)
+            for sensor in build_decoder(settings, device).sensors
+        }
 
     @property
     def devices(self) -> dict[str, Device]:
@@ -219,10 +225,7 @@ class Rig:
     def send(self, reading: Reading) -> None:
         """Put a reading on its wire now, with its stamp as the device's clock."""
         source = self._sources[reading.channel]
-        value = reading.value
-        if isinstance(source, Channel) and isinstance(value, int):
-            value %= 1 << source.bits  # the counter on the wire wraps
-        values = value if isinstance(value, tuple) else (value,)
+        values = self._sensors[reading.channel].sent(reading.value)
         self._ends[source.device].send(source.signal, values, reading.stamp // US)
 
     def __enter__(self) -> Rig:

@@ -15,7 +15,7 @@ from typing import Any
 import can
 
 from gritd.drivers.errors import DeviceError
-from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, pack
+from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, Accepted, pack
 from gritd.drivers.link import POLL, Chunk, Clock
 from gritd.drivers.port import Port
 from gritd.drivers.slcan import LONGEST_LINE, SlcanLines
@@ -80,14 +80,8 @@ class CanLink:
             if self._device.interface == "socketcan":
                 return Port(bus.fileno()), of_kernel
             if self._device.interface == "slcan":
-                return Port(bus.fileno()), SlcanLines(self._wanted()).decode
+                return Port(bus.fileno()), SlcanLines(Accepted(self._filters)).decode
         return None
-
-    def _wanted(self) -> frozenset[int]:
-        """The wanted identifiers, with their flag."""
-        return frozenset(
-            int(f["can_id"]) | (EXTENDED if f["extended"] else 0) for f in self._filters
-        )
 
     def read(self) -> Chunk | None:
         if self._bus is None:

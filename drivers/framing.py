@@ -49,6 +49,11 @@ class Framing(Protocol):
 
     counts: Counts
 
+    @property
+    def hint(self) -> str:
+        """What is likely wrong with the configuration, by what comes; '' as a rule."""
+        ...
+
     def decode(self, chunk: bytes) -> list[Frame]:
         """The frames completed by this chunk, in the order of the wire. Never raises."""
         ...

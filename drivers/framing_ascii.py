@@ -36,6 +36,8 @@ def encode(frame: Frame) -> bytes:
 class AsciiFraming:
     """Incremental decoder of checksummed lines; keeps at most MAX_LINE bytes between chunks."""
 
+    hint = ""
+
     def __init__(self) -> None:
         self.counts = Counts()
         self._pending = b""

@@ -8,13 +8,17 @@ A wanted key is `Message.Signal` (one value) or `Message` (all its data signals 
 their start bits).
 Three signal names are not data: `Sequence` or `Cycle` is the message counter, `DeviceTime` the
     node's clock [µs].
+
+A message of SAE J1939 is known by its parameter group (PGN) and the address it comes from, whatever
+its priority; where the database states the null address, by the first address that sends it. What
+differs from a wanted message in the address alone is not read, but told: `hint`.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
 import cantools
@@ -29,6 +33,9 @@ REMOTE = 1 << 30
 ERROR = 1 << 29
 HEAD = struct.Struct("<IB3x")
 
+NULL_ADDRESS = 0xFE  # of J1939: nobody's, in a database anybody's
+PEER_TO_PEER = 240  # PDU formats below this have the receiver's address in the next byte
+
 COUNTERS = ("sequence", "cycle")
 DEVICE_TIME = "devicetime"
 
@@ -40,15 +47,56 @@ def pack(can_id: int, data: bytes) -> bytes:
     return HEAD.pack(can_id, len(data)) + data
 
 
+def group_mask(can_id: int) -> int:
+    """The bits of a 29-bit identifier that make its parameter group: page, PDU format and, where
+    the message is for all, the format's extension.
+    """
+    return 0x3FF0000 if (can_id >> 16) & 0xFF < PEER_TO_PEER else 0x3FFFF00
+
+
 @dataclass
 class _Wanted:
-    """A message that some channel listens to."""
+    """A message that some channel listens to.
+
+    sender: the address it comes from, of J1939; None before it came.
+    strangers: identifiers of its group that differ in the address, by address.
+    """
 
     message: Message
     picks: dict[str, tuple[str, ...]]  # key -> names of the signals that make its values
     counter: Signal | None
     device_time: Signal | None
     gap: SequenceGap
+    sender: int | None = None
+    came: bool = False
+    strangers: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def anybodys(self) -> bool:
+        """Whether the database leaves open who sends it."""
+        return self.message.protocol == "j1939" and self.message.frame_id & 0xFF == NULL_ADDRESS
+
+    def sent_by(self, address: int) -> bool:
+        """Whether a message of its group from this address is it."""
+        if self.anybodys:
+            self.sender = address if self.sender is None else self.sender
+            return address == self.sender
+        return self.message.protocol == "j1939" and address == self.message.frame_id & 0xFF
+
+    @property
+    def hint(self) -> str:
+        """What to do where another address sends it; ''."""
+        if not self.strangers or (self.came and not self.anybodys):
+            return ""
+        ids = " and ".join(f"0x{can_id:08X}" for can_id in list(self.strangers.values())[:2])
+        group = (self.message.frame_id & group_mask(self.message.frame_id)) >> 8
+        name = f"{self.message.name} (PGN {group})"
+        if self.anybodys:
+            return (
+                f"{name}: read from address 0x{self.sender or 0:02X} alone, it comes as {ids} too; "
+                "the database leaves open who sends it"
+            )
+        return f"{name}: comes as {ids}, but the database states 0x{self.message.frame_id:08X}"
 
     @property
     def clock_modulus(self) -> int:
@@ -71,19 +119,19 @@ class CanFraming:
         self._database = database
         self._wanted: dict[int, _Wanted] = {}
         self._by_message: dict[str, _Wanted] = {}
+        self._groups: dict[int, list[_Wanted]] = {}  # of 29-bit identifiers
         for key in keys:
             self._want(key)
 
     def filters(self) -> list[dict[str, int | bool]]:
-        """Acceptance filters for exactly the wanted ids, as python-can takes them."""
-        return [
-            {
-                "can_id": w.message.frame_id,
-                "can_mask": (1 << 29) - 1,
-                "extended": bool(w.message.is_extended_frame),
-            }
-            for w in self._wanted.values()
-        ]
+        """Acceptance filters for the wanted ids, as python-can takes them; of 29 bits for their
+        groups.
+        """
+        return [_filter(wanted.message) for wanted in self._wanted.values()]
+
+    @property
+    def hint(self) -> str:
+        return "; ".join(hint for w in self._by_message.values() if (hint := w.hint))
 
     def signals(self, key: str) -> list[Signal]:
         """The data signals behind a wanted key, in the order of its values."""
@@ -100,6 +148,7 @@ class CanFraming:
     def reset(self) -> None:
         for wanted in self._wanted.values():
             wanted.gap.expected = None
+            wanted.sender = None
 
     def decode(self, chunk: bytes) -> list[Frame]:
         frames: list[Frame] = []
@@ -123,8 +172,11 @@ class CanFraming:
             return []
 
         wanted = self._wanted.get(can_id)
+        if wanted is None or wanted.anybodys:
+            wanted = self._of_group(can_id)
         if wanted is None:
             return []
+        wanted.came = True
 
         try:
             values = wanted.message.decode(data, decode_choices=False)
@@ -134,6 +186,21 @@ class CanFraming:
 
         self.counts.good += 1
         return self._frames(wanted, values)  # type: ignore[arg-type]
+
+    def _of_group(self, can_id: int) -> _Wanted | None:
+        """The wanted message that this is by group and address; where only the address differs,
+        it is noted.
+        """
+        if not can_id & EXTENDED or can_id & REMOTE:
+            return None
+        bare = can_id & ~EXTENDED
+        group = self._groups.get(bare & group_mask(bare), ())
+        for wanted in group:
+            if wanted.sent_by(bare & 0xFF):
+                return wanted
+        for wanted in group:
+            wanted.strangers[bare & 0xFF] = bare
+        return None
 
     def _frames(self, wanted: _Wanted, values: dict[str, FieldValue]) -> list[Frame]:
         sequence = device_us = None
@@ -186,9 +253,34 @@ class CanFraming:
         gap = SequenceGap(1 << counter.length if counter else 1)
         wanted = _Wanted(message, {}, counter, device_time, gap)
         self._wanted[message.frame_id | (EXTENDED if message.is_extended_frame else 0)] = wanted
+        if message.is_extended_frame:
+            group = message.frame_id & group_mask(message.frame_id)
+            self._groups.setdefault(group, []).append(wanted)
         self._by_message[name] = wanted
 
         return wanted
 
     def _unknown(self, what: str, known: str) -> NoReturn:
         raise DeviceSettingsError(f"device {self._device}", f"no {what} in its database; {known}")
+
+
+def _filter(message: Message) -> dict[str, int | bool]:
+    extended = bool(message.is_extended_frame)
+    mask = group_mask(message.frame_id) if extended else (1 << 29) - 1
+    return {"can_id": message.frame_id, "can_mask": mask, "extended": extended}
+
+
+class Accepted:
+    """The identifiers, with their flags, that acceptance filters let pass: for a link that has to
+    do it itself.
+    """
+
+    def __init__(self, filters: Iterable[dict[str, int | bool]]) -> None:
+        self._ids: dict[int, set[int]] = {}  # mask with flags -> identifiers under it
+        for one in filters:
+            mask = int(one["can_mask"]) | EXTENDED | REMOTE | ERROR
+            own = int(one["can_id"]) | (EXTENDED if one["extended"] else 0)
+            self._ids.setdefault(mask, set()).add(own & mask)
+
+    def __contains__(self, can_id: object) -> bool:
+        return isinstance(can_id, int) and any(can_id & m in ids for m, ids in self._ids.items())

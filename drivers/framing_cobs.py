@@ -85,6 +85,8 @@ class CobsFraming:
     chunks.
     """
 
+    hint = ""
+
     def __init__(self) -> None:
         self.counts = Counts()
         self._pending = b""

@@ -42,6 +42,7 @@ class ReaderStats:
     turns_unknown: int  # silences of an encoder in which its counter may have wrapped
     readings: int
     reopened: int  # times the device was opened again
+    hint: str  # what is likely wrong with its configuration, by what comes; '' as a rule
 
 
 class Reader:
@@ -116,6 +117,7 @@ class Reader:
             turns_unknown=sum(sensor.turns_unknown for sensor in sensors),
             readings=self._readings,
             reopened=max(self._opened - 1, 0),
+            hint=self.decoder.framing.hint,
         )
 
     def _run(self) -> None:

@@ -16,7 +16,9 @@ NAME = Text("a name", r".*\S.*")
 
 SERIAL = {
     "kind": Key(Choice(("serial",)), "a serial port"),
-    "port": Key(NAME, "path of the port, such as /dev/ttyACM0"),
+    "port": Key(
+        NAME, "path of the port; one in /dev/serial/by-id stays when ports are numbered anew"
+    ),
     "baud": Key(Integer(300, 12_000_000), "bits per second", "115200"),
     "framing": Key(
         Choice(("cobs", "ascii")),

@@ -406,3 +406,25 @@ def test_socketcan_gets_the_filters_and_ignores_configuration_files(monkeypatch)
 def test_a_message_that_contradicts_itself_is_refused():
     with pytest.raises(ValueError, match="length"):
         packed(can.Message(arbitration_id=1, dlc=8, data=b"123"))
+
+
+@pytest.mark.parametrize("end", [b"\r", b"\r\n", b"\n"])
+def test_an_adapter_of_any_line_end_is_read_and_a_strange_sender_told(tmp_path, end):
+    """A drive of J1939 behind a serial adapter: it sends from another address, then as stated."""
+    signals = {"Drive.Count": {"id": 0x18FEF110, "start": 0, "length": 32, "extended": True}}
+    plug = Plug(tmp_path / "adapter")
+    device = can_device("slcan", str(plug.path), dbc="", signals=signals)
+    queue = ReadingQueue()
+    (reader,) = build_readers(
+        wiring([device], [channel("wheel_encoder", "bus", "Drive.Count")]), Ticking(), queue
+    )
+    reader.start()
+    assert wait_until(lambda: reader.stats().state == "OPEN")
+    plug.deliver(b"T18FEF12A8" + b"01" * 8 + end + b"nonsense" + end)
+    assert wait_until(lambda: "0x18FEF12A" in reader.stats().hint)
+    plug.deliver(b"".join(b"T18FEF1108%08X00000000" % n + end for n in range(50)))
+    assert wait_until(lambda: reader.stats().frames == 50)
+    assert reader.stats().hint == "" and reader.stats().bad == 1
+    assert reader.stop(10.0)
+    assert len(queue.drain()) == 50
+    plug.close()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gritd.config import packaged
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser
+from gritd.tools.cli.yaml_edit import plain_text
 
+BY_ID = Path("/dev/serial/by-id")  # names of serial devices that stay when ports are renumbered
+PORT = re.compile(rb"port: /dev/ttyACM0\b.*\n")
 README = """\
 testbed.yaml describes the testbed: change it to yours, then `gritd check-config testbed.yaml`.
 testbed.dbc describes its CAN messages. `gritd calibrate --help` lists what can be calibrated.
@@ -24,13 +28,22 @@ def main(argv: Sequence[str]) -> int:
     folder = parser.parse_args(argv).folder
 
     files = {name: packaged(name).read_bytes() for name in ("testbed.yaml", "testbed.dbc")}
+    ports = sorted(BY_ID.iterdir()) if BY_ID.is_dir() else []
+    if len(ports) == 1:
+        files["testbed.yaml"] = PORT.sub(_port(ports[0]), files["testbed.yaml"])
     files["README.md"] = README.encode()
     write(folder, files)
 
     print("\n".join(str(folder / name) for name in files))
+    for port in ports:
+        print(f"serial port: {port}" + (", in testbed.yaml now" if len(ports) == 1 else ""))
     print(f"next: change {folder / 'testbed.yaml'}, then")
     print(f"gritd check-config {folder / 'testbed.yaml'}")
     return DONE
+
+
+def _port(path: Path) -> Callable[[re.Match[bytes]], bytes]:
+    return lambda _: f"port: {plain_text(str(path))}\n".encode()
 
 
 def write(folder: Path, files: dict[str, bytes]) -> None:

@@ -161,6 +161,8 @@ def _trouble(report: Report) -> Iterator[str]:
     for name, stats in report["devices"].items():
         if stats["state"] != "OPEN":
             yield f"{TROUBLE} {name} {stats['state']} {stats['last_error']}".rstrip()
+        if hint := stats.get("hint"):
+            yield f"{TROUBLE} {name}: {hint}"
 
     if report["log"]["state"] != "writing":
         yield f"{TROUBLE} log {report['log']['state']} {report['log']['error']}".rstrip()

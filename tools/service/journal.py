@@ -56,6 +56,7 @@ class Journal:
         self._counts: dict[tuple[str, str], Recurring] = {}
 
         self._states = {reader.device: "" for reader in readers}
+        self._hints = {reader.device: "" for reader in readers}
         self._steps = {reader.device: 0 for reader in readers}
         self._writing, self._files, self._hanging, self._unconfirmed = "writing", 1, "", False
 
@@ -93,6 +94,10 @@ class Journal:
         if stats.clock_steps > self._steps[stats.device]:
             self._steps[stats.device] = stats.clock_steps
             yield Notice(f"{device}: its clock stepped by {stats.clock_step:+.3f} s")
+
+        if stats.hint != self._hints[stats.device]:
+            self._hints[stats.device] = stats.hint
+            yield Notice(f"{device}: {stats.hint or 'as configured again'}", over=not stats.hint)
 
         beginning = stats.state == "WAITING" and not stats.last_error  # for its first attempt
         if stats.state != self._states[stats.device] and not beginning:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gritd.estimator.config.configuration import load
 from gritd.tools.cli.command import USAGE, CommandError
-from gritd.tools.commands import check_config
+from gritd.tools.commands import check_config, init
 from gritd.tools.commands.init import main
 
 
@@ -21,6 +22,25 @@ def test_the_folder_can_be_worked_in_as_it_is(
 
     assert check_config.main([str(folder / "testbed.yaml")]) == 0
     assert "valid" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_serial_ports_are_offered_by_the_name_that_stays(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    count: int,
+) -> None:
+    ports = [tmp_path / "by-id" / f"usb-Arduino_{n}-if00" for n in range(count)]
+    for port in ports:
+        port.parent.mkdir(exist_ok=True)
+        port.touch()
+    monkeypatch.setattr(init, "BY_ID", tmp_path / "by-id")
+    assert main([str(tmp_path / "rig")]) == 0
+    said = capsys.readouterr().out
+    assert all(str(port) in said for port in ports)
+    device = load(tmp_path / "rig" / "testbed.yaml").settings.devices["encoders"]
+    assert device.port == (str(ports[0]) if count == 1 else "/dev/ttyACM0")
 
 
 def test_no_file_is_replaced_and_none_is_left_half_way(tmp_path: Path) -> None:

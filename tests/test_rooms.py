@@ -24,6 +24,7 @@ ROOMS = (
     ("estimator.filter",),
     ("estimator.online",),
     ("estimator.offline", "estimator.daemon"),
+    ("estimator.plausibility",),
     ("drivers",),
     ("tools.cli",),
     ("tools.messages",),

@@ -49,22 +49,33 @@ def window_of(settings: Settings, now: Snapshot, samples: Mapping[str, Sequence[
 
     now: a window in which wheel and carriage drive; samples: what each encoder read in it.
     """
+    cadences = {name: _cadence(samples[name], settings.channels[name].noise) for name in ENCODERS}
+    return chosen(settings, (now.wheel_speed.value, now.carriage_speed.value), cadences)
+
+
+def chosen(settings: Settings, speeds: tuple[float, float], cadences: Mapping[str, Cadence]) -> int:
+    """The length [ns] at speeds of wheel [rad/s] and carriage [m/s]."""
     tick = round(NS / settings.rates.tick)
     lengths = [max(2, round(length * NS / tick)) * tick for length in LENGTHS]
-    cadences = {name: _cadence(samples[name], settings.channels[name].noise) for name in ENCODERS}
 
     for length in lengths[:-1]:
-        if slip_sigma(settings, now, cadences, length / NS) <= WANTED:
+        if slip_sigma(settings, speeds, cadences, length / NS) <= WANTED:
             return length
     return lengths[-1]
 
 
 def slip_sigma(
-    settings: Settings, now: Snapshot, cadences: Mapping[str, Cadence], seconds: float
+    settings: Settings,
+    speeds: tuple[float, float],
+    cadences: Mapping[str, Cadence],
+    seconds: float,
 ) -> float:
-    """σ of slip in a window of so many seconds; infinite where too few readings come."""
+    """σ of slip in a window of so many seconds at speeds of wheel [rad/s] and carriage [m/s];
+    infinite where too few readings come.
+    """
     relative = []
-    speeds = (now.wheel_speed.value, now.carriage_speed.value / settings.pulley_radius)
+    wheel_speed, carriage_speed = speeds
+    speeds = (wheel_speed, carriage_speed / settings.pulley_radius)
     for name, speed in zip(ENCODERS, speeds, strict=True):
         interval, scatter = cadences[name]
         count = seconds / interval

@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from gritd.estimator.config import configuration as config
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.plausibility.words import told
 from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import USAGE
 from gritd.tools.cli.progress import Progress
@@ -23,12 +23,12 @@ from gritd.tools.importers.series.convert import AXES, converted
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
 from gritd.tools.importers.series.mapping import SeriesMap, load
+from gritd.tools.importers.series.plausible import driven_of, sources_of
 from gritd.tools.importers.series.runs import SeriesRun, check
 from gritd.tools.importers.series.sources import RunFiles, read, runs_files, series_files
 
 NAME = "csv"
 SUMMARY = "time series of any rig, tables, bags and logs, by a map of columns to channels"
-GAP = 3.0  # usual intervals without a row are a gap
 
 ENOUGH = 20_000  # rows of each table of a bag that a proposal is made from
 
@@ -108,11 +108,11 @@ def _import(
             path = output / f"{run.info.name}.mcap"
             paths.append(write(path, streams, configured, run.info, progress))
 
-    tell(_heading(runs))
-    for run in runs:
-        tell(_row(run))
-    for note in _notes(mapped, runs, settings.load.nominal.value):
-        tell(note)
+    behind = runs[0].resampled
+    tell("every row is a reading" if behind == 1.0 else f"means over {behind:.1f} rows")
+    driven = driven_of(runs, imported.streams, configured.settings)
+    for line in (*told(driven, sources_of(mapped)), *_notes(mapped, runs, settings)):
+        tell(line)
     return paths
 
 
@@ -131,24 +131,7 @@ def _configuration(text: str, given: Path | None, path: Path) -> config.Configur
 # --- what is told ---
 
 
-def _heading(runs: Sequence[SeriesRun]) -> str:
-    behind = runs[0].resampled
-    how = "every row is a reading" if behind == 1.0 else f"means over {behind:.1f} rows"
-    return f"{how}\n{'run':<20} {'rows':>8} {'seconds':>8} {'Hz':>6} {'gaps':>5} {'load [N]':>8}"
-
-
-def _row(run: SeriesRun) -> str:
-    """A run in one line."""
-    steps = np.diff(run.seconds)
-    gaps = int(np.sum(steps > GAP * run.interval))
-    load = "" if run.info.nominal_load is None else f"{run.info.nominal_load:.1f}"
-    return (
-        f"{run.info.name:<20} {run.seconds.size:>8} {run.seconds[-1]:>8.1f} "
-        f"{1.0 / run.interval:>6.1f} {gaps:>5} {load:>8}"
-    )
-
-
-def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[str]:
+def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings) -> list[str]:
     """What the user should know of what was not given."""
     left_out = (line for run in runs for line in (*run.table.notes, *run.notes))
     notes = [f"note: {line}" for line in dict.fromkeys(left_out)]
@@ -161,7 +144,8 @@ def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], usual: float) -> list[s
     unstated = [run.info.name for run in runs if run.info.nominal_load is None]
     if unstated and mapped.named("load") is None:
         notes.append(
-            f"note: {unstated[0]} states no load; taken is {usual:g} N, load.nominal of csv.yaml"
+            f"note: {unstated[0]} states no load; taken is {settings.load.nominal.value:g} N, "
+            "load.nominal of csv.yaml"
         )
 
     if not any(mapped.named(axis) for axis in AXES):

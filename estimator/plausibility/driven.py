@@ -1,0 +1,230 @@
+"""What a run did, window by window, from its readings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import inf, isfinite, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gritd.estimator.config.settings import UNMEASURED, Calibration, Channel, Settings
+from gritd.estimator.messages.readings import ENCODERS, NS, WRENCH_FIELDS
+from gritd.estimator.offline.windows import Bools, Ints, lines, members
+from gritd.estimator.plausibility.clock import Clock, clock_of, wrap_of
+from gritd.estimator.terramechanics.soil import Array
+from gritd.estimator.wheel import window_choice
+from gritd.estimator.wheel.window_choice import Cadence
+
+MOVES = 4.0  # [σ] of its noise, a speed that is one …
+SLOW = 0.1  # … and of the run's fastest: what is slower is a start or an end
+LEAST = 5  # readings in a window
+FIRST = 0.4  # [s] windows in which speeds are looked at where their length is still to be chosen
+
+
+class Raw(NamedTuple):
+    """Readings of one channel: stamps (n,) [ns]; values (n,), of the wrench (n, 6), raw."""
+
+    stamps: Ints
+    values: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Windows of a run, arrays (n,) in SI, NaN where nothing is known."""
+
+    rim: Array  # rω [m/s]
+    travel: Array  # v [m/s]
+    sinkage: Array
+    load: Array  # measured
+    torque: Array  # at the axle
+    pull: Array
+    driving: Bools  # whether the wheel turns, at more than a start's speed
+
+    @property
+    def forward(self) -> float:
+        """1 where the wheel drives forward most of the time, else -1."""
+        return -1.0 if np.count_nonzero(self.rim[self.driving] < 0.0) * 2 > self.count else 1.0
+
+    @property
+    def count(self) -> int:
+        return int(np.count_nonzero(self.driving))
+
+    @property
+    def slip(self) -> Array:
+        """i of the driving windows (m,), along the direction of most of the run."""
+        rim, travel = (self.forward * x[self.driving] for x in (self.rim, self.travel))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slip = np.where(rim >= travel, 1.0 - travel / rim, rim / travel - 1.0)
+        return np.clip(slip, -1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A run: its course, its clock and what is stated of it."""
+
+    name: str
+    course: Course
+    clock: Clock
+    window: float  # [s] of the filter
+    slip_sigma: float  # of slip in one window, by the noise of the encoders; inf for unknown
+    stated_load: float | None  # [N]
+    wrap: float = 0.0  # [rad] by which the wheel's angle falls back; 0 where it does not
+
+
+def driven(
+    name: str, raw: Mapping[str, Raw], settings: Settings, stated_load: float | None
+) -> Driven:
+    """A run from the raw readings of its channels, each in the order of its stamps; some may be
+    missing.
+    """
+    wheel = raw.get("wheel_encoder")
+    if wheel is None or wheel.stamps.size < LEAST:
+        nothing = Course(*(np.zeros(0),) * 6, np.zeros(0, bool))
+        return Driven(name, nothing, Clock(0.0, 0.0, 0), 0.0, inf, stated_load)
+
+    scale = settings.channels["wheel_encoder"].calibration.scale.value
+    angle = wheel.values * scale
+    clock = clock_of(wheel.stamps, angle)
+
+    window = _length(raw, settings, clock.interval)
+    course = course_of(raw, settings, window)
+    cadences = _cadences(raw, settings)
+    sigma = _slip_sigma(settings, course, cadences, window)
+    return Driven(name, course, clock, window, sigma, stated_load, wrap_of(angle))
+
+
+def _length(raw: Mapping[str, Raw], settings: Settings, interval: float) -> float:
+    """Of the filter's windows [s], or what five readings take, where these are longer."""
+    rates = settings.rates
+    least = LEAST * interval * 1.01
+    if not rates.auto:
+        return max(1.0 / rates.update, least)
+
+    course = course_of(raw, settings, max(FIRST, least))
+    speeds = _speeds(settings, course)
+    cadences = _cadences(raw, settings)
+    if not all(isfinite(v) and v != 0.0 for v in speeds) or len(cadences) < len(ENCODERS):
+        return max(FIRST, least)
+    return max(window_choice.chosen(settings, speeds, cadences) / NS, least)
+
+
+def _speeds(settings: Settings, course: Course) -> tuple[float, float]:
+    """Usual speeds of wheel [rad/s] and carriage [m/s] while driving; NaN where there are none."""
+    rim, travel = course.rim[course.driving], course.travel[course.driving]
+    known = np.isfinite(travel)
+    if not known.any():
+        return nan, nan
+    return abs(float(np.median(rim))) / settings.wheel.radius, abs(float(np.median(travel[known])))
+
+
+def _cadences(raw: Mapping[str, Raw], settings: Settings) -> dict[str, Cadence]:
+    return {
+        name: Cadence(
+            float(np.median(np.diff(raw[name].stamps))) / NS, settings.channels[name].noise
+        )
+        for name in ENCODERS
+        if name in raw and raw[name].stamps.size > 1
+    }
+
+
+def _slip_sigma(
+    settings: Settings, course: Course, cadences: Mapping[str, Cadence], window: float
+) -> float:
+    speeds = _speeds(settings, course)
+    if len(cadences) < len(ENCODERS) or not all(isfinite(v) and v > 0.0 for v in speeds):
+        return inf
+    return abs(window_choice.slip_sigma(settings, speeds, cadences, window))
+
+
+# --- windows ---
+
+
+def course_of(raw: Mapping[str, Raw], settings: Settings, window: float) -> Course:
+    """The windows of so many seconds in which the wheel was read."""
+    after, until = _edges(raw["wheel_encoder"].stamps, round(window * NS))
+    none = np.full(after.size, nan)
+    rim, noise = _speed(raw, settings, "wheel_encoder", settings.wheel.radius, after, until)
+    travel, _ = _speed(raw, settings, "carriage_encoder", settings.pulley_radius, after, until)
+
+    def mean(name: str, values: Array | None = None) -> Array:
+        if name not in raw:
+            return none
+        inside = members(raw[name].stamps, after, until)
+        means = inside.mean(raw[name].values if values is None else values)
+        return np.where(inside.size > 0, means, nan)
+
+    channels, constant = settings.channels, settings.drive.torque_constant.value
+    sinkage = _physical(mean("sinkage_pot"), channels.get("sinkage_pot"))
+    current = _physical(mean("motor_shunt"), channels.get("motor_shunt"))
+    axes = {axis: none for axis in ("fx", "fz", "ty")}
+    if settings.wrench is not None and "wrench" in raw:
+        given = (settings.wrench.drawbar_pull, settings.wrench.load, settings.wrench.torque)
+        axes = {
+            axis: _axis(raw["wrench"], axis, mean, calibration)
+            for axis, calibration in zip(axes, given, strict=True)
+        }
+
+    torque = {"wrench": axes["ty"], "motor_shunt": current * constant}
+    made = Course(
+        rim,
+        travel,
+        sinkage,
+        axes["fz"],
+        torque.get(settings.drive.torque_source, none),
+        axes["fx"],
+        np.zeros(after.size, bool),
+    )
+    return with_driving(made, noise)
+
+
+def with_driving(course: Course, noise: Array) -> Course:
+    """With the windows marked in which the wheel drives; noise: of the rim's speed (n,) [m/s]."""
+    speed = np.abs(np.nan_to_num(course.rim))
+    fastest = float(np.percentile(speed, 95.0)) if speed.size else 0.0
+    return replace(course, driving=(speed > MOVES * noise) & (speed > SLOW * fastest))
+
+
+def _edges(stamps: Ints, length: int) -> tuple[Ints, Ints]:
+    """Beginning and end (n,) [ns] of the windows side by side that hold readings."""
+    number = np.unique((stamps - stamps[0]) // length)
+    after: Ints = stamps[0] + number * length - 1
+    return after, after + length
+
+
+def _speed(
+    raw: Mapping[str, Raw], settings: Settings, name: str, arm: float, after: Ints, until: Ints
+) -> tuple[Array, Array]:
+    """Speed (n,) [m/s] of an encoder and its standard deviation (n,); NaN where a window holds too
+    little.
+    """
+    none = np.full(after.size, nan)
+    if name not in raw or name not in settings.channels:
+        return none, none
+    stamps, counts = raw[name]
+    inside = members(stamps, after, until)
+    line = lines(inside, stamps, counts)
+    span = stamps[inside.last] - stamps[inside.first]
+    known = (inside.size >= 3) & (span >= (until - after) // 2)
+
+    channel = settings.channels[name]
+    scale = channel.calibration.scale.value * arm
+    with np.errstate(divide="ignore", invalid="ignore"):
+        noise = channel.noise * abs(scale) / line.spread
+    return np.where(known, line.rate * scale, nan), np.where(known, noise, nan)
+
+
+def _physical(means: Array, channel: Channel | None) -> Array:
+    if channel is None:
+        return np.full(means.size, nan)
+    return means * channel.calibration.scale.value + channel.calibration.offset.value
+
+
+def _axis(wrench: Raw, axis: str, mean: Any, calibration: Calibration) -> Array:
+    """One axis of the wrench; NaN where it is not measured."""
+    means: Array = mean("wrench", wrench.values[:, WRENCH_FIELDS.index(axis)])
+    if calibration.offset.sigma >= UNMEASURED:
+        return np.full(means.size, nan)
+    return means * calibration.scale.value + calibration.offset.value

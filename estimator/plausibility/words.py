@@ -1,0 +1,104 @@
+"""A table of runs, and a line for each thing in them that cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.plausibility.checks import Contradiction, contradictions
+from gritd.estimator.plausibility.driven import Driven
+from gritd.estimator.plausibility.mistakes import OF_A_RECORDING, Sources
+from gritd.estimator.terramechanics.soil import Array
+
+HEADING = (
+    "run",
+    "Hz",
+    "s",
+    "gaps",
+    "slip",
+    "± in a window",
+    "z/r",
+    "W [N]",
+    "stated",
+    "T/(rW)",
+    "DP/W",
+)
+DASH = "–"
+
+
+def told(given: Sequence[tuple[Driven, Settings]], sources: Sources) -> Iterator[str]:
+    """The table, then what cannot be."""
+    yield from table(given)
+    yield from warnings(given, sources)
+
+
+def warnings(
+    given: Sequence[tuple[Driven, Settings]], sources: Sources = OF_A_RECORDING
+) -> Iterator[str]:
+    """A line for each thing that physics or the configuration forbids, with the likely remedy; of
+    several runs that differ in figures alone, the first is quoted.
+    """
+    found: dict[str, list[tuple[str, Contradiction]]] = {}
+    for run, settings in given:
+        for one in contradictions(run, settings, sources):
+            found.setdefault(one.kind, []).append((run.name, one))
+
+    for those in found.values():
+        name, first = those[0]
+        if not first.alone and len(those) < len(given):
+            continue
+        yield f"cannot be: {_named(name, len(those), len(given))}{first.text}"
+
+
+def _named(name: str, count: int, of: int) -> str:
+    """The run that is quoted, and how many are like it."""
+    if of == 1:
+        return f"{name}: " if name else ""
+    more = f" and {count - 1} more of {of} runs" if count > 1 else f" of {of} runs"
+    return f"{name}{more}: "
+
+
+# --- the table ---
+
+
+def table(given: Sequence[tuple[Driven, Settings]]) -> Iterator[str]:
+    """A row a run: usual ranges, 5 to 95 % of the windows in which the wheel drives."""
+    rows = [HEADING, *(_row(run, settings) for run, settings in given)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+
+    for row in rows:
+        cells = zip(row[1:], widths[1:], strict=True)
+        yield "  ".join([f"{row[0]:<{widths[0]}}", *(f"{cell:>{width}}" for cell, width in cells)])
+
+
+def _row(run: Driven, settings: Settings) -> tuple[str, ...]:
+    clock, course = run.clock, run.course
+    driving, radius = course.driving, settings.wheel.radius
+    load = course.load[driving] if np.isfinite(course.load).any() else settings.load.nominal.value
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        torque, pull = course.torque[driving] / (radius * load), course.pull[driving] / load
+    return (
+        run.name,
+        f"{1.0 / clock.interval:.4g}" if clock.interval else DASH,
+        f"{clock.duration:.1f}",
+        str(clock.gaps),
+        _range(course.slip),
+        f"{run.slip_sigma:.3f} {run.window:.3g} s" if isfinite(run.slip_sigma) else DASH,
+        _range(course.sinkage[driving] / radius),
+        _range(course.load[driving], 1),
+        DASH if run.stated_load is None else f"{run.stated_load:g}",
+        _range(torque),
+        _range(pull),
+    )
+
+
+def _range(values: Array, digits: int = 2) -> str:
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return DASH
+    low, high = (f"{round(x, digits) + 0.0:.{digits}f}" for x in np.percentile(known, (5.0, 95.0)))
+    return low if low == high else f"{low} … {high}"

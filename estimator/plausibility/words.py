@@ -66,6 +66,7 @@ def _named(name: str, count: int, of: int) -> str:
 
 def table(given: Sequence[tuple[Driven, Settings]]) -> Iterator[str]:
     """A row a run: usual ranges, 5 to 95 % of the windows in which the wheel drives."""
+    yield "while the wheel drives, 5 to 95 % of the windows:"
     rows = [HEADING, *(_row(run, settings) for run, settings in given)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
 

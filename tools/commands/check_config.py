@@ -24,8 +24,13 @@ from gritd.estimator.config.settings import (
     Wrench,
 )
 from gritd.estimator.messages.readings import ENCODERS
+from gritd.estimator.offline.streams import RAW
+from gritd.estimator.plausibility.recorded import driven_recording
+from gritd.estimator.plausibility.words import table, warnings
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.wheel import geometry
-from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser
+from gritd.tools.cli import files
+from gritd.tools.cli.command import DAMAGED, DONE, FAILED, USAGE, CommandError, Parser
 from gritd.tools.cli.files import open_to_all
 from gritd.tools.commands.rig_reach import reach
 
@@ -49,6 +54,14 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument(
         "--effective", action="store_true", help="print the YAML with every default filled in"
     )
+    parser.add_argument(
+        "--against",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a recording to hold it against, as often as wanted: exit 1 where it cannot be",
+    )
     arguments = parser.parse_args(argv)
 
     read = config.load(arguments.file)
@@ -67,7 +80,21 @@ def main(argv: Sequence[str]) -> int:
 
     ending = "" if read.ended else "; without a last line '...' it cannot be reloaded"
     sys.stdout.write(f"{arguments.file}: valid{ending}\n\n{summary(read.settings)}")
-    return DONE
+    return against(read.settings, arguments.against) if arguments.against else DONE
+
+
+def against(settings: Settings, paths: Sequence[Path]) -> int:
+    """Print what was driven in recordings by these settings, and what of it cannot be: then the
+    code is 1. Raises CommandError.
+    """
+    try:
+        runs = [driven_recording(files.recording(path, RAW), settings) for path in paths]
+    except RecordingError as error:
+        raise CommandError(error, DAMAGED) from None
+
+    contradictions = list(warnings(runs))
+    sys.stdout.write("\n" + "\n".join([*table(runs), *contradictions]) + "\n")
+    return FAILED if contradictions else DONE
 
 
 def check_devices(settings: Settings) -> None:

@@ -13,6 +13,10 @@ import numpy as np
 from gritd.estimator.config.configuration import ConfigError, loads
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.estimator.plausibility.mistakes import OF_A_RECORDING
+from gritd.estimator.plausibility.recorded import driven_recording
+from gritd.estimator.plausibility.words import told as told_of_runs
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.parts import parts
 from gritd.estimator.recording.salvage import Recording
 from gritd.tools.cli import files
@@ -65,6 +69,7 @@ def told(recordings: Sequence[Recording]) -> Iterator[str]:
     yield ""
     yield from _topics(of_run)
     yield ""
+    yield from _driven(first)
     yield from _condition(recordings)
     yield from _filter(first)
 
@@ -120,6 +125,19 @@ def _testbed(settings: Settings) -> Iterator[str]:
         f"k {soil.shear_modulus.value * 1e3:g} ± {soil.shear_modulus.sigma * 1e3:g} mm"
     )
     yield f"{INDENT}{reach(settings)}"
+
+
+def _driven(first: Recording) -> Iterator[str]:
+    """What was driven in the first part, and what of it cannot be."""
+    if first.config_yaml is None or not first.counts["/raw/wheel_encoder"]:
+        return
+    try:
+        settings = loads(first.config_yaml, str(first.path)).settings
+        given = [driven_recording(first, settings)]
+    except (ConfigError, RecordingError):  # told elsewhere
+        return
+    yield from told_of_runs(given, OF_A_RECORDING)
+    yield ""
 
 
 def _topics(of_run: RunSummary) -> Iterator[str]:

@@ -14,11 +14,13 @@ from typing import TextIO
 
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader, ReaderStats
+from gritd.estimator.config.settings import settings_of_run
 from gritd.estimator.daemon.daemon import INFO, WARNING, Daemon
 from gritd.estimator.daemon.notice import Notice
 from gritd.estimator.daemon.publish import Publisher
 from gritd.estimator.messages.tick import TICK_NAMES
 from gritd.estimator.recording.writer import WriterStatus
+from gritd.tools.service.first_look import FirstLook
 from gritd.tools.service.incidents import Limited, Recurring
 from gritd.tools.service.telemetry import channels_of
 
@@ -54,6 +56,7 @@ class Journal:
         self._readers, self._queue, self._publisher = readers, queue, publisher
         self._limits: defaultdict[str, Limited] = defaultdict(Limited)
         self._counts: dict[tuple[str, str], Recurring] = {}
+        self._first = FirstLook()
 
         self._states = {reader.device: "" for reader in readers}
         self._hints = {reader.device: "" for reader in readers}
@@ -73,6 +76,8 @@ class Journal:
             tick, loop = daemon.loop.latest
             self._tell(daemon, "channels", now, daemon.feed.look(tick, channels_of(daemon)))
             self._tell(daemon, "model", now, daemon.model.look(tick))
+            settings = settings_of_run(daemon.configuration.settings, daemon.run)
+            self._tell(daemon, "run", now, self._first.look(tick, settings))
             self._tell(daemon, "readings", now, self._ticked(tick, loop.missed, now))
         self._tell(daemon, "threads", now, self._threads(daemon))
 

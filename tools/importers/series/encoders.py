@@ -75,8 +75,10 @@ def counted(
     seconds: NDArray[np.float64], numbers: NDArray[np.float64], column: Mapped, quantum: float
 ) -> NDArray[np.int64]:
     """Counts (n,) of numbers (n,) without gaps. A speed is summed up, over a gap with the mean of
-    its ends.
+    its ends; what wraps is laid end to end.
     """
+    if column.wraps is not None:
+        numbers = np.unwrap(numbers, period=column.wraps / column.per_unit)
     if column.channel in SPEEDS:
         return counts(seconds, numbers, quantum)
     return np.round(numbers / quantum).astype(np.int64)

@@ -47,6 +47,7 @@ MEASURED = {
     "lateral_force": ("N", "lateral force"),
     "motor_temperature": ("degC", "temperature of the winding"),
 }
+WRAPPING = ("wheel_angle", "wheel_count", "carriage_position", "carriage_count")
 AS_CONFIGURED = ("wheel_count", "carriage_count", "sinkage_volts", "shunt_volts")
 OF_THE_RUN = {
     "nominal_load": ("N", "weights of the run"),
@@ -76,6 +77,7 @@ class Mapped:
     order: of a date, one of ORDERS; '' where the file tells.
     epoch: day [ns since 1970] from which a number of time counts.
     rate: [Hz] of the column's rows, where it has no time; None where the map does not say.
+    wraps: after which the column begins anew, SI; None where it does not.
     """
 
     channel: str
@@ -86,6 +88,7 @@ class Mapped:
     order: str = ""
     epoch: int = 0
     rate: float | None = None
+    wraps: float | None = None
 
     @property
     def per_unit(self) -> float:
@@ -254,6 +257,9 @@ def _channels() -> dict[str, Section]:
         name: _plain(name, si) if name in AS_CONFIGURED else _measured(name, si)
         for name, (si, _) in MEASURED.items()
     }
+    for name in WRAPPING:
+        wraps = Key(Quantity(MEASURED[name][0], above=0), "after which it begins anew", ABSENT)
+        measured[name] = Section(dict(measured[name].keys) | {"wraps": wraps}, _mapped)
     run = Section(_choice("run"), Mapped)
     order = Key(Choice(ORDERS), "of a date in numbers", ABSENT)
     time = {"order": order, "epoch": Key(Text("a date"), "day that numbers count from", ABSENT)}

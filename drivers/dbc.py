@@ -272,7 +272,7 @@ def _lines(path: str) -> Iterator[str]:
             yield file.readline().removeprefix(BYTE_ORDER_MARK)
             yield from file
     except OSError as error:
-        raise DbcError(f"cannot be read: {(error.strerror or '').lower()}") from None
+        raise DbcError(f"cannot read: {(error.strerror or '').lower()}") from None
 
 
 def _signal(line: str) -> DbcSignal:

@@ -54,9 +54,8 @@ class Decoder:
             elapsed = self._elapsed(frame.key, stamp)
             for sensor in self._listeners[frame.key]:
                 sensor.elapsed(elapsed)
-                value = sensor.value(frame)
-                if value is not None:
-                    readings.append(Reading(stamp, sensor.channel, value, received))
+                if taken := sensor.taken(frame, stamp):
+                    readings.append(Reading(taken[0], sensor.channel, taken[1], received))
 
         return readings
 

@@ -5,7 +5,7 @@ A chunk holds whole messages, each packed as `u32 id and flags | u8 length | 3 b
 kind of log.
 
 A wanted key is `Message.Signal` (one value) or `Message` (all its data signals in the order of
-their start bits).
+their start bits; none where it only says when a cycle was measured).
 Three signal names are not data: `Sequence` or `Cycle` is the message counter, `DeviceTime` the
     node's clock [µs].
 
@@ -228,7 +228,8 @@ class CanFraming:
         )
 
         names = (signal,) if signal else data
-        if not names or not set(names) <= set(data):
+        dated = not signal and wanted.counter is not None and wanted.device_time is not None
+        if not (names or dated) or not set(names) <= set(data):
             self._unknown(f"signal {key}", f"{name} has {', '.join(data) or 'no data signals'}")
         wanted.picks[key] = names
 

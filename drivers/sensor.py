@@ -50,6 +50,11 @@ class Sensor(ABC):
     def value(self, frame: Frame) -> Value | None:
         """The value of a frame whose key is in `keys`; None if refused, or not yet complete."""
 
+    def taken(self, frame: Frame, stamp: int) -> tuple[int, Value] | None:
+        """A frame's value and when it was taken [ns]; None as `value`. stamp: of the frame [ns]."""
+        value = self.value(frame)
+        return None if value is None else (stamp, value)
+
     def elapsed(self, seconds: float) -> None:  # noqa: B027 - most sensors have no counter
         """The next frame was taken so long after the one before it [s]."""
 

@@ -52,7 +52,7 @@ class CanWire:
         """
         name, _, signal = key.partition(".")
         message = self._messages.get(name) or self._read(name)
-        data = [s.name for s in message.signals if s.name.lower() not in (*COUNTERS, DEVICE_TIME)]
+        data = _data(message)
         given = dict(zip([signal] if signal else data, values, strict=True))
         fields = {s.name: given.get(s.name, 0) for s in message.signals} | self._counters(
             message, device_us or 0
@@ -64,6 +64,11 @@ class CanWire:
             is_fd=message.length > 8,
             data=message.encode(fields, strict=False),
         )
+
+    def width(self, key: str) -> int:
+        """How many values the message of a key holds."""
+        name, _, signal = key.partition(".")
+        return 1 if signal else len(_data(self._messages.get(name) or self._read(name)))
 
     def _read(self, name: str) -> Message:
         message = database(self._device, [name]).get_message_by_name(name)
@@ -81,6 +86,11 @@ class CanWire:
             elif signal.name.lower() == DEVICE_TIME:
                 counters[signal.name] = _wrapped_time(signal, device_us)
         return counters
+
+
+def _data(message: Message) -> list[str]:
+    """Names of the signals that are neither counter nor time."""
+    return [s.name for s in message.signals if s.name.lower() not in (*COUNTERS, DEVICE_TIME)]
 
 
 def _wrapped_time(signal: Signal, device_us: int) -> FieldValue:

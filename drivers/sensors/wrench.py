@@ -8,7 +8,7 @@ from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing import Frame
 from gritd.drivers.sensor import Sensor, SignalShape, within
 from gritd.estimator.config.settings import Wrench as WrenchSettings
-from gritd.estimator.messages.readings import WRENCH_FIELDS
+from gritd.estimator.messages.readings import WRENCH_FIELDS, Value
 
 FORCES = 3  # fx fy fz come before tx ty tz
 
@@ -17,8 +17,9 @@ class Wrench(Sensor):
     """fx fy fz [N], tx ty tz [N·m], from one frame or from several of the same cycle.
 
     `signal` names the frames, joined by `+`, in the order in which their values make up the six.
-    Frames belong together if they carry the same sequence number; a cycle with a missing frame is
-    dropped and counted.
+    Frames belong together if they carry the same sequence number, whatever their order; a cycle
+    with a missing frame is dropped and counted. It was taken when the frame with the device's time
+    says, if one of them has it, else when the last of them came.
     """
 
     channel = "wrench"
@@ -29,6 +30,15 @@ class Wrench(Sensor):
         self._limits = (settings.max_force,) * FORCES + (settings.max_torque,) * FORCES
         self._parts: dict[str, Frame] = {}
         self._cycle: int | None = None
+        self._stamp: int | None = None  # of this cycle, by the device's time [ns]
+
+    def taken(self, frame: Frame, stamp: int) -> tuple[int, Value] | None:
+        if frame.sequence != self._cycle:
+            self._stamp = None
+        if frame.device_us is not None:
+            self._stamp = stamp
+        value = self.value(frame)
+        return None if value is None else (self._stamp if self._stamp is not None else stamp, value)
 
     def value(self, frame: Frame) -> tuple[float, ...] | None:
         if frame.sequence != self._cycle or frame.key in self._parts:
@@ -53,7 +63,7 @@ class Wrench(Sensor):
 
     def reset(self) -> None:
         self._parts = {}
-        self._cycle = None
+        self._cycle = self._stamp = None
 
     def check_signals(self, signals: Sequence[SignalShape]) -> None:
         names = [signal.name.rpartition(".")[2].lower() for signal in signals]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 import re
 from dataclasses import replace
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import pytest
@@ -85,6 +87,32 @@ def test_what_came_in_one_read_without_a_time_is_several_samples(cycles):
     stamps = [reading.stamp for reading in readings]
     assert len(readings) == cycles and stamps == sorted(set(stamps))
     assert all(10**18 - 1000 < stamp <= 10**18 for stamp in stamps)
+
+
+@pytest.mark.parametrize("together", [1, 3])
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_a_wrench_is_stamped_by_its_own_clock_whatever_the_order(order, together):
+    """Cycles every 4 ms that come up to 8 ms late, several at once, their messages in any order, a
+    read ending between them.
+    """
+    device, key = can_device(), "WrenchForce+WrenchTorque+WrenchTime"
+    decoder, wire = build_decoder(wiring([device], [], wrench("bus", key)), device), CanWire(device)
+    parts = {"WrenchForce": (1.0, 2.0, 3.0), "WrenchTorque": (0.5, 0.25, -0.5), "WrenchTime": ()}
+    cycles = [
+        [chunk(wire.encode(name, values, 4000 * n + 7)) for name, values in parts.items()]
+        for n in range(600)
+    ]
+    readings, rng, received = [], random.Random(1), 10**18
+    for first in range(0, 600, together):
+        late = rng.randrange(8_000_000)
+        received = max(received, 10**18 + 4_000_000 * (first + together) + late)
+        sent = [cycle[place] for cycle in cycles[first : first + together] for place in order]
+        cut = rng.randrange(len(sent))
+        for piece in (sent[:cut], sent[cut:]):
+            readings += decoder.decode(received, b"".join(piece))
+    stamps = [reading.stamp for reading in readings]
+    assert len(readings) == 600 and {r.value for r in readings} == {VALUES["wrench"]}
+    assert all(abs(b - a - 4_000_000) < 100_000 for a, b in pairwise(stamps[-300:]))
 
 
 def test_one_reader_for_each_device_in_use():
@@ -170,7 +198,7 @@ def test_a_device_that_restarts_does_not_turn_the_wheel():
         ),
         (
             wiring([can_device(dbc="/nope.dbc")], [channel("sinkage_pot", "bus", "A.B")]),
-            "/nope.dbc: cannot be read: no such",
+            "/nope.dbc: cannot read: no such",
         ),
     ],
 )

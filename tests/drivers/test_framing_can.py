@@ -252,7 +252,7 @@ def test_unknown_key_names_what_there_is(key, expected):
 
 @pytest.mark.parametrize(
     "text, expected",
-    [(None, "cannot be read"), ("BO_ nonsense", "is not a DBC"), ("\0" * 99, "not a DBC")],
+    [(None, "cannot read"), ("BO_ nonsense", "is not a DBC"), ("\0" * 99, "not a DBC")],
 )
 def test_broken_dbc_is_one_clear_line(tmp_path: Path, text, expected):
     path = tmp_path / "broken.dbc"

@@ -22,6 +22,7 @@ import yaml
 
 from gritd.drivers.wire import SerialWire
 from gritd.drivers.wire_log import read_wire
+from gritd.tools.testbed.wires import messages, slcan_line
 from tests.drivers.rig import damage
 from tests.scenarios.rig import DaemonProcess, Wires, driven
 from tests.wires.library import FOLDER, Session, keep, outcome, sessions
@@ -210,6 +211,26 @@ class FrozenPot(Meddler):
         super().send_bus(key, values, device_us)
 
 
+class LateWrench(Meddler):
+    """A gateway keeps four cycles of the wrench and sends each one's messages in any order."""
+
+    def __init__(self, wires, daemon):
+        super().__init__(wires, daemon)
+        self._waiting = []
+
+    def send_bus(self, key, values, device_us):
+        if not key.startswith("Wrench"):
+            super().send_bus(key, values, device_us)
+            return
+        self._waiting.append(messages(self.wires.bus.wire, key, values, device_us))
+        if len(self._waiting) == 4:
+            for cycle in self._waiting:
+                self.rng.shuffle(cycle)
+                with suppress(OSError):
+                    self.wires.bus.plug.send(b"".join(map(slcan_line, cycle)))
+            self._waiting.clear()
+
+
 class Stalled(Meddler):
     def middle(self):
         self.daemon.signal(signal.SIGSTOP)
@@ -217,6 +238,7 @@ class Stalled(Meddler):
         self.daemon.signal(signal.SIGCONT)
 
 
+# All but `wrench-late` were recorded of a wrench without a device time (their `changes` say so);
 # `starved` was recorded as good-slcan on a computer that was overloaded
 SESSIONS = {
     "good-slcan": (Meddler, "nothing happens; CAN by a serial adapter"),
@@ -237,6 +259,7 @@ SESSIONS = {
     "frames-twice": (Twice, "three frames in a hundred come twice"),
     "no-numbers": (NoNumbers, "NaN, infinity and what is out of range from the potentiometer"),
     "frozen-pot": (FrozenPot, "the potentiometer hangs, but for its last digit"),
+    "wrench-late": (LateWrench, "four cycles of the wrench come at once, each in any order"),
     "stalled": (Stalled, "the daemon's process is stopped for 0.3 s"),
 }
 

@@ -53,4 +53,7 @@ def test_good_sessions_lose_nothing_and_bad_ones_say_so():
     assert told["garbage-8-mb"]["devices"]["encoders"]["garbage"] > 7_500_000
     assert told["no-numbers"]["devices"]["bus"]["quarantined"]
     assert told["random-counter"]["last"]["jumps"] > 100
+    late = told["wrench-late"]
+    assert late["channels"]["wrench"]["longest_gap"] < 8.0, "by its own clock, not by receipt"
+    assert not late["devices"]["bus"].keys() - {"good", "unknown", "lost", "incomplete"}
     assert told["frozen-pot"]["stuck"].keys() == {"sinkage_pot"}

@@ -167,13 +167,13 @@ def has_multicast() -> bool:
 def messages(
     wire: CanWire, key: str, values: Sequence[FieldValue], device_us: int
 ) -> list[can.Message]:
-    """The messages of one sample; a key `First+Second` splits its values evenly."""
-    keys = key.split("+")
-    share = len(values) // len(keys)
-    return [
-        wire.encode(name, values[i * share : (i + 1) * share], device_us)
-        for i, name in enumerate(keys)
-    ]
+    """The messages of one sample; of a key `First+Second` each takes as many values as it holds."""
+    made, rest = [], values
+    for name in key.split("+"):
+        width = wire.width(name)
+        made.append(wire.encode(name, rest[:width], device_us))
+        rest = rest[width:]
+    return made
 
 
 def slcan_line(message: can.Message) -> bytes:

@@ -55,6 +55,8 @@ class Decoder:
             for sensor in self._listeners[frame.key]:
                 sensor.elapsed(elapsed)
                 if taken := sensor.taken(frame, stamp):
+                    sensor.readings += 1
+                    sensor.newest = taken[0]
                     readings.append(Reading(taken[0], sensor.channel, taken[1], received))
 
         return readings

@@ -45,6 +45,8 @@ class Sensor(ABC):
         self.quarantined = 0  # values refused as impossible
         self.incomplete = 0  # values of which a part never came
         self.turns_unknown = 0  # silences in which its counter may have wrapped
+        self.readings = 0  # values passed on
+        self.newest = 0  # when the last of them was taken [ns]
 
     @abstractmethod
     def value(self, frame: Frame) -> Value | None:

@@ -37,7 +37,7 @@ ROOMS = (
         "tools.calibrate",
         "tools.recordings",
     ),
-    ("tools.bench", "tools.report"),
+    ("tools.bench", "tools.report", "tools.view"),
     ("tools.proof",),
     ("tools.commands",),
     ("tools.main", "tools.dev"),

@@ -16,6 +16,7 @@ from gritd.tools.testbed import rig_config
 from tests.scenarios.rig import ROOT, TESTBED, WIRES, DaemonProcess
 
 UNIT = ROOT / "config" / "gritd.service"
+VIEW = ROOT / "config" / "gritd-view.service"
 CRASHES = "ten crashes in a minute"
 CRASHING = """
 import os, gritd.tools.service.serve as serving
@@ -35,10 +36,11 @@ def analyze(*arguments):
 
 
 @systemd
-def test_the_unit_is_right(tmp_path):
+@pytest.mark.parametrize("packaged", [UNIT, VIEW], ids=lambda path: path.name)
+def test_the_unit_is_right(tmp_path, packaged):
     """With a program where the unit names one: nothing to complain about."""
-    unit = tmp_path / "gritd.service"
-    unit.write_text(UNIT.read_text().replace("/opt/gritd/bin/gritd", sys.executable))
+    unit = tmp_path / packaged.name
+    unit.write_text(packaged.read_text().replace("/opt/gritd/bin/gritd", sys.executable))
     done = analyze("verify", str(unit))
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)
 
@@ -52,6 +54,12 @@ def test_the_unit_is_hardened(figure):
     figure(
         "hardening of the unit", "systemd-analyze security", "exposure", exposure, "of 10", EXPOSURE
     )
+
+
+@systemd
+def test_the_unit_of_the_view_is_hardened():
+    done = analyze("security", "--offline=true", "--no-pager", str(VIEW))
+    assert float(re.search(r"exposure level for .*: ([\d.]+)", done.stdout).group(1)) <= EXPOSURE
 
 
 KEYS = r"SUBSYSTEMS?|KERNEL|DRIVERS?|ACTION|ATTRS?\{\w+\}|ENV\{\w+\}|SYMLINK|GROUP|MODE|NAME"
@@ -73,6 +81,7 @@ def test_the_files_of_an_installation(tmp_path):
     config.write_text("# mine\n")
     assert "kept" in install("files", tmp_path)
     assert config.read_text() == "# mine\n"
+    assert "etc/systemd/system/gritd-view.service" in below(tmp_path)
     assert {"etc/systemd/system/gritd.service", "etc/udev/rules.d/90-gritd.rules"} <= below(
         tmp_path
     )

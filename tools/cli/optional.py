@@ -13,6 +13,9 @@ INSTALL = {
     "pyarrow": "'gritd[parquet]'",
     "asammdf": "'gritd[mdf]'",
     **dict.fromkeys(("h5py", "nptdms", "pyulog", "python_calamine", "rosbags"), FORMATS),
+    "starlette": "'gritd[view]'",
+    "uvicorn": "'gritd[view]'",
+    "metaflow-card-uplot": "'gritd[view]'",
 }
 
 

@@ -11,9 +11,11 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
+from gritd.estimator.config.configuration import load
 from gritd.estimator.recording.cdr import Rows
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.topics import TOPICS
@@ -23,6 +25,7 @@ from gritd.tools.cli.command import DONE, FAILED, Parser
 from gritd.tools.cli.optional import missing
 from gritd.tools.cli.terminal import LiveLine
 from gritd.tools.commands import demo_targets as targets
+from gritd.tools.service.client import SOCKET
 from gritd.tools.testbed.plant import PlantKind
 from gritd.tools.testbed.testbed import NAME, PLAYED, add_play
 
@@ -50,6 +53,7 @@ def _parser() -> Parser:
         "--output", metavar="DIR", help="folder of the run; default runs/demo-DATE-TIME"
     )
     add_play(parser)
+    parser.add_argument("--view", action="store_true", help="show it in a browser meanwhile")
 
     return parser
 
@@ -77,9 +81,19 @@ def run(folder: Path, arguments: Namespace, stop: StopRequest) -> list[str]:
         )
         with Child(stop, "daemon", "gritd", "run", "--config", config, "--name", "demo") as daemon:
             _wait_for_devices(daemon)
-            testbed.tell("play")
-            _follow(daemon, testbed, arguments.seconds)
-            return daemon.stop()
+            with _shown(stop, config) if arguments.view else nullcontext():
+                testbed.tell("play")
+                _follow(daemon, testbed, arguments.seconds)
+                return daemon.stop()
+
+
+@contextmanager
+def _shown(stop: StopRequest, config: str) -> Iterator[None]:
+    """The page of `gritd view` beside the daemon of this configuration. Raises CommandError."""
+    socket = Path(load(config).settings.logging.directory) / SOCKET
+    with Child(stop, "view", "gritd", "view", "--any-port", "--socket", str(socket)) as view:
+        print(view.wait_for("view ", READY), flush=True)
+        yield
 
 
 def _after(line: str) -> str:

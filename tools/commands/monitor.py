@@ -10,14 +10,13 @@ import time
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from math import degrees
 from typing import Any
 
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.terminal import control
 from gritd.tools.cli.wording import honesty
-from gritd.tools.commands.status import disagreement
 from gritd.tools.service.client import Report, add_socket, connected, reports, told
+from gritd.tools.service.wording import SHOWN, age, disagreement
 
 EVERY = 0.2  # [s] between pictures
 OPEN, CLOSE = (
@@ -29,19 +28,6 @@ BOLD, PLAIN = "\033[1m", "\033[m"
 LEAVE = "q"
 TROUBLE = "!"  # begins a line that is shown in bold
 INDENT = " " * 14
-
-# what is shown of a tick: label, value, sigma, factor, unit, decimals
-SHOWN = (
-    ("c", "cohesion", "cohesion_sigma", 1.0, "Pa", 0),
-    ("tan φ", "tan_phi", "tan_phi_sigma", 1.0, "", 4),
-    ("k", "shear_modulus", "shear_modulus_sigma", 1e3, "mm", 1),
-    ("slip", "slip", "slip_sigma", 100.0, "%", 1),
-    ("sinkage", "sinkage", "sinkage_sigma", 1e3, "mm", 2),
-    ("θ₁", "theta_1", "theta_1_sigma", degrees(1.0), "°", 2),
-    ("load", "load", "load_sigma", 1.0, "N", 2),
-    ("torque", "torque", "torque_sigma", 1.0, "N·m", 3),
-    ("pull", "drawbar_pull", "drawbar_pull_sigma", 1.0, "N", 2),
-)
 
 
 def main(argv: Sequence[str]) -> int:
@@ -136,7 +122,7 @@ def lines(report: Report) -> Iterator[str]:
     """
     tick = report["tick"]
     yield (
-        f"gritd {report['pid']}, up {_age(report['uptime'])}: "
+        f"gritd {report['pid']}, up {age(report['uptime'])}: "
         f"{report['status']} {' '.join(report['flags'])}"
     ).rstrip()
     yield from _trouble(report)
@@ -231,15 +217,3 @@ def _number(value: Any, factor: float, decimals: int) -> str:
 def _lateness(loop: Report) -> str:
     names = (("late_50", "50 %"), ("late_99", "99 %"), ("late_999", "99.9 %"), ("late_max", "max"))
     return ", ".join(f"{loop[key] * 1e3:.2f} ({label})" for key, label in names if key in loop)
-
-
-def _age(seconds: float) -> str:
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return (
-        f"{hours} h {minutes} min"
-        if hours
-        else f"{minutes} min {rest} s"
-        if minutes
-        else f"{rest} s"
-    )

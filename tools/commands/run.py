@@ -18,6 +18,7 @@ from gritd.estimator.daemon.notify import Notifier, extended
 from gritd.estimator.daemon.starts import forget, wait_before
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name, number, whole
 from gritd.tools.service.client import LONGEST, SOCKET
+from gritd.tools.service.shown import shown
 
 START = 30.0  # [s] that the manager gives a start, as in the unit
 
@@ -79,6 +80,8 @@ def _run(arguments: Namespace, held: ExitStack) -> int:
         return _played(configuration, folder, run, arguments.from_tap)
     place = _socket_path(folder, arguments.socket)
     held.enter_context(alone_at(place))
+    if arguments.view:
+        held.enter_context(shown(place))
     service = Service(
         folder,
         run,
@@ -180,6 +183,8 @@ def _parser() -> Parser:
         metavar="S",
         help="seconds between status lines, 0 for none",
     )
+
+    parser.add_argument("--view", action="store_true", help="show it in a browser meanwhile")
 
     wires = parser.add_mutually_exclusive_group()
     wires.add_argument(

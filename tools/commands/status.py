@@ -5,13 +5,13 @@ Prometheus.
 from __future__ import annotations
 
 import json
-import time
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gritd.tools.cli.command import DONE, FAILED, Parser
 from gritd.tools.service.client import Report, add_socket, connected, reports, told
+from gritd.tools.service.wording import disagreement
 
 # metric -> (type, help, path in the report)
 METRICS = {
@@ -109,15 +109,6 @@ def _value(value: float) -> str:
 
 def _label(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
-
-
-def disagreement(disagreeing: Mapping[str, Any]) -> str:
-    """Channel, time and size of a disagreement between model and measurement, in words."""
-    since = time.strftime("%H:%M:%S", time.gmtime(disagreeing["since"]))
-    return (
-        f"disagrees with {disagreeing['channel'].replace('_', ' ')} since {since} UTC, "
-        f"{disagreeing['sigmas']:.1f} σ off"
-    )
 
 
 def prior_note(report: Report) -> str:

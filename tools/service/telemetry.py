@@ -7,11 +7,15 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader
+from gritd.drivers.sensor import Sensor
+from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
@@ -31,7 +35,7 @@ class Reporter:
         self._began = time.monotonic()
         self._rates: dict[
             str, tuple[float, int, float]
-        ] = {}  # device -> when, readings then, rate before
+        ] = {}  # device or channel -> when, readings then, rate before
 
     def __call__(self) -> Report:
         daemon = self._daemon
@@ -46,16 +50,29 @@ class Reporter:
             "real_time": self._notice or "yes",
             "wall_clock": daemon.clock.notice,
             "configuration": daemon.configuration.source,
+            "setup": setup(daemon.configuration.settings, daemon.run.name),
             **_tick(daemon),
             "disagreement": disagreement and disagreement._asdict(),
             "queue": self._queue.counts()._asdict(),
             "devices": {reader.device: self._device(reader) for reader in self._readers},
+            "sensors": {
+                sensor.channel: self._sensor(sensor)
+                for reader in self._readers
+                for sensor in reader.decoder.sensors
+            },
             "log": {
                 **{name: getattr(log, name) for name in LOG},
                 "files": len(log.files),
                 "file": str(log.files[-1]),
+                **_room(log.files[-1]),
             },
         }
+
+    def _sensor(self, sensor: Sensor) -> Report:
+        """Of a channel: values passed on, how many a second, age of the newest [s]."""
+        age = (self._daemon.clock.now() - sensor.newest) * 1e-9 if sensor.readings else None
+        rate = self._rate(f"channel {sensor.channel}", sensor.readings)
+        return {"readings": sensor.readings, "rate": rate, "age": age}
 
     def _device(self, reader: Reader) -> Report:
         stats = asdict(reader.stats())
@@ -89,6 +106,33 @@ def _tick(daemon: Daemon) -> Report:
         "tick": fields,
         "loop": {**record._asdict(), **loop},
     }
+
+
+def setup(settings: Settings, run: str) -> Report:
+    """What does not change from tick to tick: run, testbed, wheel and the soil as it is stated."""
+    soil, wheel = settings.soil, settings.wheel
+    return {
+        "run": run,
+        "testbed": settings.testbed,
+        "wheel": {"radius": wheel.radius, "width": wheel.width, "c1": wheel.c1, "c2": wheel.c2},
+        "prior": {
+            "cohesion": _pair(soil.cohesion),
+            "tan_phi": _pair(soil.tan_phi),
+            "shear_modulus": _pair(soil.shear_modulus),
+        },
+    }
+
+
+def _pair(known: Uncertain) -> Report:
+    return {"value": known.value, "sigma": known.sigma}
+
+
+def _room(path: Path) -> Report:
+    """Bytes of the open part, and those that its disk has left; nothing where nobody can tell."""
+    with suppress(OSError):
+        disk = os.statvfs(path.parent)
+        return {"size": path.stat().st_size, "free": disk.f_bavail * disk.f_frsize}
+    return {}
 
 
 def channels_of(daemon: Daemon) -> dict[str, int]:

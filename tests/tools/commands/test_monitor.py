@@ -15,6 +15,7 @@ import pytest
 
 from gritd.estimator.messages.status import CHANNEL_BITS
 from gritd.tools.commands import monitor
+from gritd.tools.service.wording import SHOWN
 from tests.estimator.daemon.reports import REPORT, publishing
 
 ROOT = Path(__file__).parents[3]
@@ -34,7 +35,7 @@ def test_the_monitor_shows_channels_devices_and_log(publisher, capsys):
 
 
 TICK = {
-    **{key: 12345.678 for _, name, sigma, *_ in monitor.SHOWN for key in (name, sigma)},
+    **{key: 12345.678 for _, name, sigma, *_ in SHOWN for key in (name, sigma)},
     **{"separability": 1.0, "consistency": 1.0, "updates": 10**6, "resets": 10},
     **dict.fromkeys(("late", "duplicates", "invalid", "jumps"), 10**5),
 }

@@ -1,0 +1,116 @@
+"""`gritd view` as a process: attacked, it touches nothing but itself, and answers again."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any
+from urllib.request import Request, urlopen
+
+import pytest
+
+pytest.importorskip("uvicorn", reason="needs gritd[view]")
+from tests.tools.view.samples import daemon, report
+
+
+@contextmanager
+def viewing(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The process, and the address it serves."""
+    command = [sys.executable, "-m", "gritd", "view", "--port", "0", *options]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        yield process, process.stdout.readline().split()[1]
+    finally:
+        process.kill()
+        process.wait()
+
+
+def place(address: str) -> tuple[str, int]:
+    host, port = address.removeprefix("http://").rstrip("/").split(":")
+    return host, int(port)
+
+
+def asks(address: str, path: str = "") -> int:
+    with urlopen(Request(address + path), timeout=30.0) as answer:
+        return int(answer.status)
+
+
+def answers(address: str) -> bool:
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        try:
+            return asks(address) == 200
+        except OSError:
+            time.sleep(0.2)
+    return False
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, str, list[float]]]:
+    """A view, its address, and when its daemon made a report."""
+    path, made = tmp_path_factory.mktemp("view") / "gritd.sock", []
+
+    def noted(at: float) -> dict[str, object]:
+        made.append(at)
+        return report(at)
+
+    with daemon(path, noted), viewing("--socket", str(path)) as (process, address):
+        assert answers(address)
+        yield process, address, made
+
+
+HEAD = b" HTTP/1.1\r\nHost: localhost\r\n"
+SAID = (
+    b"",  # idle
+    b"GET /live" + HEAD + b"\r\n",  # and never reads
+    b"GET /" + HEAD + b"X: " + b"x" * 60_000,  # endless
+    b"\x16\x03\x01\x00nonsense\r\n\r\n",
+)
+
+
+def test_attacked_it_leaves_the_daemon_alone_and_answers_again(watched: Any) -> None:
+    process, address, made = watched
+    with ExitStack() as held:
+        for number in range(400):
+            client = held.enter_context(socket.socket())
+            client.settimeout(5.0)
+            with suppress(OSError):  # refused, as it may be
+                client.connect(place(address))
+                client.sendall(SAID[number % len(SAID)])
+
+        before = len(made)
+        time.sleep(1.0)
+        assert len(made) > before + 2 and process.poll() is None
+    assert answers(address)
+
+
+def test_frozen_it_does_not_hold_the_daemon_up(watched: Any) -> None:
+    process, address, made = watched
+    process.send_signal(signal.SIGSTOP)
+    before = len(made)
+    time.sleep(0.6)
+    assert len(made) > before
+    process.send_signal(signal.SIGCONT)
+    assert answers(address)
+
+
+def test_a_stream_goes_on(watched: Any) -> None:
+    with urlopen(watched[1] + "live", timeout=30.0) as stream:
+        lines = [stream.readline() for _ in range(9)]
+    assert sum(line.startswith(b"data: {") for line in lines) >= 3
+
+
+def test_it_ends_quietly(watched: Any) -> None:
+    """The last test of this view."""
+    process, address, _ = watched
+    with urlopen(address + "live", timeout=30.0) as stream:
+        assert stream.readline()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30.0) == 0
+    assert process.stderr is not None and process.stderr.read() == ""

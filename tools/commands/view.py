@@ -1,0 +1,122 @@
+"""`gritd view`: the running daemon in a browser, through its status socket."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from argparse import Namespace
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser, whole
+from gritd.tools.cli.optional import require
+from gritd.tools.service.client import add_socket
+
+if TYPE_CHECKING:
+    from gritd.tools.view.app import Hub
+
+NEEDS = ("starlette", "uvicorn")
+BEHIND = 5  # nice: the page waits for the daemon, never the daemon for the page
+DEFAULT_PORT = 8250
+EXPECTED = "expected a first line of 16 characters or more, as openssl rand -hex 16 gives"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Exit 0 after SIGTERM or Ctrl-C. Raises CommandError."""
+    arguments = _parser().parse_args(argv)
+    for package in NEEDS:
+        require(package, "gritd view")
+    _serve(arguments)
+    return DONE
+
+
+def _serve(arguments: Namespace) -> None:
+    from gritd.tools.view.app import Hub, application
+    from gritd.tools.view.feed import Feed
+    from gritd.tools.view.library import library
+    from gritd.tools.view.server import Place, listening, serve
+
+    place = Place(arguments.host, arguments.port, tuple(arguments.name), _token(arguments))
+    if not place.loopback and not place.token:
+        raise CommandError(
+            f"--host {place.host}: found no --token-file; expected one, since others can reach this"
+            " address; its first line is what they need to look",
+            USAGE,
+        )
+
+    files, hub, feed = library(), Hub(), Feed(arguments.socket)
+
+    with closing(listening(place, arguments.any_port)) as listener:
+        address = place.address(listener.getsockname()[1])
+
+        def begin() -> None:
+            loop = asyncio.get_running_loop()
+            feed.start(lambda frame: _push(loop, hub, frame))
+            print(f"view {address}", flush=True)
+
+        with suppress(OSError):
+            os.nice(BEHIND)
+        serve(application(feed, files, hub), place, listener, begin)
+    feed.close()
+
+
+def _push(loop: asyncio.AbstractEventLoop, hub: Hub, frame: bytes) -> None:
+    """From the feed's thread, also while the server ends."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(hub.push, frame)
+
+
+def _token(arguments: Namespace) -> str:
+    """The token of the file that is named. Raises CommandError."""
+    if arguments.token_file is None:
+        return ""
+    from gritd.tools.view.server import token_of
+
+    try:
+        lines = arguments.token_file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "no text"
+        raise CommandError(
+            f"{arguments.token_file}: found {reason.lower()}; {EXPECTED}", USAGE
+        ) from None
+    token = token_of(lines)
+    if not token:
+        raise CommandError(f"{arguments.token_file}: found no token; {EXPECTED}", USAGE)
+    return token
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="gritd view", description="Show the running daemon in a browser.")
+    add_socket(parser)
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="where to listen (default: 127.0.0.1, this computer alone)",
+    )
+    parser.add_argument(
+        "--port",
+        type=whole(0, 65535),
+        default=DEFAULT_PORT,
+        metavar="N",
+        help=f"default {DEFAULT_PORT}; 0 for any that is free",
+    )
+    parser.add_argument(
+        "--any-port", action="store_true", help="where the port is taken: any that is free"
+    )
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="HOST",
+        help="a further name under which browsers reach this computer",
+    )
+    parser.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="F",
+        help="the first line of F must be known to look; needed beyond this computer",
+    )
+    return parser

@@ -1,0 +1,1 @@
+"""The page of `gritd view`: the running daemon, or recordings, in a browser."""

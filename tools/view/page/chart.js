@@ -1,0 +1,156 @@
+// A curve along time: uPlot, with bands of ± 2σ, marks of events, the stated prior, and zoom by a drag.
+
+const HEIGHT = 190;
+const MARKS = {good: "--good", note: "--note", bad: "--bad"};
+
+export const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const faded = (name, share) => colour(name) + Math.round(share * 255).toString(16).padStart(2, "0");
+
+export const written = (value, decimals) =>
+  value === null || value === undefined ? "–" : value.toFixed(decimals).replace("-", "−");
+
+export class Chart {
+  constructor(of, into, control) {
+    this.of = of;
+    this.control = control;
+    this.box = into.appendChild(document.createElement("div"));
+    this.box.className = "chart";
+    this.box.tabIndex = 0;
+    this.box.setAttribute("role", "img");
+    const head = this.box.appendChild(document.createElement("p"));
+    head.className = "chart-head";
+    const title = head.appendChild(document.createElement("b"));
+    title.textContent = `${of.title} ${of.symbol}`.trim() + (of.unit ? ` [${of.unit}]` : "");
+    this.now = head.appendChild(document.createElement("span"));
+    this.build();
+  }
+
+  build() {
+    if (this.plot) this.plot.destroy();
+    this.plot = new uPlot(this.options(), [[], ...this.order().map(() => [])], this.box);
+  }
+
+  // Columns in the order of the series: of each curve its band's edges, if any, then its line.
+  order() { return this.of.curves.flatMap(c => (c.sigma ? [c.high, c.low, c.line] : [c.line])); }
+
+  options() {
+    const series = [{}], bands = [];
+    for (const curve of this.of.curves) {
+      const name = "--" + curve.style;
+      if (curve.sigma) {
+        bands.push({series: [series.length, series.length + 1], fill: faded(name, 0.18)});
+        series.push({width: 0, points: {show: false}}, {width: 0, points: {show: false}});
+      }
+      series.push({stroke: colour(name), width: curve.style === "measured" && this.of.curves.length > 1 && !curve.sigma ? 3.4 : 1.5, points: {show: false}});
+    }
+    const axis = {stroke: colour("--soft"), grid: {stroke: colour("--rule"), width: 1}, ticks: {show: false}, font: "12px system-ui, sans-serif"};
+    return {
+      width: Math.max(this.box.clientWidth, 200), height: HEIGHT, series, bands,
+      legend: {show: false},
+      tzDate: ts => uPlot.tzDate(new Date(ts * 1e3), "Etc/UTC"),
+      scales: {x: {time: this.control.clock, range: () => this.control.span()}, y: {range: ranged}},
+      axes: [
+        {...axis, size: 28, space: 60, values: this.control.clock ? clocked : (u, ticks) => ticks.map(v => `${v}`)},
+        {...axis, size: 54, space: 32, values: (u, ticks) => ticks.map(v => `${+v.toPrecision(8)}`.replace("-", "−"))},
+      ],
+      cursor: {sync: {key: "time"}, drag: {x: true, y: false, setScale: false}, points: {size: 6}},
+      hooks: {
+        draw: [u => this.marked(u)],
+        setSelect: [u => this.zoomed(u)],
+        setCursor: [() => this.told()],
+      },
+    };
+  }
+
+  zoomed(u) {
+    const {left, width} = u.select;
+    if (width < 8) return;
+    const span = [u.posToVal(left, "x"), u.posToVal(left + width, "x")];
+    u.setSelect({left: 0, top: 0, width: 0, height: 0}, false);
+    this.control.zoom(span);
+  }
+
+  // The stated prior as a dashed line, and events as lines from top to bottom.
+  marked(u) {
+    const {ctx, bbox} = u, scale = devicePixelRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    const line = (x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); };
+
+    const prior = this.of.expected ?? this.control.prior(this.of);
+    if (prior !== null) {
+      ctx.setLineDash([5 * scale, 4 * scale]);
+      ctx.lineWidth = 1.2 * scale;
+      ctx.strokeStyle = colour("--prior");
+      const y = u.valToPos(prior, "y", true);
+      line(bbox.left, y, bbox.left + bbox.width, y);
+    }
+    ctx.setLineDash([2 * scale, 3 * scale]);
+    ctx.lineWidth = 1.4 * scale;
+    const [from, to] = this.control.span();
+    for (const event of this.control.events()) {
+      if (event.time < from || event.time > to) continue;
+      ctx.strokeStyle = colour(MARKS[event.kind] || "--note");
+      const x = u.valToPos(event.time, "x", true);
+      line(x, bbox.top, x, bbox.top + bbox.height);
+    }
+    this.control.drawn(u, this.of, line);
+    ctx.restore();
+  }
+
+  draw(curves) {
+    this.curves = curves;
+    const data = this.order().map(at => curves.columns[at] || []);
+    this.plot.setData([curves.time, ...data], true);
+    this.told();
+  }
+
+  // The value under the cursor, or the last one.
+  told() {
+    if (!this.curves || !this.plot) return;
+    const at = this.plot.cursor.idx ?? this.curves.time.length - 1;
+    const words = this.of.curves.map(c => {
+      const column = this.curves.columns[c.line] || [];
+      const value = written(column[at], this.of.decimals);
+      if (this.of.curves.length > 1) return c.label === "measured" ? value : `${c.label} ${value}`;
+      if (!c.sigma) return value;
+      const half = (this.curves.columns[c.high][at] - column[at]) / 2;
+      return column[at] === null || column[at] === undefined ? value : `${value} ± ${written(half, this.of.decimals)}`;
+    });
+    this.now.textContent = words.join(", ");
+  }
+
+  // Now, least and greatest of each curve: what stands in the table, and for who cannot see the picture.
+  summary() {
+    return this.of.curves.map(c => {
+      const [from, to] = this.control.span();
+      const values = (this.curves ? this.curves.columns[c.line] || [] : [])
+        .filter((v, i) => v !== null && this.curves.time[i] >= from && this.curves.time[i] <= to);
+      const shown = v => `${written(v, this.of.decimals)} ${this.of.unit}`.trim();
+      const least = values.reduce((a, b) => Math.min(a, b), Infinity), most = values.reduce((a, b) => Math.max(a, b), -Infinity);
+      const name = this.of.curves.length > 1 ? `${this.of.title}, ${c.label}` : this.of.title;
+      return values.length ? [name, shown(values[values.length - 1]), shown(least), shown(most)] : [name, "–", "–", "–"];
+    });
+  }
+
+  label() {
+    const said = this.summary().map(([name, now, least, most]) => `${name}: ${now}, between ${least} and ${most}`);
+    this.box.setAttribute("aria-label", said.join("; "));
+  }
+
+  resize() { this.plot.setSize({width: Math.max(this.box.clientWidth, 200), height: HEIGHT}); }
+}
+
+// A margin, and never a range so small that noise of the last digit fills the picture.
+const ranged = (u, low, high) => {
+  if (low === null || !Number.isFinite(low)) return [0, 1];
+  const room = Math.max(high - low, 1e-3 * Math.abs(high), 1e-9), middle = (low + high) / 2;
+  return [middle - 0.6 * room, middle + 0.6 * room];
+};
+
+const clocked = (u, ticks) => {
+  const fine = ticks.length > 1 && ticks[1] - ticks[0] < 60;
+  return ticks.map(t => new Date(t * 1e3).toISOString().slice(11, fine ? 19 : 16));
+};

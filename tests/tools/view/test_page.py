@@ -14,8 +14,8 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="needs gritd[view]")
 from tests.tools.view.browser import CHROMIUM, Browser, browser
+from tests.tools.view.process import answers, viewing
 from tests.tools.view.samples import daemon, report
-from tests.tools.view.test_server import answers, viewing
 
 PAGE = Path(__file__).parents[3] / "tools" / "view" / "page"
 chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")

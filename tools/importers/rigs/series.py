@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gritd.estimator.config import configuration as config
@@ -18,7 +18,7 @@ from gritd.tools.importers.registry import Tell
 from gritd.tools.importers.segments import START
 from gritd.tools.importers.series import written
 from gritd.tools.importers.series.clocks import runs_of
-from gritd.tools.importers.series.columns import SeriesTable, Wanted
+from gritd.tools.importers.series.columns import SeriesTable, Told, Wanted
 from gritd.tools.importers.series.convert import AXES, converted
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
@@ -64,22 +64,35 @@ def _all(paths: Sequence[Path]) -> list[SeriesTable]:
     """Every table of the files. Raises RigFileError."""
     files = series_files(paths)
     tables: list[SeriesTable] = []
-    with Progress("reading", len(files)) as progress:
-        for number, path in enumerate(files):
-            progress.at(path.name, number / len(files))
-            tables += read(path, Wanted(rows=ENOUGH))
+    with Progress("reading") as progress:
+        for path, told in zip(files, _shares(progress, files), strict=True):
+            tables += read(path, Wanted(rows=ENOUGH), told=told)
     return tables
 
 
 def _read(files: Sequence[RunFiles], mapped: SeriesMap) -> list[SeriesRun]:
     """The runs of all files. Raises RigFileError."""
     runs: list[SeriesRun] = []
-    with Progress("reading", len(files)) as progress:
-        for number, each in enumerate(files):
-            progress.at(each.name, number / len(files))
-            runs += runs_of(each, mapped)
+    paths = [path for each in files for _, path in each.files]
+    with Progress("reading") as progress:
+        shares = _shares(progress, paths)
+        for each in files:
+            runs += runs_of(each, mapped, [next(shares) for _ in each.files])
     check(runs, mapped)
     return runs
+
+
+def _shares(progress: Progress, paths: Sequence[Path]) -> Iterator[Told]:
+    """For each file what takes the bytes of it that were read."""
+    sizes = [path.stat().st_size if path.is_file() else 1 for path in paths]
+    for at, path in enumerate(paths):
+        before = sum(sizes[:at])
+        progress.at(path.name, before / sum(sizes))
+
+        def told(done: int, name: str = path.name, before: int = before) -> None:
+            progress.at(name, (before + done) / sum(sizes))
+
+        yield told
 
 
 def _import(

@@ -9,7 +9,7 @@ import numpy as np
 
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import RigFileError
-from gritd.tools.importers.series.columns import Column, SeriesTable
+from gritd.tools.importers.series.columns import Column, SeriesTable, Told
 from gritd.tools.importers.series.mapping import MEASURED, SeriesMap
 from gritd.tools.importers.series.runs import EPOCH, SeriesRun, info_of, of_table, resampled
 from gritd.tools.importers.series.sources import Part, RunFiles, parts
@@ -18,9 +18,15 @@ from gritd.tools.importers.series.times import NS, Nanoseconds
 SLOW = "motor_temperature"  # a channel that may be slow: the filter does not wait for it
 
 
-def runs_of(files: RunFiles, mapped: SeriesMap) -> Iterator[SeriesRun]:
-    """The runs of a file, or of the files that belong together. Raises RigFileError."""
-    found = [part for source, path in files.files for part in parts(path, source, mapped)]
+def runs_of(files: RunFiles, mapped: SeriesMap, told: Sequence[Told]) -> Iterator[SeriesRun]:
+    """The runs of a file, or of the files that belong together; `told` for each. Raises
+    RigFileError.
+    """
+    found = [
+        part
+        for (source, path), tell in zip(files.files, told, strict=True)
+        for part in parts(path, source, mapped, tell)
+    ]
     if len(found) == 1:
         yield from of_table(found[0].table, found[0].mapped, files.name)
         return

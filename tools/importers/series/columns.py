@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from gritd.tools.importers.series.times import Nanoseconds
 
 SHOWN = 40  # characters of a name in a message
 ROOM = 120  # of several
+Told = Callable[[int], None]  # takes the bytes of a file that were read
 FEW = 5  # rows that are told one by one
 
 

@@ -1,181 +1,331 @@
-"""CSV as laboratories write it: any of three separators, decimal commas, a preamble, a row of
-units, empty cells.
-"""
+"""Tables of time series as text: the columns that are wanted, block by block."""
 
 from __future__ import annotations
 
 import csv
-import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.estimator.limits import limits, raised
-from gritd.tools.importers.files import LARGEST, RigFileError, lines
-from gritd.tools.importers.series.columns import Column, SeriesTable
-from gritd.tools.importers.series.times import is_gap
+from gritd.tools.importers.files import LARGEST, RigFileError
+from gritd.tools.importers.series.cells import OddCell
+from gritd.tools.importers.series.columns import SeriesTable, Told, told_rows
+from gritd.tools.importers.series.dialect import Layout, joined, layout, split
+from gritd.tools.importers.series.mapping import Mapped
+from gritd.tools.importers.series.text_columns import Builder, Loose, Numbers, Times, Words
+from gritd.tools.importers.series.text_file import TextFile, text_file
+from gritd.tools.importers.series.times import TimeFormatError
 
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-SEPARATORS = (",", ";", "\t")
-PREAMBLE = 50  # lines among which the header is looked for
-
+HEAD = 10  # lines that are looked at, or more
+FIRST = 2000  # rows that tell the last digit of a column
+GUESSED = 200_000  # cells of a block that are enough for a proposal
+ZEROS = "zero bytes, as a loss of power leaves them"
+CUT = "cut in the row"
 Rows = list[list[str]]
 
 
-def read(path: Path) -> SeriesTable:
-    """The columns of a CSV file, plain or gzipped. Raises RigFileError."""
-    text = list(lines(path))
-    separator, start = _layout(path, text)
-    decimal = "," if separator == ";" and _has_decimal_commas(text[start + 1 :]) else "."
-
-    rows = _split(path, text[start:], separator)
-    header, body = next(rows), list(rows)
-    named = _names(path, header, body)
-
-    units = _units(header, body, decimal)
-    body = body[1:] if units else body
-    first = start + 2 + bool(units)
-    _check(path, named, body, first)
-
-    columns = {
-        name: _column(path, name, [row[at].strip() for row in body], decimal, first)
-        for at, name in named.items()
-    }
-    return SeriesTable(path, columns, units, np.arange(first, first + len(body)))
-
-
-def _layout(path: Path, text: Sequence[str]) -> tuple[str, int]:
-    """Separator and the line of the header: the first line with as many fields as the lines below
-    it, two or more. Raises RigFileError.
+def read(
+    path: Path,
+    columns: Mapping[str, Mapped] | None = None,
+    rows: int | None = None,
+    told: Told | None = None,
+) -> SeriesTable:
+    """The columns that a map names, those that the file has; without one all columns. `rows`: about
+    so many are enough. Raises RigFileError.
     """
-    for at in range(min(len(text) - 1, PREAMBLE)):
-        for separator in SEPARATORS:
-            fields, below = text[at].count(separator), _fields_below(text[at + 1], separator)
-            if fields in below and fields and _is_header(text[at]):
-                return separator, at
+    with text_file(path) as text:
+        head = [line for _, line in joined(_head(text))]
+        if not head:
+            found = f"cannot be read: {text.cut}" if text.cut else "found nothing in it"
+            raise RigFileError(f"{path}: {found}; expected a table")
 
-    if text and len(text) <= PREAMBLE and _is_header(text[-1]) and re.search(r"[,;\t]", text[-1]):
-        raise RigFileError(f"{path}: found no rows; expected data under {text[-1].strip()[:80]}")
-    raise RigFileError(
-        f"{path}: found no header; expected names of columns, separated by ',', ';' or tabs"
-    )
-
-
-def _fields_below(line: str, separator: str) -> tuple[int, int]:
-    """How many separators a row has, with those that end it and without."""
-    return line.count(separator), line.rstrip(separator + " \r\n").count(separator)
-
-
-def _is_header(line: str) -> bool:
-    """A line whose first field is no number."""
-    first = re.split(r"[,;\t]", line)[0].strip().strip('"')
-    return not line.startswith("#") and not NUMBER.fullmatch(first)
+        form = layout(path, head, columns or ())
+        table = _Table(path, form, _builders(form, head, columns))
+        lines = head[form.start :]
+        first = 1 + sum(line.count("\n") for line in head[: form.start])
+        while lines and (rows is None or table.rows < rows):
+            few = lines[: _enough(rows, form)]
+            table.add(few, first, text)
+            first += len(lines)
+            if told is not None:
+                told(text.position)
+            lines = text.block()
+        return table.whole(text.cut)
 
 
-def _has_decimal_commas(text: Sequence[str]) -> bool:
-    return any(re.search(r"\d,\d", line) for line in text[:20])
+def _enough(rows: int | None, form: Layout) -> int | None:
+    """Lines of a block that are read; None for all."""
+    return None if rows is None else min(rows, max(GUESSED // form.width, HEAD))
 
 
-def _split(path: Path, text: Sequence[str], separator: str) -> Iterator[list[str]]:
+def _head(text: TextFile) -> list[str]:
+    head: list[str] = []
+    while len(head) < HEAD and (lines := text.block()):
+        head += lines
+    return head
+
+
+def _builders(
+    form: Layout, head: Sequence[str], columns: Mapping[str, Mapped] | None
+) -> dict[tuple[str, int], Builder]:
+    """What becomes of each column, by its name and place; one whose name stands there twice is read
+    twice.
+    """
+    first = _first(form, head)
+    if columns is None:
+        return {(name, at): Loose(first[at]) for name, at in _all(form, first)}
+
+    made: dict[tuple[str, int], Builder] = {}
+    for name, column in columns.items():
+        for at in form.places(name):
+            if column.channel == "run":
+                made[name, at] = Words()
+            else:
+                timed = column.channel in ("time", "date")
+                made[name, at] = Times(column) if timed else Numbers(first[at])
+    return made
+
+
+def _first(form: Layout, head: Sequence[str]) -> list[tuple[str, ...]]:
+    """Some cells of every column."""
+    rows: Rows = []
+    for line in head[form.start : form.start + FIRST]:
+        fields = _fields(line, form.separator)
+        if len(fields) == form.width:
+            rows.append(fields)
+    return list(zip(*rows, strict=True))
+
+
+def _all(form: Layout, first: Sequence[Sequence[str]]) -> Iterator[tuple[str, int]]:
+    """Name and place of every column: its own name, `column 3` where it has none or another has it;
+    without name and content it is none.
+    """
+    seen: set[str] = set()
+    for at, name in enumerate(form.names[: form.width]):
+        if name and name not in seen:
+            yield name, at
+        elif name or any(cell.strip() for cell in first[at]):
+            yield f"column {at + 1}", at
+        seen.add(name)
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    """The fields of a line; none of one that cannot be parted."""
     try:
-        yield from csv.reader(text, delimiter=separator)
-    except csv.Error as error:
-        raise RigFileError(f"{path}: found no CSV: {error}; expected a table") from None
+        return split(line, separator)
+    except csv.Error:
+        return []
 
 
-def _names(path: Path, header: Sequence[str], body: Rows) -> dict[int, str]:
-    """The names of the columns by place. A column without a name, such as the index that pandas
-    writes, is called by its place; one without content too is left out. Raises RigFileError.
-    """
-    names = [name.strip() for name in header]
-    for number, row in enumerate(body, start=1):
-        if any(cell.strip() for cell in row[len(names) :]):
+class _Table:
+    """Rows to columns. What cannot be read is left out, and told."""
+
+    def __init__(self, path: Path, form: Layout, columns: dict[tuple[str, int], Builder]) -> None:
+        self._path, self._form, self._columns = path, form, columns
+        self._plain = [at for (_, at), made in columns.items() if isinstance(made, Numbers)]
+        self._needed = max((at for _, at in columns), default=0) + 1
+        self._lines: list[NDArray[np.int64]] = []
+        self._left_out: dict[str, list[int]] = {}
+        self.rows = 0
+
+    def add(self, lines: list[str], first: int, text: TextFile) -> None:
+        """Lines, the first with this number. Raises RigFileError."""
+        if lines[-1].endswith("\n"):
+            self._block(lines, first)
+        else:
+            self._block(lines[:-1], first)
+            self._last(lines[-1], first + len(lines) - 1, lines[:-1], bool(text.cut))
+        self._check_size(lines, first, text)
+
+    def whole(self, cut: str) -> SeriesTable:
+        """The columns, with what was left out. Raises RigFileError."""
+        gone = sum(map(len, self._left_out.values()))
+        if not self.rows or gone > self.rows:
+            raise self._nothing(gone)
+
+        columns = {}
+        for (name, at), made in self._columns.items():
+            column = made.column()
+            if name not in columns:
+                columns[name] = column
+            elif not np.array_equal(column.numbers, columns[name].numbers, equal_nan=True):
+                raise RigFileError(
+                    f"{self._path}: found the column {name[:40]!r} twice, with other values; "
+                    f"expected the number of the one that is meant, such as 'column {at + 1}'"
+                )
+
+        why = [f"{self._path.name}: ends within its packed data: {cut[:80]}"] if cut else []
+        notes = [
+            f"{self._path.name}: left out {told_rows(rows)}: {reason}"
+            for reason, rows in self._left_out.items()
+        ]
+        lines = np.concatenate(self._lines)
+        return SeriesTable(self._path, columns, self._form.units, lines, tuple(notes + why))
+
+    # --- blocks ---
+
+    def _block(self, lines: Sequence[str], first: int) -> None:
+        if not lines:
+            return
+        try:
+            pieces = self._uniform(lines)
+        except ValueError:  # an odd cell: each row is looked at
+            pieces = None
+        if pieces is not None:
+            self._keep(pieces, np.arange(first, first + len(lines)))
+            return
+
+        rows, numbers = self._whole_rows(lines, first)
+        self._keep(self._converted(rows, numbers), np.array(numbers, dtype=np.int64))
+
+    def _uniform(self, lines: Sequence[str]) -> dict[int, Any] | None:
+        """By place what the columns become, where every line is a row without quotes; else None.
+        Raises ValueError where a cell is odd.
+        """
+        separator, width = self._form.separator, self._form.width
+        if any('"' in line or "\0" in line for line in lines):
+            return None
+        if separator != " " and {line.count(separator) for line in lines} != {width - 1}:
+            return None
+
+        pieces = self._plain_numbers(lines)
+        rest = [(at, made) for (_, at), made in self._columns.items() if at not in pieces]
+        if rest:
+            rows = [split(line, separator) for line in lines]
+            if separator == " " and set(map(len, rows)) != {width}:
+                return None
+            pieces |= {at: made.convert([row[at] for row in rows]) for at, made in rest}
+        return pieces
+
+    def _plain_numbers(self, lines: Sequence[str]) -> dict[int, Any]:
+        """Columns of numbers without a gap, the quickest way; none where there are gaps."""
+        separator = self._form.separator
+        if not self._plain or separator == " ":
+            return {}
+        if separator != "," and "," in lines[0]:
+            lines = [line.replace(",", ".") for line in lines]
+        try:
+            values = np.loadtxt(
+                lines,
+                delimiter=separator,
+                usecols=self._plain,
+                comments=None,
+                ndmin=2,
+                max_rows=len(lines),
+            )
+        except ValueError:
+            return {}
+        values[~np.isfinite(values)] = np.nan
+        return {at: values[:, number].copy() for number, at in enumerate(self._plain)}
+
+    # --- rows ---
+
+    def _whole_rows(self, lines: Sequence[str], first: int) -> tuple[Rows, list[int]]:
+        """The rows that have all fields, with their numbers. The others are left out."""
+        rows, numbers = [], []
+        for at, line in joined(lines):
+            fields = _fields(line, self._form.separator)
+            reason = self._reason(line, fields)
+            if reason is None:
+                rows.append(fields)
+                numbers.append(first + at)
+            elif reason:
+                self._left_out.setdefault(reason, []).append(first + at)
+        return rows, numbers
+
+    def _reason(self, line: str, fields: Sequence[str]) -> str | None:
+        """Why a line is no row; '' where nobody needs to know; None of a row."""
+        if not line.strip(" \t\r\n\x1a" + self._form.separator):
+            return ""
+        if "\0" in line:
+            return ZEROS
+        if not fields:
+            return f"a field in quotes of more than {csv.field_size_limit()} characters"
+        if len(fields) < self._needed:
+            comment = line.lstrip().startswith(("#", "%", "//"))
+            return "" if comment else f"fewer than {self._needed} fields"
+        if any(cell.strip() for cell in fields[len(self._form.names) :]):
+            return f"more than {self._form.width} fields"
+        if self._form.header and _stripped(fields) == _stripped(self._form.header):
+            return "the header again"
+        return None
+
+    def _last(self, line: str, number: int, before: Sequence[str], cut: bool) -> None:
+        """The last line, where no end of a line follows: it may be cut in a row or in a number,
+        which is then shorter than any before it.
+        """
+        separator = self._form.separator
+        fields = _fields(line, separator)
+        reason = self._reason(line, fields)
+        others = [_fields(other, separator)[-1:] for other in before[-FIRST:]]
+        ends = [len(end[0].strip()) for end in others if end]
+        short = bool(fields and ends) and len(fields[-1].strip()) < min(ends)
+        try:
+            if reason is None and not cut and not short and len(fields) >= self._form.width:
+                pieces = {at: made.convert([fields[at]]) for (_, at), made in self._columns.items()}
+                self._keep(pieces, np.array([number]))
+                return
+        except (OddCell, TimeFormatError):
+            pass
+        if reason != "":
+            self._left_out.setdefault(ZEROS if "\0" in line else CUT, []).append(number)
+
+    def _converted(self, rows: Rows, numbers: Sequence[int]) -> dict[int, Any]:
+        """By place what the columns become. Raises RigFileError."""
+        pieces = {}
+        for (name, at), made in self._columns.items():
+            try:
+                pieces[at] = made.convert([row[at] for row in rows])
+            except OddCell as error:
+                raise RigFileError(
+                    f"{self._path}: row {numbers[error.at]}: {name[:40]}: {error}; "
+                    "expected a number, or nothing where there is a gap"
+                ) from None
+            except TimeFormatError as error:
+                row = numbers[error.at] if numbers else 0
+                raise RigFileError(f"{self._path}: row {row}: {name[:40]}: {error}") from None
+        return pieces
+
+    def _keep(self, pieces: dict[int, Any], numbers: NDArray[np.int64]) -> None:
+        for (name, at), made in self._columns.items():
+            if isinstance(made, Numbers) and np.any(far := np.abs(pieces[at]) > LARGEST):
+                row = int(numbers[np.argmax(far)])
+                raise RigFileError(
+                    f"{self._path}: row {row}: {name[:40]}: expected a number up to {LARGEST:g}"
+                )
+            made.keep(pieces[at])
+        self._lines.append(numbers)
+        self.rows += numbers.size
+
+    # --- refusals ---
+
+    def _check_size(self, lines: Sequence[str], first: int, text: TextFile) -> None:
+        """Raises RigFileError where the values are more than can be kept, at the first block
+        already where the size of the file tells it.
+        """
+        most, columns = limits().series, len(self._columns)
+        rows = float(self.rows)
+        if len(self._lines) == 1 and not text.packed:
+            rows *= text.size / max(sum(map(len, lines)), 1)
+        if rows * columns > most:
             raise RigFileError(
-                f"{path}: line {number} below the header: found {len(row)} fields; "
-                f"expected {len(names)}"
+                f"{self._path}: found more than {most:g} values in {columns} columns; "
+                f"{raised('series')}; or cut the file into several"
             )
 
-    filled = {at for row in body for at, cell in enumerate(row[: len(names)]) if cell.strip()}
-    named = {
-        at: name or f"column {at + 1}" for at, name in enumerate(names) if name or at in filled
-    }
-    given = list(named.values())
-    if twice := next((name for name in given if given.count(name) > 1), ""):
-        raise RigFileError(
-            f"{path}: found the column {twice!r} twice; expected each column with its own name"
-        )
-    return named
-
-
-def _units(header: Sequence[str], body: Rows, decimal: str) -> dict[str, str] | None:
-    """The row of units below the header, if there is one: words where the next row has numbers."""
-    if len(body) < 2:
-        return None
-    named, below = ([bool(_number(cell, decimal)) for cell in row] for row in body[:2])
-    if any(named) or not any(below):
-        return None
-    cells = zip(header, body[0], strict=False)
-    return {name.strip(): cell.strip(" []()") for name, cell in cells if name.strip()}
-
-
-def _check(path: Path, named: Mapping[int, str], body: Rows, first: int) -> None:
-    """Every row has all fields, and the whole is no more than a log has. Raises RigFileError."""
-    if not body:
-        raise RigFileError(
-            f"{path}: found no rows; expected data under {', '.join(named.values())}"
-        )
-    if len(body) * len(named) > (most := limits().values):
-        raise RigFileError(f"{path}: found more than {most:g} values; {raised('values')}")
-
-    expected = max(named) + 1
-    for number, row in enumerate(body, start=first):
-        if len(row) < expected:
-            raise RigFileError(
-                f"{path}: row {number}: found {len(row)} fields; expected {expected}"
-            )
-
-
-def _column(path: Path, name: str, cells: list[str], decimal: str, first: int) -> Column:
-    """Numbers where every cell is one or empty; words where none is a number. Raises RigFileError
-    where both stand in one column.
-    """
-    matches = [_number(cell, decimal) for cell in cells]
-    odd = [
-        at
-        for at, (cell, match) in enumerate(zip(cells, matches, strict=True))
-        if match is None and not is_gap(cell)
-    ]
-    if odd and not any(matches):
-        return Column(np.full(len(cells), math.nan), cells)
-    if odd:
-        raise RigFileError(
-            f"{path}: row {first + odd[0]}: {name}: found {cells[odd[0]][:40]!r}; "
-            "expected a number, or nothing where there is a gap"
+    def _nothing(self, gone: int) -> RigFileError:
+        if not gone:
+            return RigFileError(f"{self._path}: found no rows; expected data under the header")
+        reason, rows = max(self._left_out.items(), key=lambda item: len(item[1]))
+        return RigFileError(
+            f"{self._path}: found {self.rows} whole rows and {gone} others; {told_rows(rows)}: "
+            f"{reason}; expected a table whose rows are alike"
         )
 
-    values = np.array([math.nan if m is None else float(m) for m in matches])
-    if np.any(np.abs(values) > LARGEST):
-        row = first + int(np.argmax(np.abs(values) > LARGEST))
-        raise RigFileError(f"{path}: row {row}: {name}: expected a number up to {LARGEST:g}")
-    return Column(values, resolution=_last_digit([m for m in matches[:2000] if m]))
 
-
-def _number(cell: str, decimal: str) -> str | None:
-    """The text of a number with a decimal point, or None."""
-    text = cell.strip()
-    if decimal == ",":
-        text = text.replace(",", ".")
-    return text if NUMBER.fullmatch(text) else None
-
-
-def _last_digit(texts: Sequence[str]) -> float:
-    """The finest digit that any of the numbers writes; 0 where there is none."""
-    places = [_place(text) for text in texts]
-    return 10.0 ** min(places) if places else 0.0
-
-
-def _place(text: str) -> int:
-    mantissa, _, exponent = text.lower().partition("e")
-    return int(exponent or 0) - len(mantissa.partition(".")[2])
+def _stripped(fields: Sequence[str]) -> list[str]:
+    return [cell.strip() for cell in fields if cell.strip()]

@@ -21,6 +21,7 @@ from gritd.tools.importers.series.columns import (
     SHOWN,
     Column,
     SeriesTable,
+    Told,
     Wanted,
     shortened,
 )
@@ -60,12 +61,19 @@ class Part:
     shift: float
 
 
-def read(path: Path, wanted: Wanted = EVERYTHING) -> list[SeriesTable]:
-    """The tables of one file, by what it is. Raises RigFileError."""
+def read(
+    path: Path,
+    wanted: Wanted = EVERYTHING,
+    columns: Mapping[str, Mapped] | None = None,
+    told: Told | None = None,
+) -> list[SeriesTable]:
+    """The tables of one file, by what it is; `columns` is what the map says of those of a text.
+    Raises RigFileError.
+    """
     if not path.exists():
         raise RigFileError(f"{path}: found nothing there; expected a file", USAGE)
     tables = registry.read(path, wanted)
-    return [csv_text.read(path)] if tables is None else tables
+    return [csv_text.read(path, columns, wanted.rows, told)] if tables is None else tables
 
 
 def stem(name: str) -> str:
@@ -148,9 +156,9 @@ def _complete(run: str, own: Mapping[str, Path], sources: Sequence[MapSource]) -
 # --- what is used of a file ---
 
 
-def parts(path: Path, source: MapSource, mapped: SeriesMap) -> list[Part]:
+def parts(path: Path, source: MapSource, mapped: SeriesMap, told: Told | None = None) -> list[Part]:
     """The columns that a map names of a file, those of one clock together. Raises RigFileError."""
-    tables = read(path, Wanted(frozenset(source.columns)))
+    tables = read(path, Wanted(frozenset(source.columns)), source.columns, told)
     places = {name: _place(path, tables, name) for name in source.columns}
 
     alike: dict[tuple[int, tuple[str, ...], float | None], list[str]] = {}

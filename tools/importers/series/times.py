@@ -256,7 +256,7 @@ def of_texts(words: Sequence[str], unit: int) -> Nanoseconds:
 
 
 def _exact(word: str, unit: int, at: int) -> int:
-    text = word.strip().replace(",", ".")
+    text = word.strip().translate(FOREIGN)
     if is_gap(text):
         return int(NONE)
 
@@ -300,6 +300,10 @@ def of_numbers(values: Array | Nanoseconds, unit: int) -> Nanoseconds:
 
 
 # --- gaps ---
+
+FOREIGN = str.maketrans(
+    {",": ".", "\N{MINUS SIGN}": "-", "D": "E", "d": "e"}
+)  # 1,5 or Fortran's 1.0D+3
 
 GAPS = frozenset(["nan", "na", "n/a", "null", "none", "nil", "nat", "-", "--", "inf", "infinity"])
 

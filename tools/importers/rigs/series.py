@@ -84,7 +84,7 @@ def _read(files: Sequence[RunFiles], mapped: SeriesMap) -> list[SeriesRun]:
 
 def _shares(progress: Progress, paths: Sequence[Path]) -> Iterator[Told]:
     """For each file what takes the bytes of it that were read."""
-    sizes = [path.stat().st_size if path.is_file() else 1 for path in paths]
+    sizes = [path.stat().st_size + 1 if path.is_file() else 1 for path in paths]
     for at, path in enumerate(paths):
         before = sum(sizes[:at])
         progress.at(path.name, before / sum(sizes))

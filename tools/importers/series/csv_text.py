@@ -38,15 +38,16 @@ def read(
     so many are enough. Raises RigFileError.
     """
     with text_file(path) as text:
-        head = [line for _, line in joined(_head(text))]
+        head = _head(text)
         if not head:
             found = f"cannot be read: {text.cut}" if text.cut else "found nothing in it"
             raise RigFileError(f"{path}: {found}; expected a table")
 
-        form = layout(path, head, columns or ())
-        table = _Table(path, form, _builders(form, head, columns))
-        lines = head[form.start :]
-        first = 1 + sum(line.count("\n") for line in head[: form.start])
+        rows_of = list(joined(head))
+        form = layout(path, [line for _, line in rows_of], columns or ())
+        begin = rows_of[form.start][0]
+        table = _Table(path, form, _builders(form, head[begin:], columns))
+        lines, first = head[begin:], begin + 1
         while lines and (rows is None or table.rows < rows):
             few = lines[: _enough(rows, form)]
             table.add(few, first, text)
@@ -70,12 +71,12 @@ def _head(text: TextFile) -> list[str]:
 
 
 def _builders(
-    form: Layout, head: Sequence[str], columns: Mapping[str, Mapped] | None
+    form: Layout, lines: Sequence[str], columns: Mapping[str, Mapped] | None
 ) -> dict[tuple[str, int], Builder]:
     """What becomes of each column, by its name and place; one whose name stands there twice is read
     twice.
     """
-    first = _first(form, head)
+    first = _first(form, lines)
     if columns is None:
         return {(name, at): Loose(first[at]) for name, at in _all(form, first)}
 
@@ -90,10 +91,10 @@ def _builders(
     return made
 
 
-def _first(form: Layout, head: Sequence[str]) -> list[tuple[str, ...]]:
+def _first(form: Layout, lines: Sequence[str]) -> list[tuple[str, ...]]:
     """Some cells of every column."""
     rows: Rows = []
-    for line in head[form.start : form.start + FIRST]:
+    for line in lines[:FIRST]:
         fields = _fields(line, form.separator)
         if len(fields) == form.width:
             rows.append(fields)

@@ -20,6 +20,7 @@ SEPARATORS = ("\t", ";", ",", " ")  # the last: any number of blanks and tabs
 COMMENT = re.compile(r"\s*(?:[#%]+|//)\s*")
 LAST = 20  # rows at the end of the beginning that tell how the table is written
 SHARE = 0.6  # of these with the usual number of fields
+GAP = 0.9  # what a gap in words counts, beside a value
 CELLS = 100_000  # that are looked at for it
 FARTHEST = 500  # lines above the rows in which the names of the map are looked for
 JOINED = 20  # lines of one row, whose quotes may hold ends of lines
@@ -151,7 +152,7 @@ def _separator(path: Path, lines: Sequence[str]) -> tuple[str, Rows]:
             continue
         rows = [row for row in rows if len(row) == width][-max(CELLS // width, 3) :]
         cells = [cell for row in rows for cell in row[:1000]]
-        found.append((sum(map(is_value, cells)) / len(cells), separator, rows))
+        found.append((sum(map(_sense, cells)) / len(cells), separator, rows))
 
     if not found:
         raise RigFileError(
@@ -160,6 +161,11 @@ def _separator(path: Path, lines: Sequence[str]) -> tuple[str, Rows]:
         )
     _, separator, rows = max(found, key=lambda each: each[0])
     return separator, rows
+
+
+def _sense(cell: str) -> float:
+    """How well a cell is a field of a table of numbers: less well for a gap in words."""
+    return 1.0 if is_value(cell) else GAP * bool(cell and is_gap(cell))
 
 
 # --- rows ---

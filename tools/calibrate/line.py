@@ -22,10 +22,12 @@ class Point:
 
     raw:   the mean of the readings, with its standard deviation.
     known: SI, with the standard deviation of what it was set by.
+    notes: what is to be told of the readings.
     """
 
     raw: Uncertain
     known: Uncertain
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def fitted(points: Sequence[Point]) -> Line:
     warnings = _warnings(known, raw, sigma, excess)
     if abs(slope) < FLAT * spread[1]:
         warnings.insert(0, "the readings do not follow the known values")
+
+    warnings += dict.fromkeys(note for point in points for note in point.notes)
 
     return Line(
         tuple(points),

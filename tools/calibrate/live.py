@@ -13,11 +13,12 @@ import numpy as np
 from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
 from gritd.estimator.config.settings import Settings, Uncertain
-from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.readings import CHANNELS, NS, Reading
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.calibrate import spikes
 from gritd.tools.calibrate.line import Point
-from gritd.tools.calibrate.plateaus import mean_of
-from gritd.tools.calibrate.sources import Signal
+from gritd.tools.calibrate.plateaus import Plateau, creep_of, mean_of
+from gritd.tools.calibrate.sources import Signal, points_of
 from gritd.tools.cli.command import FAILED, CommandError
 from gritd.tools.cli.terminal import LiveLine
 
@@ -40,7 +41,9 @@ class Live:
     def points(self, signal: Signal, known: Sequence[Uncertain]) -> list[Point]:
         """Raises CommandError where the sensor says nothing."""
         with reading(self.settings) as drain:
-            return [Point(self._one(drain, signal, value), value) for value in known]
+            read = [self._one(drain, signal, value) for value in known]
+        spiky = next((line for _, line in read if line), "")
+        return points_of([one for one, _ in read], known, signal, spiky)
 
     def touches(self, signal: Signal, count: int) -> list[float]:
         """Readings at so many touches of the surface."""
@@ -48,22 +51,29 @@ class Live:
             read = []
             for number in range(1, count + 1):
                 self.ask(f"touch {number} of {count}: lower the wheel until it just touches")
-                read.append(mean_of(self._read(drain, signal)).value)
+                read.append(mean_of(self._read(drain, signal)[1]).value)
             return read
 
-    def _one(self, drain: Drain, signal: Signal, known: Uncertain) -> Uncertain:
+    def _one(self, drain: Drain, signal: Signal, known: Uncertain) -> tuple[Plateau, str]:
+        """What is read at one value, and a line on its spikes."""
         self.ask(f"set {known.value / self.factor:g} {self.shown}")
-        return mean_of(self._read(drain, signal))
+        seconds, values, told = self._read(drain, signal)
+        creeps = creep_of(seconds, values)
+        return Plateau(float(seconds[0]), float(seconds[-1]), mean_of(values), creeps), told
 
-    def _read(self, drain: Drain, signal: Signal) -> Array:
-        """Raw values of some seconds, beginning now; shows what it sees."""
+    def _read(self, drain: Drain, signal: Signal) -> tuple[Array, Array, str]:
+        """Times [s] and raw values of some seconds, beginning now, without spikes, and a line on
+        these; shows what it sees.
+        """
         drain()
-        line, values = LiveLine(sys.stderr), list[float]()
+        line, values, stamps = LiveLine(sys.stderr), list[float](), list[int]()
         begin = last = time.monotonic()
 
         while (now := time.monotonic()) - begin < self.seconds or not values:
             time.sleep(0.02)
-            values += [_value(r, signal) for r in drain() if r.channel == signal.channel]
+            own = [r for r in drain() if r.channel == signal.channel]
+            values += [_value(r, signal) for r in own]
+            stamps += [r.stamp for r in own]
 
             if not values and now - begin > PATIENCE:
                 raise CommandError(
@@ -79,7 +89,10 @@ class Live:
                 )
 
         line.clear()
-        return np.array(values)
+        read = np.array(values)
+        found = spikes.spikes(read)
+        told = spikes.told(found, signal.channel)
+        return np.array(stamps)[~found] / NS, read[~found], told
 
 
 def _value(reading: Reading, signal: Signal) -> float:

@@ -20,11 +20,14 @@ PARTS = 10  # of a plateau, whose means tell how uncertain its mean is
 
 @dataclass(frozen=True)
 class Plateau:
-    """One stretch: begin and end [s], mean with the standard deviation of the mean."""
+    """One stretch: begin and end [s], mean with the standard deviation of the mean, and how fast it
+    creeps [1/s].
+    """
 
     begin: float
     end: float
     mean: Uncertain
+    creep: Uncertain
 
 
 def mean_of(values: Array) -> Uncertain:
@@ -39,10 +42,28 @@ def mean_of(values: Array) -> Uncertain:
     return Uncertain(float(values.mean()), max(float(parts.std(ddof=1)) / np.sqrt(PARTS), single))
 
 
+def creep_of(seconds: Array, values: Array) -> Uncertain:
+    """Slope of readings (n,) over time [1/s], with its standard deviation from the means of PARTS;
+    infinite for few.
+    """
+    if values.size < 2 * PARTS or np.ptp(seconds) == 0.0:
+        return Uncertain(0.0, float("inf"))
+    time, mean = (
+        np.array([part.mean() for part in np.array_split(one, PARTS)]) for one in (seconds, values)
+    )
+    time = time - time.mean()
+    slope = float(time @ mean / (time @ time))
+    left = mean - mean.mean() - slope * time
+    scatter = float(np.sqrt(left @ left / (PARTS - 2)))
+    return Uncertain(slope, scatter / float(np.sqrt(time @ time)))
+
+
 def between(seconds: Array, values: Array, begin: float, end: float) -> Plateau | None:
     """The readings (n,) from `begin` to `end` [s]; None where there are fewer than ten."""
     inside = (seconds >= begin) & (seconds <= end)
-    return Plateau(begin, end, mean_of(values[inside])) if inside.sum() >= 10 else None
+    if inside.sum() < 10:
+        return None
+    return Plateau(begin, end, mean_of(values[inside]), creep_of(seconds[inside], values[inside]))
 
 
 def plateaus(seconds: Array, values: Array) -> list[Plateau]:

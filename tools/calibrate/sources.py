@@ -14,6 +14,7 @@ from gritd.estimator.config import units
 from gritd.estimator.config.settings import Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.calibrate import creep, spikes
 from gritd.tools.calibrate.line import Point
 from gritd.tools.calibrate.plateaus import Plateau, between, plateaus
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
@@ -50,7 +51,7 @@ class Recorded:
     steps: tuple[tuple[float, float], ...] = ()
 
     def points(self, signal: Signal, known: Sequence[Uncertain]) -> list[Point]:
-        seconds, values = series(recording(self.path), signal)
+        seconds, values, spiky = series(recording(self.path), signal)
         stretches = self._chosen(seconds, values) if self.steps else plateaus(seconds, values)
 
         if len(stretches) != len(known):
@@ -62,7 +63,7 @@ class Recorded:
                 DAMAGED,
             )
 
-        return [Point(p.mean, value) for p, value in zip(stretches, known, strict=True)]
+        return points_of(stretches, known, signal, spiky, f"{self.path}: ")
 
     def _chosen(self, seconds: Array, values: Array) -> list[Plateau]:
         stretches = []
@@ -80,8 +81,22 @@ class Recorded:
         return stretches
 
 
-def series(recorded: Recording, signal: Signal) -> tuple[Array, Array]:
-    """Seconds from the first reading, and raw values, both (n,). Raises CommandError."""
+def points_of(
+    stretches: Sequence[Plateau],
+    known: Sequence[Uncertain],
+    signal: Signal,
+    spiky: str,
+    where: str = "",
+) -> list[Point]:
+    """What was read while known values stood. Raises CommandError where the readings creep."""
+    notes = tuple(filter(None, (spiky, creep.checked(stretches, signal.channel, where))))
+    return [Point(p.mean, value, notes) for p, value in zip(stretches, known, strict=True)]
+
+
+def series(recorded: Recording, signal: Signal) -> tuple[Array, Array, str]:
+    """Seconds from the first reading and raw values, both (n,), without single spikes, and a line
+    about these. Raises CommandError.
+    """
     rows = recorded.arrays(f"/raw/{signal.channel}")
     if rows.size < 10:
         raise CommandError(
@@ -90,7 +105,10 @@ def series(recorded: Recording, signal: Signal) -> tuple[Array, Array]:
             DAMAGED,
         )
     rows = rows[np.argsort(rows["stamp"], kind="stable")]
-    return (rows["stamp"] - rows["stamp"][0]) * 1e-9, rows[signal.field].astype(float)
+    seconds, values = (rows["stamp"] - rows["stamp"][0]) * 1e-9, rows[signal.field].astype(float)
+    found = spikes.spikes(values)
+    told = spikes.told(found, signal.channel, f"{recorded.path}: ")
+    return seconds[~found], values[~found], told
 
 
 def start_of(recorded: Recording, signal: Signal) -> float:

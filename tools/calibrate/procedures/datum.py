@@ -26,8 +26,8 @@ def touches(recorded: Recording, settings: Settings, contact: float) -> list[flo
     the line through the readings before it. Raises CommandError.
     """
     assert settings.wrench is not None
-    pot_time, pot = series(recorded, POT)
-    time, force = series(recorded, FORCE)
+    pot_time, pot, _ = series(recorded, POT)
+    time, force, _ = series(recorded, FORCE)
     start = start_of(recorded, FORCE) - start_of(recorded, POT)
     known = settings.wrench.load
     load = force * known.scale.value + known.offset.value

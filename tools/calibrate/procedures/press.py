@@ -20,8 +20,8 @@ def read(recorded: Recording, settings: Settings, radius: float, contact: float)
     where the load last was below `contact` [N]; radius of the plate [m]. Raises CommandError.
     """
     assert settings.wrench is not None
-    time, volts = series(recorded, POT)
-    at, force = series(recorded, FORCE)
+    time, volts, _ = series(recorded, POT)
+    at, force, _ = series(recorded, FORCE)
     at = at + start_of(recorded, FORCE) - start_of(recorded, POT)
     known = settings.wrench.load
     load = np.interp(time, at, force) * known.scale.value + known.offset.value

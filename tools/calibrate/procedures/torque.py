@@ -12,9 +12,10 @@ import numpy as np
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.calibrate import creep
 from gritd.tools.calibrate.line import Point, fitted
 from gritd.tools.calibrate.outcome import Calibrated, Outcome, residual_table
-from gritd.tools.calibrate.plateaus import mean_of, plateaus
+from gritd.tools.calibrate.plateaus import between, mean_of, plateaus
 from gritd.tools.calibrate.sources import Signal, Source, series, start_of
 from gritd.tools.cli.command import DAMAGED, CommandError
 
@@ -68,7 +69,7 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
     """K I = T_C sign ω + B ω + K I₀ over steady speeds both ways, of a wheel without load. Raises
     CommandError.
     """
-    spins = _spins(recorded, settings)
+    spins, notes = _spins(recorded, settings)
     speed = np.array([spin.speed for spin in spins])
     if len(spins) < SPEEDS or not (speed > 0).any() or not (speed < 0).any():
         raise CommandError(
@@ -92,7 +93,7 @@ def by_spinning(recorded: Recording, settings: Settings) -> Outcome:
         ),
         Calibrated(("channels", "motor_shunt", "offset"), offset, "A", "A"),
     )
-    warnings = []
+    warnings = list(notes)
     if excess > 3.0:
         warnings.append(f"the speeds scatter {excess:.1f} times more than noise explains")
     if min(values[:2]) < 0.0:
@@ -123,25 +124,28 @@ def _weighted(design: Array, values: Array, sigma: Array) -> tuple[Array, Array,
     return coefficients, np.sqrt(np.diag(covariance)) * max(excess, 1.0), excess
 
 
-def _spins(recorded: Recording, settings: Settings) -> list[Spin]:
-    """Stretches of steady speed, without those at rest."""
+def _spins(recorded: Recording, settings: Settings) -> tuple[list[Spin], list[str]]:
+    """Stretches of steady speed, without those at rest, and what is to be told of the current.
+    Raises CommandError where it creeps.
+    """
     time, speed = _speed(recorded, settings)
     start = _offset(recorded, SHUNT, WHEEL)
-    at, current = _current(recorded, settings)
-    at = at + start
+    at, current, spiky = _current(recorded, settings)
+    at, constant = at + start, settings.drive.torque_constant.value
 
-    spins = []
+    spins, held = [], []
     for one in plateaus(time, speed):
-        inside = (at >= one.begin) & (at <= one.end)
-        if inside.sum() >= 10 and abs(one.mean.value) > STILL * np.abs(speed).max():
-            torque = mean_of(settings.drive.torque_constant.value * current[inside])
-            spins.append(Spin(one.mean.value, torque))
-    return spins
+        steady = between(at, constant * current, one.begin, one.end)
+        if steady and abs(one.mean.value) > STILL * np.abs(speed).max():
+            spins.append(Spin(one.mean.value, steady.mean))
+            held.append(steady)
+    creeping = creep.checked(held, SHUNT.channel, f"{recorded.path}: ")
+    return spins, [line for line in (spiky, creeping) if line]
 
 
 def _speed(recorded: Recording, settings: Settings) -> tuple[Array, Array]:
     """Speed of the wheel [rad/s] in steps of 0.1 s, from the counts at their ends."""
-    time, count = series(recorded, WHEEL)
+    time, count, _ = series(recorded, WHEEL)
     grid = np.arange(time[0], time[-1], 0.1)
     angle = (
         np.interp(grid, time, count) * settings.channels["wheel_encoder"].calibration.scale.value
@@ -149,10 +153,11 @@ def _speed(recorded: Recording, settings: Settings) -> tuple[Array, Array]:
     return 0.5 * (grid[1:] + grid[:-1]), np.diff(angle) / 0.1
 
 
-def _current(recorded: Recording, settings: Settings) -> tuple[Array, Array]:
-    time, volts = series(recorded, SHUNT)
+def _current(recorded: Recording, settings: Settings) -> tuple[Array, Array, str]:
+    """Seconds, amperes, and a line on spikes."""
+    time, volts, spiky = series(recorded, SHUNT)
     known = settings.channels["motor_shunt"].calibration
-    return time, volts * known.scale.value + known.offset.value
+    return time, volts * known.scale.value + known.offset.value, spiky
 
 
 def _offset(recorded: Recording, signal: Signal, other: Signal) -> float:
@@ -167,18 +172,19 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
     """T of the sensor over the motor's current while the wheel drives one way; losses that do not
     change with the torque are in the offset. Raises CommandError.
     """
-    at, current = _current(recorded, settings)
-    time, torque = series(recorded, AXLE)
+    at, current, spiky = _current(recorded, settings)
+    time, torque, twitchy = series(recorded, AXLE)
     time = time + _offset(recorded, AXLE, SHUNT)
     assert settings.wrench is not None
     torque = torque * settings.wrench.torque.scale.value
     turning = _turning(recorded, settings)
 
-    points = []
+    points, instants = [], []
     for begin in np.arange(time[0], time[-1] - BLOCK, BLOCK):
         one, other = (_inside(t, v, begin) for t, v in ((at, current), (time, torque)))
         if one is not None and other is not None and turning(begin) and turning(begin + BLOCK):
             points.append(Point(mean_of(one), mean_of(other)))
+            instants.append(begin)
     if len(points) < SPEEDS:
         raise CommandError(
             f"{recorded.path}: found {len(points)} s of driving with current and torque; "
@@ -186,7 +192,9 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
             DAMAGED,
         )
 
+    points, creeping = _without_creep(points, instants)
     line = fitted(points)
+    notes = [note for note in (spiky, twitchy, creeping) if note]
     relative = settings.wrench.torque.scale
     spread = float(
         np.hypot(line.scale.sigma, line.scale.value * relative.sigma / abs(relative.value))
@@ -200,8 +208,34 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
     return Outcome(
         (Calibrated(CONSTANT, Uncertain(line.scale.value, spread), "N*m/A"),),
         lines=rows,
-        warnings=line.warnings,
+        warnings=(*line.warnings, *notes),
         fits=(("drive.torque_constant", line),),
+    )
+
+
+def _without_creep(points: Sequence[Point], instants: Sequence[float]) -> tuple[list[Point], str]:
+    """The points (current, torque) without a torque that creeps with time, and a line on it; as
+    they are where it does not matter.
+    """
+    current, torque = (np.array([getattr(p, n).value for p in points]) for n in ("raw", "known"))
+    time = np.array(instants) - np.mean(instants)
+    design = np.column_stack([np.ones_like(current), current, time])
+    found, left, rank, _ = np.linalg.lstsq(design, torque, rcond=None)
+    freedom = torque.size - 3
+    if rank < 3 or freedom < SPEEDS:
+        return list(points), ""
+
+    variance = float(left[0]) / freedom * np.linalg.inv(design.T @ design)[2, 2]
+    part = abs(found[2]) * np.ptp(time) / np.ptp(torque)
+    if abs(found[2]) <= creep.SURE * np.sqrt(variance) or part <= creep.HARM:
+        return list(points), ""
+    taken_out = [
+        replace(p, known=replace(p.known, value=p.known.value - found[2] * t))
+        for p, t in zip(points, time.tolist(), strict=True)
+    ]
+    return taken_out, (
+        f"current or torque sensor creep by {found[2]:.2g} N*m a second, {100 * part:.1f} % of the "
+        "torques in this run; that is taken out"
     )
 
 

@@ -88,7 +88,7 @@ def _row(run: Driven, settings: Settings) -> tuple[str, ...]:
         f"{clock.duration:.1f}",
         str(clock.gaps),
         _range(course.slip),
-        f"{run.slip_sigma:.3f} {run.window:.3g} s" if isfinite(run.slip_sigma) else DASH,
+        f"{run.slip_sigma:.3f} {round(run.window, 2):g} s" if isfinite(run.slip_sigma) else DASH,
         _range(course.sinkage[driving] / radius),
         _range(course.load[driving], 1),
         DASH if run.stated_load is None else f"{run.stated_load:g}",

@@ -12,7 +12,6 @@ from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.commands.import_rig import main
 from gritd.tools.importers.series import csv_text
-from gritd.tools.importers.series.guess import guessed
 from gritd.tools.importers.series.noise import scatter
 
 MAP = """
@@ -298,53 +297,6 @@ def test_the_scatter_of_a_column_is_its_noise(sigma: float) -> None:
     values[rng.random(t.size) < 0.1] = np.nan
     assert scatter(t, values, 1e-6) == pytest.approx(sigma, rel=0.06)
     assert scatter(t, np.full(t.size, 2.0), 0.1) == pytest.approx(0.1 / 12**0.5)
-
-
-# --- the proposal ---
-
-HEADERS = {
-    "Time [s]": "time",
-    "wheel_rpm": "wheel_speed",
-    "Rim speed (mm/s)": "rim_speed",
-    "theta_wheel_deg": "wheel_angle",
-    "carriage_pos_mm": "carriage_position",
-    "CartSpeed_mm/s": "carriage_speed",
-    "Drawbar Pull [N]": "drawbar_pull",
-    "Fz_N": "load",
-    "sinkage(mm)": "sinkage",
-    "motor current [mA]": "current",
-    "wheel_torque_Nm": "torque",
-    "trial": "run",
-    "humidity": None,
-    "cart_mm_s": "carriage_speed, unit: mm/s",
-    "omega_rad_per_s": "wheel_speed, unit: rad/s",
-}
-
-
-@pytest.mark.parametrize("header", HEADERS)
-def test_the_name_of_a_column_proposes_its_channel(tmp_path: Path, header: str) -> None:
-    rows = "".join(f"{1 + 0.1 * at:.1f},7\n" for at in range(20))
-    (tmp_path / "x.csv").write_text(f"{header},other\n{rows}")
-    text = guessed([csv_text.read(tmp_path / "x.csv")])
-    line = next(line for line in text.splitlines() if header in line)
-    expected = HEADERS[header]
-    assert f"channel: {expected}" in line if expected else line.strip().startswith("#")
-
-
-def test_a_proposal_is_a_map_that_imports(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = [f"{x / 50:.2f},{10 + x % 2},{60 + x % 3},{-3 - x % 5 / 10},50" for x in range(200)]
-    header = "time_s,wheel speed [rpm],carriage_v_mm/s,torque (Nm),load_N"
-    (tmp_path / "run.csv").write_text("\n".join([header, *rows]))
-    assert main(["csv", str(tmp_path / "run.csv"), "--guess"]) == 0
-    text = capsys.readouterr().out
-    assert "torque, unit: N*m, factor: -1" in text and "nominal_load, unit: N" in text
-
-    output = imported(
-        tmp_path, tmp_path / "run.csv", text=f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n"
-    )
-    assert read(output / "run.mcap").run.nominal_load == 50.0
 
 
 def test_a_stamp_keeps_its_nanoseconds(tmp_path: Path) -> None:

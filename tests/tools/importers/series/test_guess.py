@@ -1,0 +1,241 @@
+"""What `--guess` proposes for the headers of public logs, what it asks, and that every answer is a
+map that can be imported.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gritd.tools.commands.import_rig import main
+from gritd.tools.importers.series import csv_text
+from gritd.tools.importers.series.guess import guessed
+from gritd.tools.importers.series.sources import read
+from tests.tools.importers.series import headers
+
+LINE = re.compile(
+    r"^  (?P<off># )?(?P<name>'[^']*'|[A-Za-z_]\w*): \{channel: (?P<channel>\w+)", re.M
+)
+ASKED = re.compile(r"^  # \? (?P<name>'[^']*'|[A-Za-z_]\w*): ", re.M)
+ROWS = 60
+
+
+def cells(name: str, number: int) -> list[str]:
+    """Values that a column of such a name may hold, rising a little and scattered."""
+    rng, t = np.random.default_rng(number), 0.02 * np.arange(ROWS)
+    if "iso" in name:
+        return [f"2026-11-26T14:03:{x + 5:09.6f}" for x in t]
+    if re.search(r"(?i)\b(time|zeit|t|temps|tiempo|tempo)\b|时间|時間|prüfzeit|timestamp", name):
+        return [f"{1e3 * x if 'ms' in name else x:.3f}" for x in t]
+    if "ms" in re.split(r"[_(]", name):
+        return [f"{1e3 * x:.0f}" for x in t]
+    if "encoder" in name:
+        return [str(round(1000 * x)) for x in t]
+    return [f"{v:.4f}" for v in 3.0 + number + 2.0 * t + 0.05 * rng.standard_normal(ROWS)]
+
+
+def written(folder: Path, names: list[str], separator: str = "\t") -> Path:
+    columns = [cells(name, number) for number, name in enumerate(names)]
+    rows = [separator.join(names), *map(separator.join, zip(*columns, strict=True))]
+    path = folder / "run.txt"
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def proposed(path: Path) -> tuple[str, dict[str, set[str]], set[str]]:
+    """The text; the channels of the lines of each column; the columns that are asked about."""
+    text = guessed([csv_text.read(path)])
+    channels: dict[str, set[str]] = {}
+    asked = {match["name"].strip("'") for match in ASKED.finditer(text)}
+    for match in LINE.finditer(text):
+        name = match["name"].strip("'")
+        if not match["off"] or name in asked:
+            channels.setdefault(name, set()).add(match["channel"])
+    return text, channels, asked | set(re.findall(r"^  '?([^'\n]*?)'?: \{.*# \?", text, re.M))
+
+
+def test_there_are_forty() -> None:
+    assert len(headers.ALL) >= 40
+
+
+@pytest.mark.parametrize("header", headers.ALL)
+def test_the_names_of_public_logs_propose_their_channels(tmp_path: Path, header: str) -> None:
+    expected = headers.ALL[header]
+    _, channels, asked = proposed(written(tmp_path, list(expected)))
+    for name, channel in expected.items():
+        found = channels.get(name, set())
+        if channel.endswith("?"):
+            assert name in asked or not found, (name, found)
+        elif not channel:
+            assert found <= {"wheel_speed", "carriage_speed"} or name in asked, (name, found)
+        else:
+            assert channel in found, (name, found)
+
+
+UNITS_AND_NAMES = {
+    "Time [s]": "time",
+    "wheel_rpm": "wheel_speed",
+    "Rim speed (mm/s)": "rim_speed",
+    "theta_wheel_deg": "wheel_angle",
+    "carriage_pos_mm": "carriage_position",
+    "CartSpeed_mm/s": "carriage_speed",
+    "Drawbar Pull [N]": "drawbar_pull",
+    "Fz_N": "load",
+    "sinkage(mm)": "sinkage",
+    "motor current [mA]": "current",
+    "wheel_torque_Nm": "torque",
+    "humidity": None,
+    "cart_mm_s": "carriage_speed, unit: mm/s",
+    "omega_rad_per_s": "wheel_speed, unit: rad/s",
+}
+
+
+@pytest.mark.parametrize("header", UNITS_AND_NAMES)
+def test_names_and_units_in_one_word(tmp_path: Path, header: str) -> None:
+    rows = "".join(f"{1 + 0.1 * at:.1f},7\n" for at in range(20))
+    (tmp_path / "x.csv").write_text(f"{header},other\n{rows}")
+    text = guessed([csv_text.read(tmp_path / "x.csv")])
+    line = next(line for line in text.splitlines() if header in line)
+    expected = UNITS_AND_NAMES[header]
+    assert f"channel: {expected}" in line if expected else line.strip().startswith("#")
+
+
+# --- what is proposed can be imported ---
+
+
+def answers(text: str) -> Iterator[str]:
+    """The text as it stands, and with each line of each question in its place."""
+    lines = text.splitlines()
+    for at, line in enumerate(lines):
+        choice = LINE.match(line)
+        if choice and choice["off"]:
+            yield "\n".join([*lines[:at], "  " + line[4:], *lines[at + 1 :]])
+    yield text
+
+
+@pytest.mark.parametrize("header", ["German", "French", "Chinese", "Japanese"])
+def test_every_answer_is_a_map_that_imports(tmp_path: Path, header: str) -> None:
+    path = written(tmp_path, list(headers.LANGUAGES[header]))
+    text, _, _ = proposed(path)
+    for number, answer in enumerate(answers(text)):
+        (tmp_path / "map.yaml").write_text(f"{answer}\nwheel: {{radius: 72 mm, width: 71 mm}}\n")
+        out = tmp_path / str(number)
+        assert main(["csv", str(path), "--map", f"{tmp_path}/map.yaml", "-o", str(out)]) == 0
+
+
+def test_imposed_speeds_and_a_column_of_runs_import(tmp_path: Path) -> None:
+    rows = [
+        f"{x / 50:.2f},10,60,{3 + x % 5 / 10},{40 + x // 100 * 30},{x // 100}" for x in range(200)
+    ]
+    header = "time_s,wheel speed [rpm],carriage_v_mm/s,wheel torque (Nm),weights [N],trial"
+    (tmp_path / "run.csv").write_text("\n".join([header, *rows]))
+    text = guessed([csv_text.read(tmp_path / "run.csv")])
+    (tmp_path / "map.yaml").write_text(f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n")
+    named = [str(tmp_path / "run.csv"), "--map", str(tmp_path / "map.yaml")]
+    assert main(["csv", *named, "-o", str(tmp_path / "out")]) == 0
+    assert {path.stem for path in (tmp_path / "out").glob("*.mcap")} == {"0", "1"}
+
+
+def test_an_imposed_speed_without_digits_gets_a_noise(tmp_path: Path) -> None:
+    """A file of binary numbers does not tell how well a speed is known that never changes."""
+    from scipy.io import savemat
+
+    t = np.arange(0.0, 4.0, 0.02)
+    torque = 3.0 + 0.1 * np.random.default_rng(1).standard_normal(t.size)
+    same = {"wheel_rpm": np.full(t.size, 12.3), "cart_mm_s": np.full(t.size, 61.7)}
+    savemat(tmp_path / "run.mat", {"time": t, "wheel_torque": torque, **same})
+    text = guessed(read(tmp_path / "run.mat"))
+    (tmp_path / "map.yaml").write_text(f"{text}\nwheel: {{radius: 72 mm, width: 71 mm}}\n")
+    named = [str(tmp_path / "run.mat"), "--map", str(tmp_path / "map.yaml")]
+    assert main(["csv", *named, "-o", str(tmp_path / "out")]) == 0
+
+
+# --- what is asked, and what is seen without a name ---
+
+
+def guess_of(folder: Path, columns: dict[str, list[float] | list[str]]) -> str:
+    shown = [[x if isinstance(x, str) else f"{x:g}" for x in c] for c in columns.values()]
+    rows = [",".join(columns), *map(",".join, zip(*shown, strict=True))]
+    (folder / "run.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return guessed([csv_text.read(folder / "run.csv")])
+
+
+RISING = [0.02 * x for x in range(50)]
+NOISE = [3.0 + 0.1 * (x * 7 % 5) for x in range(50)]
+
+
+def test_a_column_that_rises_evenly_is_time(tmp_path: Path) -> None:
+    text = guess_of(tmp_path, {"qx": RISING, "wheel": NOISE})
+    assert re.search(r"^  qx: \{channel: time, unit: s\}", text, re.M)
+
+
+def test_the_number_of_a_row_is_no_time_and_the_rate_is_asked(tmp_path: Path) -> None:
+    text = guess_of(tmp_path, {"qx": list(range(50)), "wheel": NOISE})
+    assert "channel: time" not in text and re.search(r"^# \? rate:", text, re.M)
+
+
+def test_a_unit_of_time_that_nothing_tells_is_asked(tmp_path: Path) -> None:
+    text = guess_of(tmp_path, {"t": list(range(50)), "wheel": NOISE})
+    assert not re.search(r"^  t:", text, re.M)
+    assert {"s", "ms"} <= set(re.findall(r"^  # t: \{channel: time, unit: (\w+)\}", text, re.M))
+    assert "unit: ms}" in guess_of(tmp_path, {"t": [20.0 * x for x in range(50)], "wheel": NOISE})
+
+
+@pytest.mark.parametrize(
+    ("first", "unit"),
+    [(1.795e9, "s"), (1.795e12, "ms")],
+)
+def test_a_time_since_1970_tells_its_unit(tmp_path: Path, first: float, unit: str) -> None:
+    step = 0.02 * first / 1.795e9
+    text = guess_of(tmp_path, {"stamp": [f"{first + step * x:.6f}" for x in range(50)], "v": NOISE})
+    assert f"channel: time, unit: {unit}}}" in text
+
+
+def test_dates_that_can_be_read_are_proposed_and_others_are_not(tmp_path: Path) -> None:
+    good = [f"2026/11/26/14:03:{x / 50 + 5:09.6f}" for x in range(50)]
+    assert "time: {channel: time, unit: clock}" in guess_of(tmp_path, {"time": good, "v": NOISE})
+
+    open_order = [f"03/04/2026 14:03:{x / 50 + 5:09.6f}" for x in range(50)]
+    text = guess_of(tmp_path, {"time": open_order, "v": NOISE})
+    assert "# ? time" in text and "day-month-year" in text and "month-day-year" in text
+
+    strange = [f"kw 47 tag {x}" for x in range(50)]
+    assert "channel: time" not in guess_of(tmp_path, {"time": strange, "v": NOISE})
+
+
+def test_a_constant_speed_is_a_speed_and_a_constant_load_the_weights(tmp_path: Path) -> None:
+    constant = [[12.0] * 50, [60.0] * 50]
+    text = guess_of(
+        tmp_path,
+        {"t": RISING, "wheel rpm": constant[0], "cart mm/s": constant[1], "load [N]": constant[1]},
+    )
+    assert "'wheel rpm': {channel: wheel_speed, unit: rpm}" in text
+    assert "'cart mm/s': {channel: carriage_speed, unit: mm/s}" in text
+    assert "'load [N]': {channel: nominal_load, unit: N}" in text
+
+
+@pytest.mark.parametrize("name", ["Fz [N]", "sinkage [mm]", "motor current [A]"])
+def test_a_sign_is_asked_and_not_turned(tmp_path: Path, name: str) -> None:
+    text = guess_of(tmp_path, {"t": RISING, name: [-x for x in NOISE]})
+    line = next(line for line in text.splitlines() if name in line and "channel" in line)
+    active, _, comment = line.partition(" # ")
+    assert comment.startswith("?") and "factor: -1" in comment and "factor" not in active
+
+
+def test_other_units_get_their_factor(tmp_path: Path) -> None:
+    text = guess_of(tmp_path, {"t": RISING, "load [kg]": NOISE, "x [in]": NOISE})
+    assert "'load [kg]': {channel: load, unit: N, factor: 9.80665}" in text
+    assert "'x [in]': {channel: carriage_position, unit: mm, factor: 25.4}" in text
+
+
+def test_a_column_that_another_file_lacks_is_not_proposed(tmp_path: Path) -> None:
+    first = written(tmp_path, ["Zeit [s]", "Zugkraft [N]"])
+    table = csv_text.read(first)
+    (tmp_path / "b").mkdir()
+    other = csv_text.read(written(tmp_path / "b", ["Zeit [s]", "Einsinkung [mm]"]))
+    text = guessed([table, other])
+    assert "'Zeit [s]': {channel: time" in text and "channel: drawbar_pull" not in text

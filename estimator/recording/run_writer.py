@@ -7,15 +7,18 @@ before that tick. See docs/recording.md.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
+from numpy.typing import NDArray
 
 from gritd.estimator.messages.readings import Reading
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.messages.tick import REVISION
+from gritd.estimator.recording.bulk import Bytes, Stamps, merged, records
 from gritd.estimator.recording.cdr import ENCAPSULATION, Topic, Values
 from gritd.estimator.recording.mcapfile import MESSAGE_HEAD, RECORD_HEAD, McapFile, RecordingError
 from gritd.estimator.recording.metadata import CONFIG, RUN, TICK_REVISION, sealed, versions
@@ -64,6 +67,30 @@ class RunWriter:
         value = reading.value
         values = (reading.stamp, *value) if isinstance(value, tuple) else (reading.stamp, value)
         self.message("/raw/" + reading.channel, reading.received, values)
+
+    def readings(self, streams: Sequence[tuple[str, Stamps, NDArray[np.generic]]]) -> None:
+        """Many raw readings, received when they were taken: channel, stamps (n,) [ns] that rise,
+        values (n,) or (n, fields). They stand in the order of the stamps, then of the streams, as
+        `reading` one by one would write them.
+        """
+        encoders = [self._encoders["/raw/" + channel] for channel, _, _ in streams]
+        if not streams:
+            return
+        each = [
+            encoder.many(stamps, values)
+            for encoder, (_, stamps, values) in zip(encoders, streams, strict=True)
+        ]
+        whole, ends = merged(each, [stamps for _, stamps, _ in streams])
+
+        done = begin = 0
+        while done < ends.size:
+            room = self._chunk_size - len(self._pending.records)
+            until = min(int(np.searchsorted(ends, begin + room)) + 1, ends.size)
+            starts = np.concatenate(([begin], ends[done : until - 1])) - begin
+            self._pending.extend(whole[begin : ends[until - 1]].tobytes(), starts)
+            done, begin = until, int(ends[until - 1])
+            if self._is_full():
+                self.write_out()
 
     def message(self, topic: str, log_time: int, values: Values) -> None:
         """One message; `values` in the order of the topic's fields, `log_time` in ns."""
@@ -160,6 +187,16 @@ class _Pending:
             self.starts.pop()
             raise
 
+    def extend(self, records: bytes, starts: Stamps) -> None:
+        """The same of several, which begin at `starts` (n,) in `records`."""
+        before = len(self.starts)
+        self.starts += (starts + len(self.records)).tolist()
+        try:
+            self.records += records
+        except MemoryError:
+            del self.starts[before:]
+            raise
+
 
 class _Encoder:
     """Message records of one channel: MCAP's head and the CDR body, packed in one call where the
@@ -168,7 +205,7 @@ class _Encoder:
 
     def __init__(self, channel: int, topic: Topic) -> None:
         self._channel = channel
-        self._codec = topic.codec
+        self._topic, self._codec = topic, topic.codec
         self._sequence = 0
         self._length = MESSAGE_HEAD.size - RECORD_HEAD.size + self._codec.size
         self._pack = struct.Struct(MESSAGE_HEAD.format + self._codec.format).pack
@@ -178,6 +215,12 @@ class _Encoder:
         record = self._record(number, log_time, values)
         self._sequence = number  # only now: a message that does not fit leaves no gap
         return record
+
+    def many(self, stamps: Stamps, values: NDArray[np.generic]) -> Bytes:
+        """Records (n, size) of a flat topic. Raises ValueError where they do not fit."""
+        made = records(self._topic, self._channel, self._sequence + 1, stamps, values)
+        self._sequence = (self._sequence + stamps.size) & 0xFFFFFFFF
+        return made
 
     def _record(self, number: int, log_time: int, values: Values) -> bytes:
         if self._codec.flat:

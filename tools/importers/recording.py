@@ -4,7 +4,6 @@ their stamps.
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from gritd.config import packaged
 from gritd.estimator.config import configuration as config
-from gritd.estimator.messages.readings import CHANNELS, Reading
+from gritd.estimator.messages.readings import CHANNELS
 from gritd.estimator.messages.run_info import RunInfo
 from gritd.estimator.recording.mcapfile import reported
 from gritd.estimator.recording.run_writer import RunWriter
@@ -24,24 +23,19 @@ from gritd.tools.cli.progress import Progress
 from gritd.tools.importers.files import Array, RigFileError
 
 NS = 1_000_000_000
-STEP = 10_000  # readings between two signs of life
+STEP = 10_000  # readings of a channel that are written at once
 UNKNOWN = 1e6  # standard deviation, in N or N·m, of what a rig does not measure: no information
 
 
 @dataclass(frozen=True)
 class Stream:
-    """The readings of one channel: stamps [ns since the epoch], shape (n,); raw values, shape (n,),
-    wrench (n, 6).
+    """The readings of one channel: stamps [ns since the epoch] that rise, shape (n,); raw values,
+    shape (n,), wrench (n, 6).
     """
 
     channel: str
     stamps: NDArray[np.int64]
     values: NDArray[np.int64] | Array
-
-    def readings(self) -> Iterator[Reading]:
-        wrench = self.values.ndim == 2
-        for stamp, value in zip(self.stamps.tolist(), self.values.tolist(), strict=True):
-            yield Reading(stamp, self.channel, tuple(value) if wrench else value, stamp)
 
 
 def stamps(start: int, seconds: Array) -> NDArray[np.int64]:
@@ -95,15 +89,28 @@ def write(
         path.parent.mkdir(parents=True, exist_ok=True)
         path.unlink(missing_ok=True)
 
-    order = {channel: place for place, channel in enumerate(CHANNELS)}
     writer = RunWriter(path, (), configured.text, run)
-    merged = heapq.merge(
-        *(stream.readings() for stream in streams), key=lambda r: (r.stamp, order[r.channel])
-    )
-
-    for number, reading in enumerate(merged, start=1):
-        writer.reading(reading)
-        if progress is not None and number % STEP == 0:
-            progress.advance(STEP)
+    order = {channel: place for place, channel in enumerate(CHANNELS)}
+    for block in _blocks(sorted(streams, key=lambda stream: order[stream.channel])):
+        writer.readings([(stream.channel, stream.stamps, stream.values) for stream in block])
+        if progress is not None:
+            progress.advance(sum(stream.stamps.size for stream in block))
     writer.close()
     return path
+
+
+def _blocks(streams: Sequence[Stream]) -> Iterator[list[Stream]]:
+    """The readings of the streams, each by rising stamps, in times of STEP readings or fewer."""
+    if not streams:
+        return
+    longest = max(streams, key=lambda stream: stream.stamps.size)
+    edges = np.append(longest.stamps[STEP::STEP], np.iinfo(np.int64).max)
+    begins = [0] * len(streams)
+    for edge in edges.tolist():
+        ends = [int(np.searchsorted(stream.stamps, edge)) for stream in streams]
+        yield [
+            Stream(stream.channel, stream.stamps[begin:end], stream.values[begin:end])
+            for stream, begin, end in zip(streams, begins, ends, strict=True)
+            if end > begin
+        ]
+        begins = ends

@@ -103,6 +103,8 @@ class SeriesTable:
 
     def at(self, chosen: NDArray[np.bool_]) -> SeriesTable:
         """The rows that are marked (n,)."""
+        if np.all(chosen):
+            return self
         columns = {name: column.at(chosen) for name, column in self.columns.items()}
         lines = None if self.lines is None else self.lines[chosen]
         clock = None if self.clock is None else self.clock[chosen]

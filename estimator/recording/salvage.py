@@ -11,6 +11,8 @@ gone through chunk by chunk, which is several times slower and finds what is wro
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import BinaryIO
 
@@ -39,7 +41,7 @@ from gritd.estimator.recording.tables import NOTHING, Fields, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.recording.walk import Contents, Walk
 
-__all__ = ["Message", "Recording", "read"]
+__all__ = ["Message", "Recording", "glance", "read"]
 
 # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_KEPT = 16 << 20
@@ -81,6 +83,22 @@ def read(
 
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
+    recording._tables = wanted.done()
+    return recording
+
+
+def glance(path: Path | str, tables: Mapping[str, Fields], chunks: int) -> Recording:
+    """A first look at a recording: metadata, and what so many chunks hold that lie evenly spread
+    over the file. Each is checked, the file as a whole is not. Raises RecordingError as `read`.
+    """
+    path = Path(path)
+    recording = Recording(path)
+    wanted = Tables(tables)
+
+    with reported(path, "read"), file_opened(path, buffering=0) as file:
+        walk = Walk(file, path.stat().st_size)
+        _Check(recording, {}, wanted).glance(file, walk, chunks)
+
     recording._tables = wanted.done()
     return recording
 
@@ -151,6 +169,17 @@ class _Check:
         recording.closed, recording.attachments = contents.closed, contents.attachments
         _take_metadata(recording, contents)
         self._count_lost(expected, numbered=contents.library == LIBRARY)
+
+    def glance(self, file: BinaryIO, walk: Walk, chunks: int) -> None:
+        """Raises RecordingError where this is no MCAP file."""
+        walk.begin()
+        self._summary(walk.contents.summary)
+        first = next(walk.blocks(), None)  # what stands before it is metadata
+
+        for block in chain(() if first is None else (first,), walk.spread(chunks)):
+            with suppress(Damaged):
+                self._block(file, block)
+        _take_metadata(self._recording, walk.contents)
 
     def _pile(self, file: BinaryIO, pile: Sequence[tuple[Block, int]]) -> bool:
         """Check neighbouring blocks; False where nothing is read from one on. With each stands how

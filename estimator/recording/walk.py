@@ -35,6 +35,7 @@ _FOOTER = struct.Struct("<BQQQI")
 _CLOSING = _FOOTER.size + len(MAGIC)
 _DATA_END_SIZE = 13
 _STEP = 1 << 20
+_NEAR = 1 << 17  # [bytes] some chunks of an ordinary recording
 _WINDOW = 1 << 13  # [bytes] of the file read at once where records are small
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of the entries
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
@@ -86,6 +87,19 @@ class Walk:
                 break
 
         yield from self._blocks
+
+    def spread(self, count: int) -> Iterator[Block]:
+        """Chunks near so many places, evenly spread over the file, but for its first, in order."""
+        before = -1
+        for number in range(1, count + 1):
+            start = len(MAGIC) + number * (self._limit - len(MAGIC)) // (count + 1)
+            place = self._find_chunk(start, _NEAR, 2 * _NEAR)
+            if place is not None and place > before:
+                _, length = RECORD_HEAD.unpack(self._read(place, RECORD_HEAD.size))
+                end = place + RECORD_HEAD.size + length
+                block = self._chunk_head(place + RECORD_HEAD.size, length)
+                yield replace(block, index=(end, self._indexes(end)))
+                before = place
 
     def _too_many(self) -> str:
         """What there is more of than a recording has; '' as a rule."""
@@ -289,13 +303,11 @@ class Walk:
         )
         return head[0] == Opcode.MESSAGE_INDEX and agree
 
-    def _find_chunk(self, position: int) -> int | None:
-        for start in range(position, min(self._limit, position + SEARCH), _STEP):
-            window = self._read(
-                start, _STEP + 64
-            )  # heads that begin in this step end inside the window
+    def _find_chunk(self, position: int, step: int = _STEP, far: int = SEARCH) -> int | None:
+        for start in range(position, min(self._limit, position + far), step):
+            window = self._read(start, step + 64)  # heads that begin in this step end inside it
             for match in _NEXT_CHUNK.finditer(window):
-                if match.start() < _STEP and self._plausible(start + match.start()):
+                if match.start() < step and self._plausible(start + match.start()):
                     return start + match.start()
         return None
 

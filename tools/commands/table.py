@@ -22,7 +22,7 @@ COMMANDS = {
         "one report of the running daemon, for people or scripts",
     ),
     "monitor": ("gritd.tools.commands.monitor", "the running daemon in a terminal"),
-    "view": ("gritd.tools.commands.view", "the running daemon in a browser"),
+    "view": ("gritd.tools.commands.view", "the running daemon, or recordings, in a browser"),
     "simulate": (
         "gritd.tools.commands.simulate",
         "the forward model alone: a schedule in, a recording out",

@@ -1,11 +1,12 @@
-"""`gritd view`: the running daemon in a browser, through its status socket."""
+"""`gritd view`: the running daemon in a browser, through its status socket; or recordings."""
 
 from __future__ import annotations
 
 import asyncio
 import os
+import socket
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from gritd.tools.service.client import add_socket
 
 if TYPE_CHECKING:
     from gritd.tools.view.app import Hub
+    from gritd.tools.view.server import Place
 
 NEEDS = ("starlette", "uvicorn")
 BEHIND = 5  # nice: the page waits for the daemon, never the daemon for the page
@@ -33,10 +35,9 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _serve(arguments: Namespace) -> None:
-    from gritd.tools.view.app import Hub, application
-    from gritd.tools.view.feed import Feed
+    """Raises CommandError."""
     from gritd.tools.view.library import library
-    from gritd.tools.view.server import Place, listening, serve
+    from gritd.tools.view.server import Place
 
     place = Place(arguments.host, arguments.port, tuple(arguments.name), _token(arguments))
     if not place.loopback and not place.token:
@@ -46,20 +47,47 @@ def _serve(arguments: Namespace) -> None:
             USAGE,
         )
 
-    files, hub, feed = library(), Hub(), Feed(arguments.socket)
+    serve = _recorded if arguments.files else _live
+    serve(arguments, place, library())
 
-    with closing(listening(place, arguments.any_port)) as listener:
-        address = place.address(listener.getsockname()[1])
+
+def _live(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
+    """The running daemon."""
+    from gritd.tools.view.app import Hub, live
+    from gritd.tools.view.feed import Feed
+    from gritd.tools.view.server import listening, serve
+
+    hub, feed = Hub(), Feed(arguments.socket)
+    with closing(listening(place, arguments.any_port)) as listener, closing(feed):
 
         def begin() -> None:
             loop = asyncio.get_running_loop()
             feed.start(lambda frame: _push(loop, hub, frame))
-            print(f"view {address}", flush=True)
+            _announce(place, listener)
 
         with suppress(OSError):
             os.nice(BEHIND)
-        serve(application(feed, files, hub), place, listener, begin)
-    feed.close()
+        serve(live(feed, files, hub), place, listener, begin)
+
+
+def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
+    """Recordings. Raises CommandError."""
+    from gritd.tools.view.app import recorded
+    from gritd.tools.view.recorded import Recordings
+    from gritd.tools.view.server import listening, serve
+
+    recordings = Recordings(arguments.files)
+    with closing(listening(place, arguments.any_port)) as listener:
+
+        def begin() -> None:
+            recordings.start()
+            _announce(place, listener)
+
+        serve(recorded(recordings, files), place, listener, begin)
+
+
+def _announce(place: Place, listener: socket.socket) -> None:
+    print(f"view {place.address(listener.getsockname()[1])}", flush=True)
 
 
 def _push(loop: asyncio.AbstractEventLoop, hub: Hub, frame: bytes) -> None:
@@ -88,7 +116,12 @@ def _token(arguments: Namespace) -> str:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="gritd view", description="Show the running daemon in a browser.")
+    parser = Parser(
+        prog="gritd view", description="Show the running daemon, or recordings, in a browser."
+    )
+    parser.add_argument(
+        "files", nargs="*", type=Path, metavar="FILE", help="recordings, in place of the daemon"
+    )
     add_socket(parser)
     parser.add_argument(
         "--host",

@@ -15,10 +15,10 @@ from typing import Any
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader
 from gritd.drivers.sensor import Sensor
-from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.messages.tick import TICK_NAMES
+from gritd.tools.service.setup import setup
 
 Report = dict[str, Any]
 
@@ -106,25 +106,6 @@ def _tick(daemon: Daemon) -> Report:
         "tick": fields,
         "loop": {**record._asdict(), **loop},
     }
-
-
-def setup(settings: Settings, run: str) -> Report:
-    """What does not change from tick to tick: run, testbed, wheel and the soil as it is stated."""
-    soil, wheel = settings.soil, settings.wheel
-    return {
-        "run": run,
-        "testbed": settings.testbed,
-        "wheel": {"radius": wheel.radius, "width": wheel.width, "c1": wheel.c1, "c2": wheel.c2},
-        "prior": {
-            "cohesion": _pair(soil.cohesion),
-            "tan_phi": _pair(soil.tan_phi),
-            "shear_modulus": _pair(soil.shear_modulus),
-        },
-    }
-
-
-def _pair(known: Uncertain) -> Report:
-    return {"value": known.value, "sigma": known.sigma}
 
 
 def _room(path: Path) -> Report:

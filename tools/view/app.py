@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from importlib import resources
 from math import isfinite
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from starlette.applications import Starlette
@@ -15,25 +15,19 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
+from gritd.estimator.daemon.publish import line_of
 from gritd.estimator.terramechanics.soil import Array
+
+if TYPE_CHECKING:  # the one does not load what the other needs
+    from gritd.tools.view.feed import Feed
+    from gritd.tools.view.recorded import Recordings
+    from gritd.tools.view.run_curves import Along
 
 STREAMS = 64  # browsers that may follow at once
 MOST_POINTS = 4000  # of a curve
 QUIET = 10.0  # [s] without a frame: a comment keeps the connection
 KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 PAGE = resources.files("gritd.tools.view").joinpath("page")
-
-
-class Shown(Protocol):
-    """What a page shows: the running daemon, or recordings."""
-
-    def described(self) -> dict[str, Any]: ...
-
-    def events(self) -> list[dict[str, Any]]: ...
-
-    def stretch(
-        self, span: tuple[float, float] | None, seconds: float, points: int
-    ) -> tuple[Array, Array, Array]: ...
 
 
 class Hub:
@@ -69,34 +63,101 @@ class Hub:
             self.streams -= 1
 
 
-def application(shown: Shown, library: Mapping[str, Path], hub: Hub | None) -> Starlette:
-    """The application; with a hub there is a stream of frames."""
+def live(feed: Feed, library: Mapping[str, Path], hub: Hub) -> Starlette:
+    """The page of the running daemon."""
 
     async def about(request: Request) -> Response:
-        return JSONResponse(shown.described())
+        return JSONResponse(feed.described())
 
     async def events(request: Request) -> Response:
-        return JSONResponse(shown.events())
+        return JSONResponse(feed.events())
 
     async def stretch(request: Request) -> Response:
-        asked = _asked(request)
-        if asked is None:
-            return PlainTextResponse("expected from and to, or seconds; and points\n", 400)
-        return await asyncio.to_thread(lambda: packed(*shown.stretch(*asked)))
+        if (asked := Asked.of(request)) is None:
+            return _senseless()
+        return await asyncio.to_thread(
+            lambda: packed(*feed.stretch(asked.span, asked.seconds, asked.points))
+        )
 
-    async def live(request: Request) -> Response:
-        if hub is None or hub.streams >= STREAMS:
+    async def stream(request: Request) -> Response:
+        if hub.streams >= STREAMS:
             return PlainTextResponse("no place left to follow\n", 503)
         return StreamingResponse(hub.frames(), media_type="text/event-stream")
 
-    routes: list[BaseRoute] = [
-        Route("/about", about),
-        Route("/events", events),
-        Route("/stretch", stretch),
-        Route("/live", live),
-        *_files(library),
-    ]
-    return Starlette(routes=routes)
+    answers = {"/about": about, "/events": events, "/stretch": stretch, "/live": stream}
+    return _application(answers, library)
+
+
+def recorded(recordings: Recordings, library: Mapping[str, Path]) -> Starlette:
+    """The page of recordings."""
+
+    async def about(request: Request) -> Response:
+        return JSONResponse(recordings.described())
+
+    async def events(request: Request) -> Response:
+        if (asked := Asked.of(request, len(recordings.runs))) is None:
+            return _senseless()
+        return JSONResponse(await asyncio.to_thread(recordings.events, asked.run))
+
+    async def stretch(request: Request) -> Response:
+        if (asked := Asked.of(request, len(recordings.runs))) is None:
+            return _senseless()
+        return await asyncio.to_thread(
+            lambda: packed(*recordings.stretch(asked.run, asked.along, asked.span, asked.points))
+        )
+
+    async def moment(request: Request) -> Response:
+        if (asked := Asked.of(request, len(recordings.runs))) is None:
+            return _senseless()
+        told = await asyncio.to_thread(recordings.moment, asked.run, asked.along, asked.at)
+        return Response(line_of(told), media_type="application/json")
+
+    answers = {"/about": about, "/events": events, "/stretch": stretch, "/moment": moment}
+    return _application(answers, library)
+
+
+Answer = Callable[[Request], Awaitable[Response]]
+
+
+def _application(answers: Mapping[str, Answer], library: Mapping[str, Path]) -> Starlette:
+    routes = [Route(path, answer) for path, answer in answers.items()]
+    return Starlette(routes=[*routes, *_files(library)])
+
+
+def _senseless() -> Response:
+    return PlainTextResponse("expected numbers that make sense\n", 400)
+
+
+class Asked(NamedTuple):
+    """What a request asks for."""
+
+    span: tuple[float, float] | None
+    seconds: float
+    points: int
+    run: int
+    along: Along
+    at: float
+
+    @classmethod
+    def of(cls, request: Request, runs: int = 1) -> Asked | None:
+        """None where it makes no sense."""
+        given = request.query_params
+        try:
+            span = (float(given["from"]), float(given["to"])) if "from" in given else None
+            asked = cls(
+                span,
+                float(given.get("seconds", "60")),
+                min(int(given.get("points", "1200")), MOST_POINTS),
+                int(given.get("run", "0")),
+                "way" if given.get("along") == "way" else "time",
+                float(given.get("at", "0")),
+            )
+        except (ValueError, KeyError):
+            return None
+
+        finite = all(map(isfinite, (asked.seconds, asked.at, *(span or ()))))
+        forward = asked.seconds > 0.0 and (span is None or span[0] < span[1])
+        return asked if finite and forward and asked.points >= 2 and 0 <= asked.run < runs else None
 
 
 def _files(library: Mapping[str, Path]) -> list[BaseRoute]:
@@ -113,20 +174,6 @@ def _file(name: str, content: bytes) -> BaseRoute:
         return Response(content, media_type=kind)
 
     return Route("/" if name == "index.html" else f"/{name}", answer)
-
-
-def _asked(request: Request) -> tuple[tuple[float, float] | None, float, int] | None:
-    """Span, seconds and points of a request; None where they make no sense."""
-    given = request.query_params
-    try:
-        points = min(int(given.get("points", "1200")), MOST_POINTS)
-        seconds = float(given.get("seconds", "60"))
-        span = (float(given["from"]), float(given["to"])) if "from" in given else None
-    except (ValueError, KeyError):
-        return None
-    finite = all(map(isfinite, (seconds, *(span or ()))))
-    sensible = points >= 2 and seconds > 0.0 and (span is None or span[0] < span[1])
-    return (span, seconds, points) if finite and sensible else None
 
 
 def packed(time: Array, columns: Array, way: Array) -> Response:

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import pytest
 
 pytest.importorskip("starlette", reason="needs gritd[view]")
-from gritd.tools.view.app import Hub, application
+from gritd.tools.view.app import Hub, live
 from gritd.tools.view.feed import Feed
 from gritd.tools.view.guard import BURST, Guard
 from gritd.tools.view.library import library
 
 TOKEN = "0123456789abcdef0123"
-APP = application(Feed(None), library(), Hub())
+APP = live(Feed(None), library(), Hub())
 
 
 class Answer(NamedTuple):

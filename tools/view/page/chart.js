@@ -27,7 +27,19 @@ export class Chart {
 
   build() {
     if (this.plot) this.plot.destroy();
-    this.plot = new uPlot(this.options(), [[], ...this.order().map(() => [])], this.box);
+    const options = this.options();
+    this.plot = new uPlot(options, options.series.map(() => []), this.box);
+    this.plot.over.addEventListener("click", () => this.control.chosen(this.plot.posToVal(this.plot.cursor.left, "x")));
+  }
+
+  // Several runs over each other: [{curves, colour}]; of each the lines alone, the first whole, others dashed.
+  drawRuns(runs) {
+    const key = runs.map(run => run.colour).join();
+    if (this.laid !== key) { this.laid = key; this.runs = runs; this.build(); }
+    this.curves = runs[0].curves;
+    const tables = runs.map(run => [run.curves.time, ...this.of.curves.map(c => run.curves.columns[c.line])]);
+    this.plot.setData(uPlot.join(tables), true);
+    this.now.textContent = "";
   }
 
   // Columns in the order of the series: of each curve its band's edges, if any, then its line.
@@ -35,7 +47,9 @@ export class Chart {
 
   options() {
     const series = [{}], bands = [];
-    for (const curve of this.of.curves) {
+    for (const run of this.runs || []) for (const [i, curve] of this.of.curves.entries())
+      series.push({stroke: colour(run.colour), width: 1.4, points: {show: false}, dash: i ? [4, 3] : undefined, label: curve.label});
+    if (!this.runs) for (const curve of this.of.curves) {
       const name = "--" + curve.style;
       if (curve.sigma) {
         bands.push({series: [series.length, series.length + 1], fill: faded(name, 0.18)});
@@ -50,7 +64,7 @@ export class Chart {
       tzDate: ts => uPlot.tzDate(new Date(ts * 1e3), "Etc/UTC"),
       scales: {x: {time: this.control.clock, range: () => this.control.span()}, y: {range: ranged}},
       axes: [
-        {...axis, size: 28, space: 60, values: this.control.clock ? clocked : (u, ticks) => ticks.map(v => `${v}`)},
+        {...axis, size: 28, space: 60, values: this.control.clock ? clocked : this.control.words},
         {...axis, size: 54, space: 32, values: (u, ticks) => ticks.map(v => `${+v.toPrecision(8)}`.replace("-", "−"))},
       ],
       cursor: {sync: {key: "time"}, drag: {x: true, y: false, setScale: false}, points: {size: 6}},
@@ -101,6 +115,7 @@ export class Chart {
   }
 
   draw(curves) {
+    if (this.runs) { this.runs = this.laid = null; this.build(); }
     this.curves = curves;
     const data = this.order().map(at => curves.columns[at] || []);
     this.plot.setData([curves.time, ...data], true);
@@ -109,8 +124,8 @@ export class Chart {
 
   // The value under the cursor, or the last one.
   told() {
-    if (!this.curves || !this.plot) return;
-    const at = this.plot.cursor.idx ?? this.curves.time.length - 1;
+    if (!this.curves || !this.plot || this.runs) return;
+    const at = this.plot.cursor.idx ?? this.control.index(this.curves.time);
     const words = this.of.curves.map(c => {
       const column = this.curves.columns[c.line] || [];
       const value = written(column[at], this.of.decimals);
@@ -143,9 +158,23 @@ export class Chart {
   resize() { this.plot.setSize({width: Math.max(this.box.clientWidth, 200), height: HEIGHT}); }
 }
 
+// Of a series what is in sight, sorted.
+const sorted = (u, at) => {
+  const [from, to] = u.series[0].idxs || [0, -1];
+  return (u.data[at] || []).slice(from, to + 1).filter(v => v !== null && v !== undefined).sort((a, b) => a - b);
+};
+
+// All of every line, of a band's edges all but the outermost: a σ that nothing is known of at a start would hide the rest.
 // A margin, and never a range so small that noise of the last digit fills the picture.
-const ranged = (u, low, high) => {
-  if (low === null || !Number.isFinite(low)) return [0, 1];
+const ranged = u => {
+  let low = Infinity, high = -Infinity;
+  for (let i = 1; u.series.length > i; i++) {
+    const values = sorted(u, i), cut = u.series[i].width === 0 ? Math.floor(0.05 * values.length) : 0;
+    if (values.length === 0) continue;
+    low = Math.min(low, values[cut]);
+    high = Math.max(high, values[values.length - 1 - cut]);
+  }
+  if (!Number.isFinite(low)) return [0, 1];
   const room = Math.max(high - low, 1e-3 * Math.abs(high), 1e-9), middle = (low + high) / 2;
   return [middle - 0.6 * room, middle + 0.6 * room];
 };
@@ -153,4 +182,14 @@ const ranged = (u, low, high) => {
 const clocked = (u, ticks) => {
   const fine = ticks.length > 1 && ticks[1] - ticks[0] < 60;
   return ticks.map(t => new Date(t * 1e3).toISOString().slice(11, fine ? 19 : 16));
+};
+
+// Charts follow their box, the colours of the reader's choice, and paper.
+export const watched = (charts, draw) => {
+  const into = document.getElementById("charts"), root = document.documentElement;
+  new ResizeObserver(() => charts.forEach(chart => chart.resize())).observe(into);
+  const repaint = () => { charts.forEach(chart => chart.build()); draw(); };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  addEventListener("beforeprint", () => { root.classList.add("printing"); repaint(); });
+  addEventListener("afterprint", () => { root.classList.remove("printing"); repaint(); });
 };

@@ -1,8 +1,9 @@
 // The page: asks what there is to show, follows the stream of frames, and draws.
-import {Chart} from "./chart.js";
+import {Chart, watched} from "./chart.js";
 import {Curves, placed, stretch} from "./data.js";
 import {plane, wheel} from "./pictures.js";
-import {byId, events as tellEvents, facts, headline, made, state, table, values} from "./tell.js";
+import {recorded} from "./recorded.js";
+import {byId, events as tellEvents, facts, headline, legend, made, state, table, values} from "./tell.js";
 
 const WINDOWS = [60, 300, 900, 1800, 3600]; // [s]
 const POINTS = 1200, TEXT = 250, LABELS = 5000; // points of a curve; [ms] between changes of words, of labels
@@ -16,7 +17,8 @@ const span = () => page.held || [(page.curves.last || 0) - page.window, page.cur
 const utc = t => new Date(t * 1e3).toISOString().slice(11, 19);
 
 const control = {
-  clock: true, span, events: () => page.events, zoom: chosen => hold(chosen), drawn: () => {},
+  clock: true, span, events: () => page.events, zoom: chosen => hold(chosen), drawn: () => {}, chosen: () => {},
+  index: time => time.length - 1,
   prior: chart => (chart.prior && page.prior ? page.prior[chart.prior][0] * chart.factor : null),
 };
 
@@ -85,11 +87,7 @@ const wire = () => {
     const act = event.ctrlKey || event.metaKey || event.altKey ? undefined : keys[event.key];
     if (act) { event.preventDefault(); act(); }
   });
-  new ResizeObserver(() => page.charts.forEach(chart => chart.resize())).observe(byId("charts"));
-  const repaint = () => { page.charts.forEach(chart => chart.build()); page.drawn = 0; draw(); };
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
-  addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); repaint(); });
-  addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); repaint(); });
+  watched(page.charts, () => { page.drawn = 0; draw(); });
   controls();
 };
 
@@ -166,20 +164,11 @@ const follow = () => {
 
 const begin = async () => {
   page.about = await (await fetch("about")).json();
+  if (!page.about.live) { await recorded(page.about); return; }
   page.charts = placed(page.about.charts).map(chart => new Chart(chart, byId("charts"), control));
   legend();
   wire();
   follow();
-};
-
-const legend = () => {
-  const entries = [["estimate", "estimate"], ["measured", "measured"], ["predicted", "predicted at the estimate"],
-    ["band", "± 2σ"], ["prior", "stated prior; 1 where σ is honest"]];
-  byId("legend").append(...entries.map(([kind, words]) => {
-    const entry = made("span");
-    entry.append(made("i", undefined, `swatch ${kind}`), words);
-    return entry;
-  }));
 };
 
 addEventListener("load", () => begin().catch(silent));

@@ -105,16 +105,14 @@ export const wheel = (svg, told, rim) => {
 
   const [ex, ey] = on(entry, SIZE), words = (x, y, text, kind, anchor = "start") => made(svg, "text", {class: kind, x, y, "text-anchor": anchor}, text);
   words(Math.min(ex + 12, 400), ey - 8, `θ₁ ${degrees(entry)}`, "strong");
-  const below = 322;
-  words(10, below - 20, `σ up to ${written(most, 1)} kPa at θₘ ${degrees(rim.theta[peak])}`, "normal-text");
-  words(10, below, `τ up to ${written(shear, 1)} kPa at ${degrees(rim.theta[greatest])}`, "shear-text");
-  words(10, GROUND - 6, "surface before", "");
+  words(10, GROUND - 6, "surface", "");
   words(10, bottom + 16, `rut, sinkage ${written(rim.sinkage * 1e3, 1)} mm`, "strong");
   made(svg, "path", {class: "thin", d: `M${MIDDLE - 28} 20h56m-7 -5l7 5l-7 5`});
   words(MIDDLE, 14, "travel", "", "middle");
 
-  const said = `Wheel of radius ${written(rim.radius * 1e3, 0)} mm. Contact from entry θ₁ ${degrees(entry)} to the bottom; normal stress σ (filled) and ` +
-    `shear stress τ (line) outwards from the rim, by the linear model at the estimate.`;
+  const said = `Wheel of radius ${written(rim.radius * 1e3, 0)} mm, in contact from θ₁ ${degrees(entry)} to the bottom. Outwards from the rim, ` +
+    `by the linear model at the estimate: normal stress σ (filled), up to ${written(most, 1)} kPa at θₘ ${degrees(rim.theta[peak])}, ` +
+    `and shear stress τ (line), up to ${written(shear, 1)} kPa at ${degrees(rim.theta[greatest])}.`;
   told.textContent = said;
-  svg.setAttribute("aria-label", `${said} σ up to ${written(most, 1)} kPa at ${degrees(rim.theta[peak])}, τ up to ${written(shear, 1)} kPa, sinkage ${written(rim.sinkage * 1e3, 1)} mm.`);
+  svg.setAttribute("aria-label", `${said} Sinkage ${written(rim.sinkage * 1e3, 1)} mm.`);
 };

@@ -76,3 +76,13 @@ export const events = (list, shown) => {
   });
   byId("events").replaceChildren(...(items.length ? items : [made("li", "none yet")]));
 };
+
+export const legend = () => {
+  const entries = [["estimate", "estimate"], ["measured", "measured"], ["predicted", "predicted at the estimate"],
+    ["band", "± 2σ"], ["prior", "stated prior; 1 where σ is honest"]];
+  byId("legend").append(...entries.map(([kind, words]) => {
+    const entry = made("span");
+    entry.append(made("i", undefined, `swatch ${kind}`), words);
+    return entry;
+  }));
+};

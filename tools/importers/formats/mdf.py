@@ -18,7 +18,9 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
     """The channels of each channel group, by its name or number: `group.channel`. The clock is the
     group's master channel, since 1970 where the file says when it began. Raises RigFileError.
     """
-    with reading(path, "an MDF file"), import_module("asammdf").MDF(path) as file:
+    library = import_module("asammdf")
+    library.blocks.mdf_v4.MDF4._file = None  # else one that cannot be opened complains when freed
+    with reading(path, "an MDF file"), library.MDF(path) as file:
         numbers = [at for at, group in enumerate(file.groups) if group.channel_group.cycles_nr]
         names = _names(file, numbers)
         check_size(path, sum(file.groups[at].channel_group.cycles_nr for at in numbers))

@@ -17,6 +17,7 @@ import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
@@ -25,6 +26,7 @@ import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
+    AttachmentIndex,
     Channel,
     Chunk,
     DataEnd,
@@ -159,6 +161,7 @@ class McapFile:
         self._definitions: dict[int, Definition] = {}
         self._preambles: dict[int, bytes] = {}
         self._metadata_index: list[MetadataIndex] = []
+        self._attachment_index: list[AttachmentIndex] = []
         self._chunk_indexes = ChunkIndexes(self._compression)
         self._counts: Counter[int] = Counter()
         self._indexed = True  # whether the index knows every chunk
@@ -221,6 +224,13 @@ class McapFile:
         index = MetadataIndex(offset=self._length, length=len(data), name=name)
         self._append(data)
         self._metadata_index.append(index)
+
+    def add_attachment(self, index: AttachmentIndex, pieces: Iterable[bytes]) -> None:
+        """An attachment's record as another file holds it, with what that file's index says."""
+        moved = replace(index, offset=self._length)
+        for piece in pieces:
+            self._append(piece)
+        self._attachment_index.append(moved)
 
     def add_chunk(self, messages: bytes | bytearray, starts: Sequence[int] | Starts) -> None:
         """Write message records, concatenated in `messages`, that begin at byte offsets `starts`,
@@ -349,6 +359,7 @@ class McapFile:
             (Opcode.CHANNEL, [record_bytes(*(channel for _, channel in used))]),
             (Opcode.STATISTICS, [record_bytes(self._statistics(len(schemas)))]),
             (Opcode.CHUNK_INDEX, self._chunk_indexes.records()),
+            (Opcode.ATTACHMENT_INDEX, [record_bytes(*self._attachment_index)]),
             (Opcode.METADATA_INDEX, [record_bytes(*self._metadata_index)]),
         ]
 
@@ -356,7 +367,7 @@ class McapFile:
         first, last = self._span or (0, 0)
 
         return Statistics(
-            attachment_count=0,
+            attachment_count=len(self._attachment_index),
             channel_count=len(self._counts),
             channel_message_counts=dict(sorted(self._counts.items())),
             chunk_count=self._chunk_indexes.count,

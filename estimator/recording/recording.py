@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gritd.estimator.messages.run_info import RunInfo
+from gritd.estimator.recording.attachments import AttachmentPlace
 from gritd.estimator.recording.blocks import Block, Unpacker, split, unpack
 from gritd.estimator.recording.cdr import Rows, Topic
 from gritd.estimator.recording.decoding import Chunk, Source, select
@@ -37,12 +41,15 @@ class Recording:
     counted: bool = False  # the file says how many messages it had: `lost` is all that is lost
     misplaced: int = 0  # chunks that stand in another place than they were written to, or twice
     unverified: int = 0  # messages under no checksum; other writers may leave such
-    attachments: int = 0
+    repeated: list[tuple[str, dict[str, str]]] = field(default_factory=list)  # as metadata is
+    attachments: list[AttachmentPlace] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what is odd, though nothing is missing
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
     sources: dict[int, Source] = field(default_factory=dict)  # by channel number
     _piles: list[tuple[Block, ...]] = field(default_factory=list, repr=False)
     _kept: dict[int, Pile] = field(default_factory=dict, repr=False)
     _tables: dict[tuple[str, Fields], Rows] = field(default_factory=dict, repr=False)
+    _received: NDArray[np.int64] | None = field(default=None, repr=False)  # instead of log times
 
     @property
     def complete(self) -> bool:
@@ -129,6 +136,7 @@ class Recording:
         }
         for rows in (*passed.values(), *empty.values()):
             rows.flags.writeable = True  # nobody else has them
+            self._set_times(rows)
         return {**empty, **passed, **made}
 
     def _known(self, topic: str) -> Topic:
@@ -140,8 +148,26 @@ class Recording:
             )
         return known
 
+    def _set_times(self, rows: Rows) -> None:
+        """Of rows as `arrays` gives them, where the file's log times are no times."""
+        if self._received is not None:
+            rows["log_time"] = self._received[rows["order"]]
+
     def _opened(self) -> Iterator[Pile]:
         """Pile by pile in file order."""
+        if self._received is None:
+            yield from self._stored()
+            return
+        before = 0
+        for pile in self._stored():
+            chunk = pile.chunk
+            heads, after = chunk.heads.copy(), before + len(chunk.starts)
+            heads["log_time"] = self._received[before:after]
+            yield pile._replace(chunk=replace(chunk, heads=heads))
+            before = after
+
+    def _stored(self) -> Iterator[Pile]:
+        """The piles as they stand in the file."""
         with reported(self.path, "read"), opened(self.path, buffering=0) as file:
             unpacker = Unpacker()
             for number, blocks in enumerate(self._piles):

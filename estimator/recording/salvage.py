@@ -35,6 +35,7 @@ from gritd.estimator.recording.mcapfile import (
 from gritd.estimator.recording.mcapfile import opened as file_opened
 from gritd.estimator.recording.metadata import CHECKSUM, CONFIG, RUN, seal_holds
 from gritd.estimator.recording.piles import REACH, ROOM, Pile, alone, opened
+from gritd.estimator.recording.received import LogTimes, received
 from gritd.estimator.recording.recording import Message, Recording
 from gritd.estimator.recording.sequence import Sequence as Numbers
 from gritd.estimator.recording.tables import NOTHING, Fields, Tables
@@ -74,7 +75,7 @@ def read(
         try:
             walk = Walk(file, path.stat().st_size)
             known = {topic.name: topic for topic in topics}
-            _Check(recording, known, wanted).whole(file, walk)
+            times = _Check(recording, known, wanted).whole(file, walk)
         except RecordingError as error:
             message = str(error)
             raise RecordingError(
@@ -84,6 +85,8 @@ def read(
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
     recording._tables = wanted.done()
+    if not times.good:
+        _take_times(recording)
     return recording
 
 
@@ -114,6 +117,10 @@ def _take_metadata(recording: Recording, contents: Contents) -> None:
         else:
             recording.damage.append(f"metadata {name}: its checksum does not hold; ignored")
 
+    recording.repeated = [
+        (name, entries) for name, entries in contents.repeated if not name.startswith("gritd.")
+    ]
+
     if contents.library == LIBRARY:
         recording.damage += [
             f"metadata {name} is missing"
@@ -126,6 +133,16 @@ def _take_metadata(recording: Recording, contents: Contents) -> None:
     recording.versions = {key: value for key, value in config.items() if key != CHECKSUM}
     recording.run, wrong = RunInfo.from_entries(recording.metadata.get(RUN, {}))
     recording.damage += [f"metadata {RUN}: {line}" for line in wrong]
+
+
+def _take_times(recording: Recording) -> None:
+    """Another clock of a file whose log times are no times."""
+    recording._received, note = received(recording.chunks(), recording.sources)
+    recording.notes += [note] if note else ["neither its log times nor its stamps are times"]
+    for rows in recording._tables.values():
+        rows.flags.writeable = True
+        recording._set_times(rows)
+        rows.flags.writeable = False
 
 
 class _Check:
@@ -141,6 +158,7 @@ class _Check:
 
         self._unpacker = Unpacker()
         self._sequence = Numbers()
+        self._times = LogTimes()  # of another writer's file
         self._numbered = False  # its messages are numbered as ours are
         self._preambles: set[bytes] = {b""}  # definitions that are known, as they stand in a chunk
         self._preamble = b""  # the last of them
@@ -149,7 +167,7 @@ class _Check:
         self._kept_room = 0 if tables.wanted else MAX_KEPT  # who has the arrays asks no more
         self._unpacked = self._stored = self._chunks = self._messages = 0
 
-    def whole(self, file: BinaryIO, walk: Walk) -> None:
+    def whole(self, file: BinaryIO, walk: Walk) -> LogTimes:
         """Raises RecordingError where this is no MCAP file, or one without a field relied on."""
         recording, contents = self._recording, walk.contents
         recording.damage = contents.damage
@@ -169,6 +187,7 @@ class _Check:
         recording.closed, recording.attachments = contents.closed, contents.attachments
         _take_metadata(recording, contents)
         self._count_lost(expected, numbered=contents.library == LIBRARY)
+        return self._times
 
     def glance(self, file: BinaryIO, walk: Walk, chunks: int) -> None:
         """Raises RecordingError where this is no MCAP file."""
@@ -324,6 +343,8 @@ class _Check:
         for channel, own in chunk.groups.items():
             recording.counts[recording.sources[channel].topic.name] += len(own)
         self._tables.add(chunk, recording.sources, self._messages)
+        if not self._numbered:
+            self._times.add(chunk.heads["log_time"])
         self._messages += len(chunk.starts)
 
     def _summary(self, summary: bytes) -> dict[int, int]:

@@ -17,6 +17,7 @@ from typing import BinaryIO
 from mcap.opcode import Opcode
 
 from gritd.estimator.limits import limits
+from gritd.estimator.recording.attachments import AttachmentPlace
 from gritd.estimator.recording.blocks import Block, Damaged, Texts
 from gritd.estimator.recording.mcapfile import MAGIC, RECORD_HEAD, RecordingError
 
@@ -46,8 +47,9 @@ class Contents:
     """What a walk over the file found, but for its blocks."""
 
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    repeated: list[tuple[str, dict[str, str]]] = field(default_factory=list)  # under a name again
     damage: list[str] = field(default_factory=list)
-    attachments: int = 0
+    attachments: list[AttachmentPlace] = field(default_factory=list)
     closed: bool = False  # ends with an index that is intact
     summary: bytes = b""  # the first of its records, checksum verified
     headed: bool = False  # has a header
@@ -193,7 +195,8 @@ class Walk:
         elif opcode == Opcode.HEADER:
             self._header(start, length)
         elif opcode == Opcode.ATTACHMENT:
-            self.contents.attachments += 1
+            place = AttachmentPlace(position, RECORD_HEAD.size + length)
+            self.contents.attachments.append(place)
         elif opcode == Opcode.DATA_END and length == 4:
             return None
         else:
@@ -258,7 +261,8 @@ class Walk:
         name = fields.text()
         entries = fields.table()
         fields.finish()
-        self.contents.metadata.setdefault(name, entries)
+        if self.contents.metadata.setdefault(name, entries) is not entries:
+            self.contents.repeated.append((name, entries))
 
     def _header(self, start: int, length: int) -> None:
         if length > MAX_DEFINITION:

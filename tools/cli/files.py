@@ -7,6 +7,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -16,6 +17,7 @@ from gritd.estimator.config.settings import Settings
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.recording.tables import NOTHING, Fields
+from gritd.estimator.visible import visible
 from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
 
 WRONG_NAME = (
@@ -31,12 +33,16 @@ WRONG_NAME = (
 
 def recording(path: Path, tables: Mapping[str, Fields] = NOTHING) -> Recording:
     """A recording to read, and what will be asked of it (see `salvage.read`). Raises CommandError,
-    2 where there is no such file, 3 where it is no recording.
+    2 where there is no such file, 3 where it is no recording. What is odd about it goes to standard
+    error.
     """
     try:
-        return read(path, tables=tables)
+        made = read(path, tables=tables)
     except RecordingError as error:
         raise unread(path, error) from None
+    for note in made.notes:
+        print(visible(f"gritd: note: {path}: {note}"), file=sys.stderr)
+    return made
 
 
 def unread(path: Path, error: RecordingError) -> CommandError:

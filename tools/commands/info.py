@@ -59,7 +59,7 @@ def told(recordings: Sequence[Recording]) -> Iterator[str]:
     size = sum(recording.path.stat().st_size for recording in recordings)
 
     yield (
-        f"{first.path}: {_clock(of_run.start)}, {of_run.duration:.1f} s, "
+        f"{first.path}: {_clock(of_run)}, {of_run.duration:.1f} s, "
         f"{sum(topic.messages for topic in of_run.topics)} messages, {size / 1e6:.1f} MB"
         + (f", {len(recordings)} parts" if len(recordings) > 1 else "")
     )
@@ -74,11 +74,13 @@ def told(recordings: Sequence[Recording]) -> Iterator[str]:
     yield from _filter(first)
 
 
-def _clock(stamp: int) -> str:
-    """A time [ns since the epoch] as a date."""
-    if not stamp:
+def _clock(of_run: RunSummary) -> str:
+    """When the run began, as a date."""
+    if not of_run.topics:
         return "no messages"
-    return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(stamp / 1e9))
+    if of_run.start <= 0:
+        return "no date"
+    return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(of_run.start / 1e9))
 
 
 def _run(recording: Recording) -> Iterator[str]:

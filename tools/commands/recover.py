@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from gritd.estimator.messages.readings import NS
-from gritd.estimator.recording.mcapfile import McapFile, RecordingError
+from gritd.estimator.recording.blocks import Damaged
+from gritd.estimator.recording.mcapfile import McapFile, RecordingError, opened, reported
 from gritd.estimator.recording.metadata import RECOVERED, sealed
 from gritd.estimator.recording.salvage import Recording, read
 from gritd.estimator.visible import visible
@@ -41,6 +42,7 @@ def main(argv: Sequence[str]) -> int:
 
     target = arguments.output or source.with_suffix(f".recovered{source.suffix}")
     try:
+        lost = _check_attachments(recording)
         span = recover(recording, vacant(target))
     except RecordingError as error:
         raise unwritten(error) from None
@@ -51,18 +53,20 @@ def main(argv: Sequence[str]) -> int:
         raise CommandError(f"{source}: found nothing to recover; no file is written", DAMAGED)
 
     print(f"{target}: {summary(recording, span)}")
-    return DONE if recording.saved and not recording.attachments else DAMAGED
+    return DONE if recording.saved and not lost else DAMAGED
 
 
 def recover(recording: Recording, target: Path) -> float | None:
-    """Write every intact message, in file order, and every intact metadata record to a new file.
+    """Write every intact message, in file order, every intact metadata record and attachment to a
+    new file.
     Returns the time from the first message to the last [s]; None, and makes no file, where a
     recording that is not whole has neither.
 
-    Messages of topics that we cannot decode are kept as they are; attachments are not kept. Raises
+    Messages of topics that we cannot decode are kept as they are. Raises
     RecordingError where the file cannot be written. Whatever stops it, no part of a file is left.
     """
-    if not (recording.complete or recording.counts.total() or recording.metadata):
+    some = recording.counts.total() or recording.metadata or recording.attachments
+    if not (recording.complete or some):
         return None
 
     first, last = np.iinfo(np.uint64).max, 0  # [ns]
@@ -75,7 +79,10 @@ def recover(recording: Recording, target: Path) -> float | None:
                 file.add_metadata(
                     name, sealed(name, entries) if name.startswith("gritd.") else entries
                 )
+        for name, entries in recording.repeated:
+            file.add_metadata(name, entries)
         file.add_metadata(RECOVERED, sealed(RECOVERED, _note(recording)))
+        _copy_attachments(recording, file)
         with Progress("recovering messages", recording.counts.total()) as progress:
             for chunk in recording.chunks():
                 file.add_chunk(*chunk.records())
@@ -86,11 +93,33 @@ def recover(recording: Recording, target: Path) -> float | None:
     return max(last - first, 0) / NS
 
 
+def _check_attachments(recording: Recording) -> int:
+    """Leave out those that are not whole, and say so among the damage; returns how many."""
+    found, whole = recording.attachments, []
+    with reported(recording.path, "read"), opened(recording.path, buffering=0) as source:
+        for place in recording.attachments:
+            try:
+                place.checked(source)
+                whole.append(place)
+            except Damaged as why:
+                recording.damage.append(f"byte {place.start}: {why}; left out")
+    recording.attachments = whole
+    return len(found) - len(whole)
+
+
+def _copy_attachments(recording: Recording, file: McapFile) -> None:
+    with reported(recording.path, "read"), opened(recording.path, buffering=0) as source:
+        for place in recording.attachments:
+            file.add_attachment(place.checked(source), place.pieces(source))
+
+
 def summary(recording: Recording, span: float) -> str:
     """One line: what was saved, and what is known to be lost. span: from the first message to the
     last [s].
     """
     saved = f"saved {recording.counts.total()} messages of {len(recording.counts)} topics"
+    if recording.attachments:
+        saved += f" and {len(recording.attachments)} attachments"
     if recording.complete:
         return f"{saved}; the recording was complete"
 

@@ -82,7 +82,9 @@ def test_a_file_of_each_format_is_read(tmp_path: Path, ending: str) -> None:
     times = (wheel["stamp"] - wheel["stamp"][0]) * 1e-9
     np.testing.assert_allclose(times, writers.TIME, atol=1e-6)
     own = pull if ending != "lvm" else pull[::2]
-    np.testing.assert_allclose((own["stamp"] - wheel["stamp"][0]) * 1e-9, writers.TIME[::2], atol=1e-6)
+    np.testing.assert_allclose(
+        (own["stamp"] - wheel["stamp"][0]) * 1e-9, writers.TIME[::2], atol=1e-6
+    )
     np.testing.assert_allclose(own["fx"], writers.PULL, rtol=1e-6)
     for rows, truth, channel in ((wheel, writers.WHEEL, "wheel"), (cart, writers.CART, "carriage")):
         scale = settings.channels[f"{channel}_encoder"].calibration.scale.value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,21 +15,23 @@ from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser
 from gritd.tools.cli.optional import require
 from gritd.tools.cli.progress import Progress
+from gritd.tools.messages.decoders import Undecodable
 from gritd.tools.recordings import tables
+from gritd.tools.recordings.nested import NestedTopic
 
 FORMS = {"csv": tables.write_csv, "parquet": tables.write_parquet}
 
 
 def main(argv: Sequence[str]) -> int:
-    """Exit 0; 3 where the recording is damaged: then the tables hold what is whole. Raises
-    CommandError.
+    """Exit 0; 3 where the recording is damaged, or something of it does not go into a table: then
+    the tables hold what is whole, and the rest is named. Raises CommandError.
     """
     arguments = _parser().parse_args(argv)
     if arguments.form == "parquet":
         require("pyarrow", "--parquet")
 
     recordings = [files.recording(part) for part in parts(arguments.file)]
-    topics = _chosen(recordings, arguments.topic)
+    topics, left_out = _exported(recordings, _chosen(recordings, arguments.topic))
     folder = _folder(arguments)
 
     try:
@@ -37,15 +40,35 @@ def main(argv: Sequence[str]) -> int:
     except OSError as error:
         raise CommandError(f"{error.filename}: {error.strerror}", USAGE) from None
 
+    for line in left_out:
+        print(visible(f"gritd: {arguments.file}: left out: {line}"), file=sys.stderr)
     damage = [f"{r.path}: {visible(line)}" for r in recordings for line in r.damage]
     if damage:
         raise CommandError("; ".join(damage), DAMAGED)
-    return DONE
+    return DAMAGED if left_out else DONE
+
+
+def _exported(
+    recordings: Sequence[Recording], names: Sequence[str]
+) -> tuple[list[tables.AnyTopic], list[str]]:
+    """The topics, and a line for each that does not go into a table, or not whole."""
+    topics, left_out = [], []
+    with Progress("looking at topics", len(names)) as progress:
+        for number, name in enumerate(names):
+            progress.at(name, number / len(names))
+            try:
+                topics.append(tables.exported(recordings, name))
+            except Undecodable as why:
+                left_out.append(f"{name}: {why}")
+
+    for topic in topics:
+        left_out += topic.left_out if isinstance(topic, NestedTopic) else ()
+    return topics, left_out
 
 
 def _chosen(recordings: Sequence[Recording], wanted: Sequence[str]) -> list[str]:
     """The topics that are asked for, or all. Raises CommandError."""
-    known = list(tables.exportable(recordings))
+    known = tables.exportable(recordings)
     for name in wanted:
         if name not in known:
             raise CommandError(
@@ -69,19 +92,19 @@ def _folder(arguments: Namespace) -> Path:
 
 
 def _written(
-    recordings: Sequence[Recording], names: Sequence[str], folder: Path, form: str
+    recordings: Sequence[Recording], topics: Sequence[tables.AnyTopic], folder: Path, form: str
 ) -> list[Path]:
     """The files, one a topic and one that says what the columns are."""
-    topics, start = tables.exportable(recordings), tables.start_of(recordings)
-    total = sum(recording.counts[name] for recording in recordings for name in names)
+    start = tables.start_of(recordings)
+    total = sum(recording.counts[topic.name] for recording in recordings for topic in topics)
     paths = []
 
     with Progress("exporting", total) as progress:
-        for name in names:
-            paths.append(folder / tables.file_of(name, form))
-            FORMS[form](paths[-1], topics[name], recordings, start, progress.advance)
+        for topic in topics:
+            paths.append(folder / tables.file_of(topic.name, form))
+            FORMS[form](paths[-1], topic, recordings, start, progress.advance)
 
-    tables.write_columns(folder / tables.COLUMNS, [topics[name] for name in names], form)
+    tables.write_columns(folder / tables.COLUMNS, topics, form)
     return [*paths, folder / tables.COLUMNS]
 
 

@@ -25,15 +25,21 @@ def getter(path: str) -> Getter:
     """What takes a number out of a message: NaN where it is not in it, or is no number; of a time
     its seconds.
     """
+    get = value_at(path)
+    return lambda message: number(get(message))
+
+
+def value_at(path: str) -> Callable[[Any], Any]:
+    """What takes a field out of a message; None where it is not in it."""
     steps = [(match[1], match[2]) for match in STEP.finditer(path)]
 
-    def get(message: Any) -> float:
+    def get(message: Any) -> Any:
         value = message
         for name, index in steps:
             parent, value = value, _field(value, name)
             if index is not None:
                 value = _element(parent, value, index)
-        return number(value)
+        return value
 
     return get
 

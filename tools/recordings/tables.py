@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from gritd.estimator.messages.readings import NS
 from gritd.estimator.recording.cdr import Rows, Topic
 from gritd.estimator.recording.salvage import Recording
 from gritd.estimator.recording.topics import CHECKPOINT
+from gritd.tools.recordings.nested import NestedTopic, nested
 
 BLOCK = 5000  # rows between two signs of life
 COLUMNS = "columns.csv"  # what every column is
@@ -21,12 +23,21 @@ TIME = "time"  # the first column [s]
 TIME_MEANING = "seconds since the first message of the run, by receive time"
 
 Advance = Callable[[int], None]
+AnyTopic = Topic | NestedTopic
 
 
-def exportable(recordings: Sequence[Recording]) -> dict[str, Topic]:
-    """The topics that become a table, by name: all but checkpoints, which are the filter's own."""
+def exportable(recordings: Sequence[Recording]) -> list[str]:
+    """The names of the topics that become a table: all but checkpoints, which are the filter's
+    own.
+    """
+    sources = (source for recording in recordings for source in recording.sources.values())
+    return sorted({source.topic.name for source in sources} - {CHECKPOINT})
+
+
+def exported(recordings: Sequence[Recording], name: str) -> AnyTopic:
+    """A topic with the fields that become columns. Raises Undecodable."""
     known = {name: topic for recording in recordings for name, topic in recording.topics.items()}
-    return {name: topic for name, topic in sorted(known.items()) if name != CHECKPOINT}
+    return known.get(name) or nested(recordings, name)
 
 
 def file_of(topic: str, suffix: str) -> str:
@@ -46,7 +57,7 @@ def start_of(recordings: Sequence[Recording]) -> int:
 
 
 def write_csv(
-    path: Path, topic: Topic, recordings: Sequence[Recording], start: int, advance: Advance
+    path: Path, topic: AnyTopic, recordings: Sequence[Recording], start: int, advance: Advance
 ) -> None:
     """One topic. Stamps are in ns since the epoch. A missing message is a missing row; NaN is an
     empty cell. Raises OSError.
@@ -56,12 +67,12 @@ def write_csv(
         writer.writerow([TIME, *topic.names])
 
         for rows in _blocks(topic, recordings, start):
-            writer.writerows([["" if v != v else v for v in row] for row in rows])
+            writer.writerows([["" if v is None or v != v else v for v in row] for row in rows])
             advance(len(rows))
 
 
 def write_parquet(
-    path: Path, topic: Topic, recordings: Sequence[Recording], start: int, advance: Advance
+    path: Path, topic: AnyTopic, recordings: Sequence[Recording], start: int, advance: Advance
 ) -> None:
     """One topic, as `write_csv`. Raises OSError; needs pyarrow."""
     pyarrow = importlib.import_module("pyarrow")
@@ -84,7 +95,7 @@ def _column(pyarrow: Any, values: list[Any]) -> Any:
         return pyarrow.array(values, type=pyarrow.uint64())
 
 
-def write_columns(path: Path, topics: Sequence[Topic], suffix: str) -> None:
+def write_columns(path: Path, topics: Sequence[AnyTopic], suffix: str) -> None:
     """What every column of every file means. Raises OSError."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -96,9 +107,15 @@ def write_columns(path: Path, topics: Sequence[Topic], suffix: str) -> None:
 
 
 def _blocks(
-    topic: Topic, recordings: Sequence[Recording], start: int
+    topic: AnyTopic, recordings: Sequence[Recording], start: int
 ) -> Iterator[list[tuple[Any, ...]]]:
     """The rows of a topic, with the time in front, some at a time."""
+    if isinstance(topic, NestedTopic):
+        rows = topic.rows(recordings, start)
+        while block := list(islice(rows, BLOCK)):
+            yield block
+        return
+
     for recording in recordings:
         if topic.name not in recording.topics:
             continue

@@ -80,7 +80,8 @@ def read_mcap(path: Path, wanted: Wanted) -> list[SeriesTable]:
     asked = {topic for topic in decoders if _asks(wanted, topic)}
     total = sum(recording.counts[topic] for topic in asked)
     tables = _tables(path, _of_mcap(recording, asked), decoders, wanted, total)
-    return _noted(tables, [f"{topic}: {why}" for topic, why in refused.items()], recording.damage)
+    told = [f"{path.name}: {line}" for line in (*recording.damage, *recording.notes)]
+    return _noted(tables, [f"{topic}: {why}" for topic, why in refused.items()], told)
 
 
 def _of_mcap(recording: Recording, asked: set[str]) -> Iterator[_Message]:

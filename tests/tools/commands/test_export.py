@@ -6,6 +6,7 @@ import csv
 import importlib.util
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gritd.estimator.recording.salvage import read
@@ -86,3 +87,42 @@ def test_parquet(recorded, tmp_path, capsys):
     assert cli.main(command) == 0
     table = parquet.read_table(tmp_path / "out" / "raw_motor_shunt.parquet")
     assert table["volts"].to_pylist() == read(recorded).arrays("/raw/motor_shunt")["volts"].tolist()
+
+
+def test_nested_messages_become_columns_and_the_rest_is_named(tmp_path, capsys):
+    rosbags = pytest.importorskip("rosbags.typesys")
+    from mcap.writer import Writer
+
+    store = rosbags.get_typestore(rosbags.Stores.ROS2_HUMBLE)
+    types = store.types
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        text, _ = store.generate_msgdef("sensor_msgs/msg/JointState", ros_version=2)
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", text.encode())
+        joints = writer.register_channel("/joints", "cdr", schema)
+        proto = writer.register_channel("/camera", "protobuf", 0)
+        scan = writer.register_channel("/scan", "json", 0)
+        for at in range(20):
+            header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](at, 5), "a")
+            values = np.array([at, 0.1 * at])
+            message = types["sensor_msgs/msg/JointState"](
+                header, ["arm", "wheel"], values, values[:0], values
+            )
+            data = bytes(store.serialize_cdr(message, message.__msgtype__))
+            writer.add_message(joints, 10**18 + at, data, 0)
+        writer.add_message(proto, 10**18, b"\x08\x01", 0)
+        ranges = b'{"angle": 0.5, "ranges": [' + b",".join([b"1"] * 500) + b"]}"
+        writer.add_message(scan, 10**18, ranges, 0)
+        writer.finish()
+
+    command = ["export", str(tmp_path / "a.mcap"), "--csv", "-o", str(tmp_path / "out")]
+    assert cli.main(command) == 3
+    told = capsys.readouterr().err
+    assert "/camera" in told and "protobuf" in told and "/scan.ranges, an array of 500" in told
+
+    rows = rows_of(tmp_path / "out" / "joints.csv")
+    assert [float(row["position[wheel]"]) for row in rows] == [0.1 * at for at in range(20)]
+    assert rows[3]["header.stamp"] == "3000000005" and rows[3]["header.frame_id"] == "a"
+    assert rows_of(tmp_path / "out" / "scan.csv")[0]["angle"] == "0.5"
+    assert not (tmp_path / "out" / "camera.csv").exists()

@@ -162,3 +162,36 @@ def test_an_output_that_cannot_be_made_is_usage(
     said = capsys.readouterr().err
     assert said.startswith(f"gritd: {tmp_path / name}: ") and said.count("\n") == 1
     assert (tmp_path / "a.mcap").read_bytes() == before
+
+
+def test_attachments_and_metadata_of_others_survive(tmp_path, capsys):
+    """One whose checksum does not hold is named, and the exit code says that it is lost."""
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    photos = {"photo.jpg": bytes(range(256)) * 9000, "notes.txt": b"dry sand"}
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/x", "json", 0)
+        writer.add_message(channel, 10**18, b"{}", 10**18)
+        for name, data in photos.items():
+            writer.add_attachment(1, 2, name, "application/octet-stream", data)
+        writer.add_metadata("lab", {"bench": "3"})
+        writer.add_metadata("lab", {"bench": "4"})
+        writer.finish()
+
+    assert cli.main(["recover", str(tmp_path / "a.mcap")]) == 0
+    with (tmp_path / "a.recovered.mcap").open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert {a.name: a.data for a in reader.iter_attachments()} == photos
+        said = [m.metadata for m in reader.iter_metadata() if m.name == "lab"]
+        assert said == [{"bench": "3"}, {"bench": "4"}]
+        assert reader.get_summary().statistics.attachment_count == 2
+
+    data = (tmp_path / "a.mcap").read_bytes().replace(b"dry sand", b"wet sand")
+    (tmp_path / "b.mcap").write_bytes(data)
+    assert cli.main(["recover", str(tmp_path / "b.mcap")]) == 3
+    assert "notes.txt" in capsys.readouterr().err
+    with (tmp_path / "b.recovered.mcap").open("rb") as file:
+        assert [a.name for a in make_reader(file).iter_attachments()] == ["photo.jpg"]

@@ -19,7 +19,8 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
     group's master channel, since 1970 where the file says when it began. Raises RigFileError.
     """
     library = import_module("asammdf")
-    library.blocks.mdf_v4.MDF4._file = None  # else one that cannot be opened complains when freed
+    # that of a file which could not be opened complains with a traceback when it is freed
+    library.blocks.mdf_v4.MDF4.__del__ = lambda self: None
     with reading(path, "an MDF file"), library.MDF(path) as file:
         numbers = [at for at, group in enumerate(file.groups) if group.channel_group.cycles_nr]
         names = _names(file, numbers)

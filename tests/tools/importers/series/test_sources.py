@@ -102,12 +102,13 @@ def test_files_that_do_not_belong_together_are_told(tmp_path: Path) -> None:
     assert str(other) in str(error.value) and "*_force.npz" in str(error.value)
 
 
-def test_what_was_exported_comes_in_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_what_was_exported_comes_in_again(tmp_path: Path, form: str) -> None:
     """Every reading to the nanosecond and to the last bit."""
-    pytest.importorskip("pyarrow")
+    pytest.importorskip("pyarrow" if form == "parquet" else "csv")
     truth = simulated(tmp_path)
     exported = tmp_path / "again"
-    assert cli.main(["export", str(truth), "--parquet", "-o", str(exported)]) == 0
+    assert cli.main(["export", str(truth), f"--{form}", "-o", str(exported)]) == 0
 
     stamp = "stamp: {channel: time, unit: ns}"
     lines = ["files:"]
@@ -118,7 +119,7 @@ def test_what_was_exported_comes_in_again(tmp_path: Path) -> None:
         "motor_shunt": "volts: {channel: shunt_volts, unit: V}",
         "wrench": "fx: {channel: drawbar_pull, unit: N}, fz: {channel: load, unit: N}",
     }.items():
-        lines.append(f"  raw_{name}.parquet: {{columns: {{{stamp}, {columns}}}}}")
+        lines.append(f"  raw_{name}.{form}: {{columns: {{{stamp}, {columns}}}}}")
     (tmp_path / "map.yaml").write_text("\n".join([*lines, "load: 60 N"]))
     options = ["--map", tmp_path / "map.yaml", "--config", packaged(), "-o", tmp_path / "out"]
     assert main(["csv", str(exported), *map(str, options)]) == 0

@@ -37,6 +37,7 @@ SYMBOLS: dict[str, tuple[Fraction, dict[str, int], bool]] = {
     "s": (Fraction(1), {"s": 1}, True),
     "min": (Fraction(60), {"s": 1}, False),
     "h": (Fraction(3600), {"s": 1}, False),
+    "d": (Fraction(86400), {"s": 1}, False),
     "A": (Fraction(1), {"A": 1}, True),
     "K": (Fraction(1), {"K": 1}, True),
     "degC": (

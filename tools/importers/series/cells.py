@@ -11,6 +11,7 @@ import numpy as np
 from gritd.tools.importers.files import Array
 from gritd.tools.importers.series.times import FOREIGN, is_gap
 
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 
@@ -37,15 +38,26 @@ def number(cell: str) -> float | None:
     return value if math.isfinite(value) else math.nan
 
 
-def numbers(cells: Sequence[str]) -> Array:
-    """Numbers (n,), NaN in a gap. Raises OddCell."""
+def numbers(cells: Sequence[str], commas: bool = True) -> Array:
+    """Numbers (n,), NaN in a gap. `commas`: whether a comma can only be a decimal one; it may also
+    part thousands where the fields are between commas. Raises OddCell.
+    """
     try:
         values = np.array([float(cell) if cell else math.nan for cell in cells])
         if not any("_" in cell for cell in cells):  # which Python allows between digits
             return np.where(np.isfinite(values), values, math.nan)
     except ValueError:  # a decimal comma, a gap in words
         pass
+    if not commas:
+        _check_commas(cells)
     return np.array([_required(at, cell) for at, cell in enumerate(cells)])
+
+
+def _check_commas(cells: Sequence[str]) -> None:
+    """Raises OddCell where every comma may part thousands."""
+    some = [at for at, cell in enumerate(cells) if "," in cell]
+    if some and all(THOUSANDS.fullmatch(cells[at].strip()) for at in some):
+        raise OddCell(some[0], cells[some[0]])
 
 
 def _required(at: int, cell: str) -> float:

@@ -87,7 +87,8 @@ def _builders(
                 made[name, at] = Words()
             else:
                 timed = column.channel in ("time", "date")
-                made[name, at] = Times(column) if timed else Numbers(first[at])
+                numbers = Numbers(first[at], form.separator != ",")
+                made[name, at] = Times(column) if timed else numbers
     return made
 
 
@@ -284,7 +285,7 @@ class _Table:
             except OddCell as error:
                 raise RigFileError(
                     f"{self._path}: row {numbers[error.at]}: {name[:40]}: {error}; "
-                    "expected a number, or nothing where there is a gap"
+                    "expected a number such as 1234.5, or nothing where there is a gap"
                 ) from None
             except TimeFormatError as error:
                 row = numbers[error.at] if numbers else 0

@@ -29,6 +29,7 @@ from gritd.tools.importers.series.stamps import (
 from gritd.tools.importers.series.times import NONE, NS, Nanoseconds
 
 EPOCH = 10**8 * NS  # later times count from 1970
+MOST = 50  # runs of one file whose time begins again
 Rows = NDArray[np.bool_]
 
 
@@ -144,6 +145,11 @@ def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list
     """The rows (n,) of each part that is long enough for a run, with notes on the others. Raises
     RigFileError where none is.
     """
+    if len(order.begins) > MOST:
+        raise RigFileError(
+            f"{table.path}: {name}: found {len(order.begins) - 1} times that fall, the first at "
+            f"row {table.line(order.begins[1])}; expected times that rise, or rate: in the map"
+        )
     part = np.searchsorted(order.begins, np.arange(table.rows), side="right")
     marks = [order.kept & (part == number) for number in range(1, len(order.begins) + 1)]
     long = [rows for rows in marks if rows.sum() >= LEAST]

@@ -25,10 +25,10 @@ from gritd.tools.importers.series.times import (
     unwrapped,
 )
 
-SAMPLE = 2000  # rows that tell how a date is written
 LEAST = 10  # rows of a run
 GLITCH = 1 * NS  # a time that falls by less was set back; by more it began again
 AHEAD = 10  # usual intervals: a time that leaps by more, and back, is one odd stamp
+BITS = (16, 24, 32)  # of a counter
 REPEATED = 0.2  # share of rows with the time of the row before: the clock is too coarse
 
 
@@ -44,7 +44,7 @@ class TimeColumn:
         if self._mapped.unit != CLOCK:
             return self._counted(of_texts(words, self._unit))
         if self._clock is None:
-            self._clock = clock(words[:SAMPLE], self._mapped.order)
+            self._clock = clock(words, self._mapped.order)
         return self._clock.read(words)
 
     def column(self, column: Column) -> Column:
@@ -67,7 +67,7 @@ class TimeColumn:
         return per_unit(units.unit(self._mapped.unit).factor)
 
     def _counted(self, instants: Nanoseconds) -> Nanoseconds:
-        """Since 1970, where the map states the day that a number counts from."""
+        """From 1970 on, where the map states the day that a number counts from."""
         return np.where(instants == NONE, NONE, instants + self._mapped.epoch)
 
 
@@ -88,9 +88,25 @@ def instants(table: SeriesTable, mapped: SeriesMap) -> Nanoseconds:
     known = np.all([each != NONE for each in times], axis=0)
     total = np.where(known, sum(times), NONE)
     one_day = len(times) == 1 or np.all(np.diff(times[0][known]) == 0)
-    if one_day and told[-1].period:
-        total[known] = unwrapped(total[known], told[-1].period)
+    if one_day and (period := told[-1].period or _counter(total[known], mapped)):
+        total[known] = unwrapped(total[known], period)
     return total
+
+
+def _counter(times: Nanoseconds, mapped: SeriesMap) -> int:
+    """After how many ns the times (n,) of a counter begin again: the range of its bits, where they
+    go on behind every fall as if they had it. 0 of others.
+    """
+    name = mapped.named("time")
+    steps = np.diff(times)
+    falls = np.flatnonzero(steps < 0)
+    if name is None or not falls.size or mapped.columns[name].unit == CLOCK:
+        return 0
+
+    unit = per_unit(units.unit(mapped.columns[name].unit).factor)
+    usual = AHEAD * np.median(np.abs(steps))
+    sizes = [unit << bits for bits in BITS if unit << bits < 2**62 and times.max() < unit << bits]
+    return next((s for s in sizes if np.all(np.abs(steps[falls] + s) <= usual)), 0)
 
 
 def _read(table: SeriesTable, name: str, mapped: Mapped) -> Column:

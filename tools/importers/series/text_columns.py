@@ -25,14 +25,17 @@ class Builder(Protocol):
 
 
 class Numbers:
-    """A column of numbers; `first` are some of its cells, which tell its last digit."""
+    """A column of numbers; `first` are some of its cells, which tell its last digit. `commas`:
+    whether a comma in it can only be a decimal one.
+    """
 
-    def __init__(self, first: Sequence[str]) -> None:
+    def __init__(self, first: Sequence[str], commas: bool) -> None:
+        self._commas = commas
         self._pieces: list[Array] = []
         self._resolution = last_digit(first)
 
     def convert(self, cells: Sequence[str]) -> Array:
-        return numbers(cells)
+        return numbers(cells, self._commas)
 
     def keep(self, piece: Array) -> None:
         self._pieces.append(piece)

@@ -36,8 +36,9 @@ NUMBERED = r"(?P<a>\d{1,4})(?P<mark>[-/.])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{4}|\d{
 NAMED = r"(?P<day>\d{1,2})[-. ]{1,2}(?P<month>[A-Za-zä]{3,9})[-., ]{1,2}(?P<year>\d{4})"
 AMERICAN = r"(?P<month>[A-Za-zä]{3,9})\.? (?P<day>\d{1,2}),? (?P<year>\d{4})"
 COMPACT = r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)"
+DAYS = r"(?:(?P<days>\d{1,5}) days?,? )?"  # of pandas
 CLOCK = (
-    r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d+))?)?(?: ?(?P<half>[AP]M))?"
+    r"(?P<h>\d{1,3}):(?P<min>\d\d)(?::(?P<s>\d\d)(?:[.,:](?P<part>\d+))?)?(?: ?(?P<half>[AP]M))?"
 )
 TOGETHER = r"(?P<h>\d\d)(?P<min>\d\d)(?P<s>\d\d)(?:[.,](?P<part>\d+))?(?P<half>)"
 MINUTES = r"(?P<h>)(?P<min>\d{1,2}):(?P<s>\d\d)[.,](?P<part>\d+)(?P<half>)"
@@ -50,7 +51,7 @@ FORMS = {
         "named": rf"{WEEKDAY}(?P<date>{NAMED})(?:[T /_:,-]{{1,2}}{CLOCK}{ZONE})?",
         "american": rf"{WEEKDAY}(?P<date>{AMERICAN})(?:[T /_:,-]{{1,2}}{CLOCK}{ZONE})?",
         "compact": rf"(?P<date>{COMPACT})(?:[T _-]?{TOGETHER}{ZONE})?",
-        "of day": rf"{CLOCK}{ZONE}",
+        "of day": rf"{DAYS}{CLOCK}{ZONE}",
         "of hour": MINUTES,
     }.items()
 }
@@ -133,7 +134,9 @@ class Clock:
         seconds = _seconds(match["h"], match["min"], match["s"], match["half"]) * NS
         instant = seconds + _fraction(match["part"] or "0")
         if self.period:
-            return instant
+            return instant + int(match.groupdict().get("days") or 0) * DAY
+        if instant > DAY:
+            raise ValueError
         day = (_date(match, self.order).toordinal() - EPOCH) * DAY
         return _checked(day + instant - _zone(match["zone"]), match.string, 0)
 
@@ -207,7 +210,7 @@ def _seconds(hour: str | None, minute: str | None, second: str | None, half: str
         if not 1 <= h <= 12:
             raise ValueError
         h = h % 12 + 12 * (half.upper() == "PM")
-    if h > 24 or m > 59 or s > 60:
+    if m > 59 or s > 60:
         raise ValueError
     return h * 3600 + m * 60 + s
 

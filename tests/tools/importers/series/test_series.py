@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -150,6 +151,48 @@ def test_a_time_that_begins_again_begins_a_run(
     assert all(recording.run.nominal_load == 40.0 for recording in found.values())
     said = capsys.readouterr().out
     assert "rows 352, 353, 354" in said and "row 102" in said
+
+
+def stamps_of(folder: Path, times: list[str], time: str) -> list[int]:
+    """Of the first encoder, with these times and this line of the map for them."""
+    header, *rows = table(folder).read_text().splitlines()
+    body = [f"{t},{row.partition(',')[2]}" for t, row in zip(times, rows, strict=False)]
+    (folder / "run.csv").write_text("\n".join([header, *body]))
+    output = imported(
+        folder, folder / "run.csv", text=MAP.replace("{channel: time, unit: s}", time)
+    )
+    found: list[int] = read(output / "run.mcap").arrays("/raw/wheel_encoder")["stamp"].tolist()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("unit", "epoch", "first"),
+    [("s", "1904-01-01", "3878546585.00"), ("d", "1899-12-30", "46352.5854747685185")],
+)
+def test_a_time_counts_from_the_day_that_the_map_states(
+    tmp_path: Path, unit: str, epoch: str, first: str
+) -> None:
+    """As LabVIEW and spreadsheets count."""
+    per_row = Decimal("0.02") / (1 if unit == "s" else 86400)
+    times = [f"{Decimal(first) + at * per_row:.13f}" for at in range(250)]
+    stamps = stamps_of(tmp_path, times, f"{{channel: time, unit: {unit}, epoch: {epoch}}}")
+    assert abs(stamps[0] - 1795701785_000_000_000) < 10**9
+    np.testing.assert_allclose(np.diff(stamps), 20_000_000, atol=20_000)
+
+
+@pytest.mark.parametrize(("unit", "bits", "step"), [("us", 32, 20_000), ("ms", 16, 20)])
+def test_a_counter_that_begins_again_goes_on(
+    tmp_path: Path, unit: str, bits: int, step: int
+) -> None:
+    """A clock of 32 bits in microseconds does so every 71 minutes."""
+    times = [str((2**bits - 100 * step - 7 + at * step) % 2**bits) for at in range(250)]
+    stamps = stamps_of(tmp_path, times, f"{{channel: time, unit: {unit}}}")
+    assert len(stamps) == 250 and set(np.diff(stamps)) == {20_000_000}
+
+
+def test_a_time_that_falls_all_the_way_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="249 times that fall, the first at row 3"):
+        stamps_of(tmp_path, [f"{9.0 - 2 * at}" for at in range(250)], "{channel: time, unit: s}")
 
 
 def test_a_day_beside_a_time_of_day(tmp_path: Path) -> None:

@@ -110,6 +110,14 @@ def test_times_of_day_go_on_past_midnight() -> None:
     assert np.diff(unwrapped(read.read(words), read.period)).tolist() == [NS * 3 // 4]
 
 
+def test_elapsed_times_go_beyond_a_day() -> None:
+    words = ["23:59:59.5", "24:00:00.5", "100:00:00.5"]
+    found = clock(words).read(words)
+    assert np.diff(found).tolist() == [NS, 76 * HOUR]
+    words = ["0 days 23:59:59.500000", "1 days 00:00:00.5", "4 days 04:00:00.5"]  # of pandas
+    assert clock(words).read(words).tolist() == found.tolist()
+
+
 @pytest.mark.parametrize(
     "word", ["31.02.2026 10:00", "26.11.2026 25:00", "26.13.2026", "12.5", "x"]
 )

@@ -76,6 +76,7 @@ def diagnose(
     jobs: int = 1,
     quick: bool = False,
     other_rig: bool = False,
+    online: bool = False,
     step: Callable[[str], None] = lambda what: None,
 ) -> Result:
     """Where runs and model differ, and which physics was left out.
@@ -85,6 +86,7 @@ def diagnose(
     bed: with a reference, "same" or "prepared". seed: of the surrogates. jobs: processes that fit.
     quick: a first answer, for which only the likeliest effects are fitted, each alone.
     other_rig: config may be of another testbed than the runs.
+    online: the on-line filter runs over them too, by config and by what was found.
     step: is told what begins.
 
     Raises ValueError without runs, CommandError and ConfigError; one line.
@@ -97,7 +99,16 @@ def diagnose(
     given = references.given([_file(each) for each in reference], bed)
     files, configuration = [_file(run) for run in runs], configured(config)
     diagnosis, damage = of_files(
-        files, configuration, seed, step, jobs, "", given, quick, own_rig=not other_rig
+        files,
+        configuration,
+        seed,
+        step,
+        jobs,
+        "",
+        given,
+        quick,
+        own_rig=not other_rig,
+        online=online,
     )
     return Result(lab.with_runs(diagnosis, files, configuration), tuple(damage))
 

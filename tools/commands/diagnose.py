@@ -109,6 +109,7 @@ def _one(arguments: argparse.Namespace) -> int:
             reference,
             arguments.quick,
             own_rig=not arguments.other_rig,
+            online=arguments.online,
         )
 
     _write(arguments, _told(arguments, diagnosis, arguments.files, configuration), configuration)
@@ -123,6 +124,7 @@ def _command(arguments: argparse.Namespace, seed: int) -> str:
         words += ["--reference", *map(str, arguments.reference), "--bed", arguments.bed]
     words += ["--config", str(arguments.config), "--seed", str(seed)]
     words += ["--quick"] if arguments.quick else []
+    words += ["--online"] if arguments.online else []
     return shlex.join(["gritd", "diagnose", *words])
 
 
@@ -162,6 +164,7 @@ def _again(arguments: argparse.Namespace) -> int:
             then.command,
             then.reference,
             then.quick,
+            online=arguments.online,
         )
 
     _write(arguments, _told(arguments, diagnosis, list(then.files), configuration), configuration)
@@ -335,6 +338,11 @@ def _parser() -> argparse.ArgumentParser:
         "--quick",
         action="store_true",
         help="a first answer: only the likeliest effects, one at a time",
+    )
+    parser.add_argument(
+        "--online",
+        action="store_true",
+        help="run the on-line filter over the recordings too, with what was found and without",
     )
     parser.add_argument(
         "--jobs",

@@ -18,7 +18,7 @@ from gritd.tools.diagnose.explain.innovations import Filtered, filtered, with_in
 from gritd.tools.diagnose.explain.result import Diagnosis
 from gritd.tools.diagnose.method import diagnose
 from gritd.tools.diagnose.rig.adapter import rig_of
-from gritd.tools.diagnose.rig.signals import distinct, read_all, read_one
+from gritd.tools.diagnose.rig.signals import distinct, in_order, read_all, read_one
 from gritd.tools.report import reference as references
 
 
@@ -32,15 +32,18 @@ def of_files(
     reference: references.Given = references.NONE,
     quick: bool = False,
     own_rig: bool = False,
+    online: bool = False,
 ) -> tuple[Diagnosis, list[str]]:
     """The diagnosis, and what was damaged in the files. Raises CommandError.
 
     step: is told what begins; jobs: processes; command: what does the same again in a shell; quick:
     a first answer.
-    own_rig: recordings of another testbed than the configuration's are refused.
+    own_rig: recordings of another testbed than the configuration's are refused; online: the on-line
+    filter runs over them too, before and after.
     """
     settings = configuration.settings
-    recordings, known = read_all(files), read_all(reference.files)
+    files = in_order(files)
+    recordings, known = read_all(files), read_all(in_order(reference.files))
     if own_rig:
         provenance.check_rig([*recordings, *known], settings, configuration.source)
 
@@ -59,12 +62,12 @@ def of_files(
         warnings.simplefilter("ignore", RuntimeWarning)
         soil = any(constant.soil for constant in rig.constants)
         # long recordings are large: they are let go, and read again where they are needed
-        work = Filtered if quick else partial(filtered, configuration, recordings, soil)
+        work = partial(filtered, configuration, recordings, soil) if online else Filtered
         del recordings, known
         with meanwhile(jobs, work) as before:
             del work
             diagnosis = diagnose(rig, seed, redo, step, jobs, quick)
-            if not quick:
+            if online:
                 again = [partial(read_one, path) for path in files]
                 diagnosis = with_innovations(diagnosis, configuration, before(), again, jobs)
 

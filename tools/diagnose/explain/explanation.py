@@ -71,7 +71,7 @@ def explain(
         fit=_fit(problem, before, after),
         law=law.law if law else None,
         next_experiment=proposed,
-        caveats=_caveats(problem, accepted, whole, redo),
+        caveats=_caveats(problem, accepted, whole, redo, search.failed),
         share=decision.share,
         remaining=left,
         remaining_words=_remaining(decision, strains(rig, accepted), left, bool(rig.forms)),
@@ -80,7 +80,15 @@ def explain(
         noise=_noise(problem),
         reference=None,
         explanations=tuple(
-            Explanation(w.names, w.nameless, w.evidence, w.probability) for w in decision.weighed
+            Explanation(
+                w.names,
+                w.nameless,
+                w.evidence,
+                w.probability * (w.listed if w.names else 1.0),
+                w.share,
+                w.trust,
+            )
+            for w in decision.weighed
         ),
         lines=ripples_of(rig),
         latencies=latencies_of(rig),
@@ -124,7 +132,7 @@ def _hypotheses(
         accepted = decision.verdict == "explained" and name in decision.best.names
         best = decision.best if accepted else max(models, key=lambda m: m.evidence, default=None)
         alike = _alike(decision, name)
-        forms = decision.best.form_share(name) if accepted else 0.0
+        forms = best.form_share(name) if best else 0.0
         rig = search.problem.stack.rig
 
         out.append(
@@ -228,11 +236,20 @@ def _subject(rig: Rig) -> str:
 
 
 def _caveats(
-    problem: Problem, accepted: Model, whole: Model, redo: Mapping[str, Any]
+    problem: Problem,
+    accepted: Model,
+    whole: Model,
+    redo: Mapping[str, Any],
+    failed: Sequence[Sequence[str]],
 ) -> tuple[str, ...]:
-    """Sentences on what to doubt; whole: the accepted model with functions without a name."""
+    """Sentences on what to doubt; whole: the accepted model with functions without a name; failed:
+    effects that no fit was had of.
+    """
     rig = problem.stack.rig
     sentences = list(rig.caveats)
+    if failed:
+        names = listed(sorted({" with ".join(of) for of in failed}))
+        sentences.append(f"Left out, for their algebra failed: {names}.")
     if redo.get("quick"):
         sentences.append(
             "A first answer (--quick): the likeliest effects were fitted one at a time, and no"

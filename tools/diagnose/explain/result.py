@@ -257,6 +257,8 @@ class Explanation:
     nameless: bool
     evidence: float
     probability: float
+    share: float = 0.0
+    trust: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

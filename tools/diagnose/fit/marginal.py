@@ -152,6 +152,11 @@ class Marginal:
         spread = sum(w * (s + np.outer(m - mean, m - mean)) for w, m, s in told) / total
         return np.asarray(mean), np.asarray(spread)
 
+    def log_likelihoods(self, chosen: Chosen, number: int) -> Array:
+        """Of each size of one freedom (n,), all others as chosen, without its prior."""
+        values = [self.log_evidence(c) for c in self._along(chosen, number)]
+        return np.array(values) - self.freedoms[number].sizes.log_prior
+
     def size_of(self, chosen: Chosen, number: int) -> float:
         """Root mean square size of a freedom, over the sizes about the likeliest ones."""
         ordered, weight = self._weighed(chosen)

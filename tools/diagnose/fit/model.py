@@ -91,13 +91,27 @@ class Model:
             whitened = whitened + size * (freedom.whitened @ weights)
         return own, whitened
 
+    def of_forms(self, name: str) -> Array | None:
+        """Log likelihood (h,) of each size by which an effect may act in another form than ours,
+        the other freedoms as chosen; None where it has no other form.
+        """
+        own = self._form_of(name)
+        if self.marginal is None or own is None:
+            return None
+        return self.marginal.log_likelihoods(self.chosen, own)
+
+    def _form_of(self, name: str) -> int | None:
+        """Which freedom holds other forms of an effect: the last of its own."""
+        every = list(enumerate(self.marginal.freedoms if self.marginal else ()))
+        own = [number for number, freedom in every[len(self.sizes) :] if freedom.name == name]
+        return own[-1] if own else None
+
     def form_share(self, name: str) -> float:
         """Root mean square share by which an effect may act in another form than ours."""
-        if self.marginal is None:
+        own = self._form_of(name)
+        if self.marginal is None or own is None:
             return 0.0
-        every = list(enumerate(self.marginal.freedoms))[len(self.sizes) :]
-        own = [number for number, freedom in every if freedom.name == name]
-        return self.marginal.size_of(self.chosen, own[-1]) if own else 0.0
+        return self.marginal.size_of(self.chosen, own)
 
     def constants(self) -> tuple[Array, Array]:
         """Mean (q,) and covariance (q, q) of the constants in prior σ, averaged over the sizes of

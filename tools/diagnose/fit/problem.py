@@ -145,7 +145,6 @@ class Problem:
         off by.
         """
         self.stack, self.noise = stack, noise
-        self.far = TUNING.fit.far  # [σ] that a constant may be off
         allowed = freedom("tolerance", tolerance, noise, Sizes())
         self.fixed: tuple[Freedom, ...] = (allowed,)  # what every fit has
         self.allowance = Allowance(((allowed, 1.0),))
@@ -165,12 +164,6 @@ class Problem:
         more = freedom("nameless", columns, self.noise, Sizes())
         other = self._with([(more, 1.0)])
         other.fixed = (*self.fixed, more)
-        return other
-
-    def near(self, far: float) -> Problem:
-        """The same with constants no farther than so many σ from what is known of them."""
-        other = copy(self)
-        other.far = far
         return other
 
     def with_freedoms(self, freedoms: Sequence[Freedom], sizes: Sequence[float]) -> Problem:
@@ -244,7 +237,7 @@ class Ground:
         weights = (np.ones(self._count), [f.weight for f in free])
         self.penalty = np.concatenate((*weights, np.ones(problem.allowance.count)))
 
-        ends = [_ends(known, problem.far) for known in constants] + [_ends_of(f) for f in free]
+        ends = [_ends(known) for known in constants] + [_ends_of(f) for f in free]
         low, high = np.array(ends).reshape(-1, 2).T
         self.bounds = descent.Bounds(low, high)
         shapes = [f.parameter.role != "strength" for f in free]
@@ -365,8 +358,9 @@ class Ground:
         return np.nan_to_num(raw, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def _ends(known: Constant, far: float) -> tuple[float, float]:
-    """Bounds of a constant, in prior σ, and no farther than `far` of them."""
+def _ends(known: Constant) -> tuple[float, float]:
+    """Bounds of a constant, in prior σ, none beyond what a fit may strain it by."""
+    far = TUNING.fit.far
     if known.log:
         return -far, far
     low, high = ((end - known.value) / known.sigma for end in (known.low, known.high))

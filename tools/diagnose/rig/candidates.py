@@ -8,12 +8,8 @@ import numpy as np
 
 from gritd.estimator.effects import EFFECTS
 from gritd.estimator.effects.base import Effect
-from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.diagnose.rig.interface import Index
 from gritd.tools.diagnose.rig.signals import Signals
-from gritd.tools.diagnose.tuning import TUNING
-
-TURN = 2.0 * np.pi  # [rad] a recording that goes on for so long is no table
 
 
 def candidates(signals: Sequence[Signals], left_out: Collection[str]) -> dict[str, type[Effect]]:
@@ -31,21 +27,10 @@ def tables(signals: Sequence[Signals]) -> bool:
 
 
 def steady_states(signals: Signals) -> bool:
-    """Whether a recording is a table of steady states. Time, place and wheel angle in it mean
-    nothing.
-
-    Its importer says so. Else no speed changes but across a silence, and no stretch lasts a whole
-    turn.
+    """Whether a recording is a table of steady states, as it says itself: time, place and wheel
+    angle in it mean nothing. Short runs at steady speeds are none.
     """
-    if signals.info.steady_states:
-        return True
-
-    return not any(
-        np.ptp(signals.wheel_angle[at]) >= TURN
-        or _changes(signals.wheel_speed[at])
-        or _changes(signals.carriage_rate[at])
-        for at in unbroken(signals)
-    )
+    return signals.info.steady_states
 
 
 def unbroken(signals: Signals) -> list[Index]:
@@ -53,7 +38,3 @@ def unbroken(signals: Signals) -> list[Index]:
     known = np.flatnonzero(np.isfinite(signals.wheel_speed) & np.isfinite(signals.carriage_rate))
     stretches = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
     return [at for at in stretches if at.size]
-
-
-def _changes(speed: Array) -> bool:
-    return float(np.ptp(speed)) > TUNING.rig.steady_range * float(np.abs(speed).max())

@@ -73,6 +73,7 @@ class DriveRig:
     partial: Mapping[str, tuple[str, Sequence[Bools]]] = {}
     law = None
     slipping = ""
+    tabled = False
     stated_noise: Mapping[str, float] = {}
     shortcomings: Sequence[str] = ()
 

@@ -241,6 +241,12 @@ class Rig(Protocol):
         """The constant that changes the slip; "" where nothing slips."""
 
     @property
+    def tabled(self) -> bool:
+        """Whether the recordings are tables of steady states: their scatter was drawn, white, by
+        what imported them.
+        """
+
+    @property
     def stated_noise(self) -> Mapping[str, float]:
         """Standard deviation of one reading of a channel as the configuration states it, in the
         channel's unit; of those that it states one.

@@ -113,6 +113,15 @@ def distinct(paths: Sequence[Path]) -> dict[str, str]:
     return checksums
 
 
+def in_order(paths: Sequence[Path]) -> list[Path]:
+    """The recordings by name, those of one name by content: no result depends on the order in which
+    they are given. A rig orders the runs of a campaign by their time, as far as that tells.
+    """
+    names = [path.name for path in paths]
+    content = {p: sha256(p) if names.count(p.name) > 1 else "" for p in paths}
+    return sorted(paths, key=lambda path: (path.name, content[path]))
+
+
 def read_one(path: Path) -> Recording:
     """Raises CommandError, one line, for a file that cannot be read."""
     try:

@@ -111,11 +111,12 @@ class WheelRig:
         self.baseline = configured(settings.effects)
         self.settings, self.lines, self.latencies = settings, lines, latencies
         self.new = [number >= reference for number in range(len(signals))]
-        self._tabled, self._doubt = tables(signals), [s.doubt for s in signals]
+        self.tabled, self._doubt = tables(signals), [s.doubt for s in signals]
         self.channels = channels_of(signals, settings, [w.known for w in weights])
         self.loss_of_drive = read_off and loss_measured(signals, self.channels)
 
-        self.stated_noise = noise_of_readings(settings, self.loss_of_drive)
+        stated_noise = noise_of_readings(settings, self.loss_of_drive)
+        self.stated_noise = {} if self.tabled else stated_noise  # no row is a reading
         self._driven = _driven(signals, weights, self.new, settings)
         self._idle = (
             idle_values(signals, self._driven.motions, settings) if self.loss_of_drive else None
@@ -217,7 +218,7 @@ class WheelRig:
         """Of wheel, carriage and measured load, channels (n,) of each run; nothing in tables, whose
         values are those of states.
         """
-        if self._tabled:
+        if self.tabled:
             return ()
         speeds = unrest_in(self._driven.motions, self._by_carriage)
         if all(one.known for one in self._weights):
@@ -227,7 +228,7 @@ class WheelRig:
     @cached_property
     def reliefs(self) -> Sequence[Sequence[Mapping[str, Array]]]:
         """Of each run, channels (n,); none on a bed that was not touched, and none in tables."""
-        if self._tabled or not self._anew or "sinkage" not in self.channels:
+        if self.tabled or not self._anew or "sinkage" not in self.channels:
             return ()
         return list(reliefs_of(self.runs, self.channels, height_of(self.settings)))
 
@@ -255,7 +256,7 @@ class WheelRig:
         back inside an interval.
         """
         blur = blur_of(stack, predicted)
-        if self._tabled or "torque" not in self.channels:
+        if self.tabled or "torque" not in self.channels:
             return blur
         after = [after_reversal(motion, self.settings) for motion in self._driven.motions]
         return np.hypot(blur, blur_of_reversal(stack, predicted, after))
@@ -298,7 +299,7 @@ class WheelRig:
                 self.channels,
                 sinkage_from_prior(motion, self.settings, soil, configured(self._acting.effects)),
                 idle,
-                self._tabled,
+                self.tabled,
             )
             for one, motion, idle in zip(signals, self._driven.motions, idles, strict=True)
         ]

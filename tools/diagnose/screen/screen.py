@@ -16,6 +16,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
@@ -54,6 +55,7 @@ class Screen:
     ripple: chance of the likeliest new ripple that the recordings show at their own rate.
     counts: the share of evidence that counts beside a reference, or a discrepancy that was learnt:
         it was driven elsewhere too.
+    strain: [σ] of the constant that stands farthest from what is known of it.
     habit:  the largest surprise of each candidate in a run of the reference (habit.py).
     apart:  candidates whose habit says nothing of others: a rig that ripples is off its model in
         nothing else.
@@ -71,6 +73,7 @@ class Screen:
     apart: Collection[Candidate] = ()
     ripple: float = 1.0
     counts: float = 1.0
+    strain: float = 0.0
 
     @property
     def listed(self) -> dict[str, float]:
@@ -144,7 +147,13 @@ class Screen:
         counted = float((1 + np.sum(self.nulls >= self.largest[1])) / (1 + len(self.nulls)))
         lacking = max(self.asked - max(self.open, 0.0), self.of_reference - self.largest[1])
         beyond = min(TUNING.screen.level * float(np.exp(lacking)), 1.0)
-        return min(max(counted, beyond), self.ripple)
+        return min(max(counted, beyond), self.ripple, self.strained)
+
+    @property
+    def strained(self) -> float:
+        """Chance of a constant as far from what is known of it, in any of so many kinds."""
+        far = 2.0 * float(ndtr(-self.strain))
+        return min(TUNING.screen.kinds * far, 1.0) if self.strain > TUNING.screen.beyond else 1.0
 
     @property
     def stands_out(self) -> list[Candidate]:
@@ -156,8 +165,9 @@ class Screen:
 
     @property
     def on_grid(self) -> bool:
-        """Whether something stands out on the grid."""
-        return self.largest[1] > self.threshold and self.open > self.asked
+        """Whether something stands out on the grid, or a constant strains beyond belief."""
+        outstanding = self.largest[1] > self.threshold and self.open > self.asked
+        return outstanding or self.strain > TUNING.screen.beyond
 
     @property
     def alarmed(self) -> bool:

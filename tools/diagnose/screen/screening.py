@@ -93,14 +93,25 @@ def screen_of_base(screening: Screening, jobs: int = 1) -> Screen:
         counts = max(_covered(screening), TUNING.screen.least_covered)
         open_ = counts * _open_form(screening, model, screen)
         ripple = _ripple(problem) ** counts  # as evidence, it counts by the covered share
-        return replace(screen, open=open_, ripple=ripple, counts=counts)
+        strain = strain_of(problem, model)
+        return replace(screen, open=open_, ripple=ripple, counts=counts, strain=strain)
     searched = _averages(screening, model, jobs)
     projection = model.fitted.projection(drawn)
     kept = screening.functions
     screen = screen_signatures(projection, _parts(screening, model), searched, jobs, kept)
 
     # whether there is a mismatch at all; with a reference campaign the noise's colour is not open
-    return replace(screen, open=_open(screening, model, screen, jobs), ripple=_ripple(problem))
+    open_ = np.inf if problem.stack.rig.tabled else _open(screening, model, screen, jobs)
+    return replace(screen, open=open_, ripple=_ripple(problem), strain=strain_of(problem, model))
+
+
+def strain_of(problem: Problem, model: Model) -> float:
+    """How far the farthest constant of a fit stands from what is known of it [σ]; beside a
+    reference, of those that tell what is new.
+    """
+    referred = problem.stack.referred
+    told = [bool(constant.changes) or not referred for constant in problem.stack.rig.constants]
+    return float(np.max(np.abs(model.fitted.u[np.array(told, bool)]), initial=0.0))
 
 
 def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
@@ -114,7 +125,8 @@ def with_form_open(screening: Screening, bare: Model, screen: Screen) -> Screen:
     counts = max(held.covered, TUNING.screen.least_covered)
     left = counts * _open_form(screening, bare, screen)
     most = max(screen.asked, asked(screening.problem.stack))
-    return replace(screen, open=min(screen.open, left), counts=counts, asked=most)
+    least, strain = min(screen.open, left), strain_of(screening.problem, bare)
+    return replace(screen, open=least, counts=counts, asked=most, strain=strain)
 
 
 def _parts(screening: Screening, model: Model) -> list[Part]:

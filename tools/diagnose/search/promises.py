@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from gritd.estimator.effects.base import Effect
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
+from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.bending import varied_along_place
 from gritd.tools.diagnose.fit.evidence import Signature, log_bayes, log_evidence
 from gritd.tools.diagnose.fit.marginal import Chosen
@@ -67,7 +69,7 @@ def promises(problem: Problem, screen: Screen, model: Model, jobs: int = 1) -> l
 
     def likeliest(some: Sequence[str]) -> list[Promise]:
         with problem.stack.rig.aside():  # the same bits, whatever was tried before
-            every = (_promised(beside, effects[name]) for name in some)
+            every = [attempted(partial(_promised, beside, effects[name])) for name in some]
             return [promise for promise in every if promise is not None]
 
     made = each(jobs, likeliest, list(some_of(names)))

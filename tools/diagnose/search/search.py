@@ -13,6 +13,7 @@ import numpy as np
 from gritd.estimator.effects.base import order_of
 from gritd.tools.cli.memory import give_back
 from gritd.tools.cli.parallel import each
+from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.model import Model, fit_model
 from gritd.tools.diagnose.fit.problem import Free, Maker, Problem, free_of
 from gritd.tools.diagnose.fit.signatures import resolved_order
@@ -34,6 +35,7 @@ class Search:
     screening: Screening
     models: tuple[Model, ...]
     first: Screen
+    failed: tuple[tuple[str, ...], ...] = ()  # effects whose fit ended in a numerical failure
 
     @property
     def problem(self) -> Problem:
@@ -92,7 +94,7 @@ def search_models(
     search = extended(search, [search.bare], TUNING.search.effects_first, jobs)
     if search.problem.stack.referred:  # beside what the reference tells by itself, too
         search = extended(search, [search.base], TUNING.search.effects_later, jobs)
-    search = _settled(_calmed(search, jobs))
+    search = _settled(search)
     tested: Model | None = None
     for size in range(1, TUNING.search.most_effects):
         starts = [m for m in search.sized(size)[: TUNING.search.starts] if _near(search, m)]
@@ -118,53 +120,6 @@ def _bare(search: Search, start: Model) -> Model:
     sizes = start.sizes or tuple(0 for _ in screening.forms)
     begins = (start.fitted.u, np.zeros(0))
     return fit_model(screening.problem, screening.forms, (), (), begins, sizes)
-
-
-def _calmed(search: Search, jobs: int) -> Search:
-    """With the best models of a forward search that keeps the constants near what is known of them,
-    let go; as it is where the bare model leaves them there.
-
-    Where much is left out, the constants strain for it. From where they end, other effects look
-    like others, and no single one sets the constants free: a channel that is blurred until no
-    ripple is left of it turns a ripple round, and an offset keeps a strong friction's place. So
-    effects are added first, as many as help, and the constants follow.
-    """
-    if np.max(np.abs(search.bare.fitted.u), initial=0.0) < TUNING.search.strained:
-        return search
-    problem = search.problem.near(TUNING.search.near)
-    screening = replace(search.screening, problem=problem)
-    known = np.zeros_like(search.base.fitted.u)
-    base = replace(search.base, fitted=problem.descend((), (), known, np.zeros(0)))
-    near = Search(screening, (base,), search.first)
-    near = replace(near, models=(base, _bare(near, base)))
-
-    best = near.bare
-    for _ in range(TUNING.search.most_effects):
-        near = extended(near, [best], TUNING.search.effects_near, jobs)
-        more = near.sized(len(best.names) + 1)
-        if not more or near.weight(more[0]) < near.weight(best):
-            break
-        best = more[0]
-
-    found = [m for n in range(len(best.names)) for m in near.sized(n + 1)[:1]]
-    free = each(jobs, lambda model: _let_go(search, model), found, shared(near))
-    return replace(search, models=tuple(_the_better((*search.models, *free))))
-
-
-def _let_go(search: Search, model: Model) -> Model:
-    """A model that was fitted near the known constants, fitted with all their room."""
-    fitted, screening = model.fitted, search.screening
-    begins, bends = (fitted.u, fitted.x), model.other_forms
-    with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-        return fit_model(
-            screening.problem,
-            screening.forms,
-            fitted.effects,
-            fitted.free,
-            begins,
-            model.sizes,
-            bends,
-        )
 
 
 def _the_better(models: Sequence[Model]) -> Iterator[Model]:
@@ -201,17 +156,30 @@ def extended(search: Search, starts: Sequence[Model], most: int, jobs: int) -> S
     wanted: dict[frozenset[str], tuple[Model, Promise]] = {}
     for model in starts:
         every = promises(search.problem, search.first, model, jobs)
-        candidates = [p for p in every if p.gain > TUNING.search.promising]
+        least = _least_promise(model, every)
+        candidates = [p for p in every if p.gain > least]
         fresh = [(frozenset((*model.names, p.effect.name)), p) for p in candidates]
         fresh = [(names, p) for names, p in fresh if names not in wanted and not search.has(names)]
         wanted |= {names: (model, promise) for names, promise in fresh[:most]}
 
-    def fitted(of: tuple[Model, Promise]) -> Model:
+    def fitted(of: tuple[Model, Promise]) -> Model | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return _with_effect(search, *of)
+            return attempted(lambda: _with_effect(search, *of))
 
     made = each(jobs, fitted, list(wanted.values()), shared(search))
-    return replace(search, models=(*search.models, *made))
+    models = (*search.models, *(model for model in made if model is not None))
+    told = zip(wanted.values(), made, strict=True)
+    failed = tuple((*start.names, p.effect.name) for (start, p), model in told if model is None)
+    return replace(search, models=models, failed=(*search.failed, *failed))
+
+
+def _least_promise(model: Model, every: Sequence[Promise]) -> float:
+    """What an effect must gain by linear algebra beside a model to be fitted [nats]: a share of the
+    best, which a fit may turn round; one more effect also some of what the verdict asks of it.
+    """
+    alone = TUNING.search.companion if model.names else TUNING.search.promising
+    top = max((promise.gain for promise in every), default=0.0)
+    return max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
 
 
 def shared(search: Search) -> list[object]:
@@ -273,8 +241,13 @@ def _retested(search: Search, best: Model, jobs: int) -> Search:
     """
     if len(best.names) < 2:
         return search
-    less = each(jobs, lambda leave: _less(search, best, leave), best.names, shared(search))
-    return replace(search, models=tuple(_the_better((*search.models, *less))))
+
+    def less(leave: str) -> Model | None:
+        return attempted(lambda: _less(search, best, leave))
+
+    made = each(jobs, less, best.names, shared(search))
+    again = [model for model in made if model is not None]
+    return replace(search, models=tuple(_the_better((*search.models, *again))))
 
 
 def without(search: Search, model: Model, name: str) -> Model:

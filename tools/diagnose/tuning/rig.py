@@ -51,9 +51,6 @@ class Rig:
     )
     kept_balances: int = tuned(8, "balances", "of all runs that are kept", "memory, run time")
 
-    # --- candidates.py ---
-    steady_range: float = tuned(0.2, "-", "relative range of a speed that does not change")
-
     # --- constants.py ---
     timing: float = tuned(5e-3, "s", "a channel's stamps may be off by so much", DESIGN)
     blur: float = tuned(

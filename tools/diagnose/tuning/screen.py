@@ -42,6 +42,10 @@ class Screen:
 
     at_once: int = tuned(12, "signatures", "whitened and projected, or weighed, at once", "memory")
 
+    beyond: float = tuned(
+        4.0, "σ", "of a constant: farther from what is known of it is an alarm by itself"
+    )
+
     # --- screening.py ---
     nulls: int = tuned(300, "draws", "of noise alone", "run time")
     strained: float = tuned(3.0, "σ", "expected size of a constant's error that was not foreseen")

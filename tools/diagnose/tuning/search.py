@@ -13,7 +13,7 @@ TESTBEDS = "of ten testbeds with one effect left out, one or two have a second t
 class Search:
     """How far the search for effects goes."""
 
-    effects_first: int = tuned(9, "effects", "fitted beside the base model", "run time")
+    effects_first: int = tuned(7, "effects", "fitted beside the base model", "run time")
     effects_quick: int = tuned(3, "effects", "fitted for a first answer", "run time")
     effects_later: int = tuned(5, "effects", "fitted beside a model with effects", "run time")
     starts: int = tuned(2, "models", "of a size from which the next step starts", "run time")
@@ -37,13 +37,18 @@ class Search:
     same: float = tuned(
         1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
     )
-    strained: float = tuned(
-        4.0, "σ", "of a constant, from which effects are added with the constants near, too"
-    )
-    near: float = tuned(2.0, "σ", "that the constants may be off in that search")
-    effects_near: int = tuned(4, "effects", "fitted at each step of that search", "run time")
     varied: float = tuned(-2.3, "nats", "log prior of an effect that varies along the bed")
     promising: float = tuned(1.0, "nats", "a signature must gain by linear algebra to be fitted")
+    promised_share: float = tuned(
+        0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
+    )
+    promised_less: float = tuned(6.0, "nats", "less than that share", "run time")
+    companion: float = tuned(
+        8.0,
+        "nats",
+        "that one more effect must gain by linear algebra: a third of what the verdict asks",
+        "run time",
+    )
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
     least_start: float = tuned(
         0.02, "expected sizes", "of a strength that has a sign: at its bound it has no slope"

@@ -19,11 +19,13 @@ it is not: where soil acts, calibrations strain because the form of its model is
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from gritd.estimator.terramechanics.soil import Array
 from gritd.tools.cli.parallel import each
+from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.heldout import held_out
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.rig.interface import Bools
@@ -52,9 +54,12 @@ class Breadth:
             self._prepare([m for m in self._search.models[1:] if self._matters(m, counted)])
         for model in sorted(self._search.models[1:], key=lambda m: -self._search.weight(m)):
             tested = self._matters(model, counted)
-            if tested and not all(self.broad(model, name) for name in model.names):
+            if tested and not attempted(partial(self._all_broad, model)):
                 counted[model] = -np.inf
         return counted
+
+    def _all_broad(self, model: Model) -> bool:
+        return all(self.broad(model, name) for name in model.names)
 
     def broad(self, model: Model, name: str) -> bool:
         """Whether an effect of a model gains in more than two stretches, or relieves calibrations

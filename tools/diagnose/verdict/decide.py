@@ -1,9 +1,9 @@
 """From fitted models to a verdict, probabilities and groups.
 
 Every explanation has an evidence: the discrepancy of form alone, listed effects with it, functions
-without a name instead of effects or beside them. `calibration.py` makes probabilities of these. An
-effect has the weight of all explanations that hold it. `unlisted` has the weight of those without
-any.
+without a name instead of effects or beside them. `calibration.py` makes probabilities of these, and
+`resemblance.py` says how far an effect of each is to be trusted. An effect has the weight of all
+explanations that hold it, as far as it is trusted in them; `unlisted` has the rest.
 """
 
 from __future__ import annotations
@@ -15,16 +15,20 @@ import numpy as np
 from scipy.special import logsumexp
 
 from gritd.tools.cli.parallel import each
+from gritd.tools.diagnose.fit.attempt import attempted
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.noise.colour import whiten
 from gritd.tools.diagnose.screen.screen import Screen
-from gritd.tools.diagnose.search.search import Search, shared
+from gritd.tools.diagnose.search.search import Search, shared, without
 from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.diagnose.tuning.guards import SPAN
 from gritd.tools.diagnose.verdict.breadth import Breadth
 from gritd.tools.diagnose.verdict.calibration import Calibration, learnt
-from gritd.tools.diagnose.verdict.decision import Decision, Verdict, Weighed
+from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, Weighed
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
+from gritd.tools.diagnose.verdict.resemblance import trusted
+
+EVEN = 0.5  # likelier there than not
 
 
 def decide(search: Search, jobs: int = 1) -> Decision:
@@ -45,9 +49,8 @@ def decide(search: Search, jobs: int = 1) -> Decision:
     if beside.get(best) is not None:  # what pays beside the best may pay beside its rivals
         beside |= _beside(search, _rivals(search, evidence, best), jobs)
 
-    weighed = weigh(search, evidence, beside)
-    by = learnt(len(_candidates(search)), search.problem.stack.referred)
-    return judged(search, weighed, beside, by)
+    by = learnt(len(search.problem.stack.rig.effects), search.problem.stack.referred)
+    return judged(search, trusting(search, weigh(search, evidence, beside), by), beside, by)
 
 
 def _beside(search: Search, models: Sequence[Model], jobs: int) -> dict[Model, Nameless | None]:
@@ -55,7 +58,7 @@ def _beside(search: Search, models: Sequence[Model], jobs: int) -> dict[Model, N
 
     def nameless(model: Model) -> Nameless | None:
         with search.problem.stack.rig.aside():  # the same bits, whatever was fitted before
-            return nameless_beside(search.screening, model)
+            return attempted(lambda: nameless_beside(search.screening, model))
 
     return dict(zip(models, each(jobs, nameless, models, shared(search)), strict=True))
 
@@ -68,10 +71,6 @@ def _rivals(search: Search, evidence: Mapping[Model, float], best: Model) -> lis
     for size in range(1, len(best.names) + 1):
         rivals += [m for m in standing if len(m.names) == size][: TUNING.verdict.rivals]
     return [m for m in rivals if m is not best]
-
-
-def _candidates(search: Search) -> Sequence[str]:
-    return list(search.problem.stack.rig.effects)
 
 
 def weigh(
@@ -100,45 +99,87 @@ def judged(
     beside: Mapping[Model, Nameless | None],
     calibration: Calibration,
 ) -> Decision:
-    """The decision from the evidence of all explanations."""
+    """The decision from the evidence of all explanations. A name is accepted where it is likelier
+    to be there than to be resembled, and likelier than that nothing of the list is there.
+    """
     weights = calibration.weights(
         np.array([w.evidence for w in weighed]),
         np.array([len(w.names) for w in weighed]),
         np.array([float(w.nameless) for w in weighed]),
     )
-    shares = np.exp(weights - logsumexp(weights)) * (1.0 - calibration.lapse)
+    shares = np.exp(weights - logsumexp(weights))
     every = tuple(replace(w, probability=float(p)) for w, p in zip(weighed, shares, strict=True))
 
-    unlisted = sum(w.probability for w in every if not w.names)
-    listed = [w for w in every if w.names]
-    likely = unlisted < TUNING.verdict.nameless_most * (1.0 - calibration.lapse)
-    best = _best(listed if likely and listed else every)
-    share = taken_share(search, best) if best.names else 0.0
-    named = likely and bool(best.names) and share > TUNING.verdict.explained_share
-    told = best if named else search.bare
+    probability, unlisted = _probabilities(every), _unlisted(every)
+    best = _best([w for w in every if w.names] or every)
+    trust = _trust(every, best)
+    kept = [n for n in best.names if trust[n] > EVEN and probability[n] > unlisted]
+    told, share = _standing(search, best, kept, calibration)
     if told not in beside:
-        beside = {told: nameless_beside(search.screening, told)}
+        beside = {told: attempted(lambda: nameless_beside(search.screening, told))}
+
     return Decision(
-        "explained" if named else "unlisted",
+        "explained" if told.names else "unlisted",
         told,
         share,
         beside[told],
-        _probabilities(every),
+        probability,
         unlisted,
-        _groups(every, best),
+        _groups(every, told if told.names else best.model),
         every,
+        tuple(
+            Resembled(name, best.share, best.model.form_share(name))
+            for name in best.names
+            if name not in told.names and _weight(every, best) > TUNING.verdict.resembles
+        ),
     )
 
 
-def _best(weighed: Sequence[Weighed]) -> Model:
-    """The likeliest model of the likeliest number of effects: many alike sets of two weigh together
-    against one. Effects against none weigh together, however many they are: see judged.
+def trusting(search: Search, weighed: Sequence[Weighed], by: Calibration) -> list[Weighed]:
+    """Explanations with the share that their effects take, and how far these are to be trusted."""
+    rig, made = search.problem.stack.rig, []
+    for w in weighed:
+        share = taken_share(search, w.model) if w.names else 0.0
+        made.append(replace(w, share=share, trust=trusted(rig, w.model, share, by)))
+    return made
+
+
+def _standing(
+    search: Search, best: Weighed, kept: Sequence[str], by: Calibration
+) -> tuple[Model, float]:
+    """The model of the names that are accepted, and the share that they take: where some of the
+    best are not, the others must stand without them.
+    """
+    if len(kept) == len(best.names):
+        return best.model, best.share
+    model = best.model
+    for name in best.names:
+        if name not in kept:
+            model = without(search, model, name)
+    if not model.names:
+        return search.bare, 0.0
+
+    share = taken_share(search, model)
+    stands = all(p > EVEN for p in trusted(search.problem.stack.rig, model, share, by))
+    return (model, share) if stands else (search.bare, 0.0)
+
+
+def _best(weighed: Sequence[Weighed]) -> Weighed:
+    """The likeliest explanation of the likeliest number of effects: many alike sets of two weigh
+    together against one. Of equally likely ones the one with the fewest parameters.
     """
     sizes = {len(w.names) for w in weighed}
     size = max(sizes, key=lambda n: sum(w.probability for w in weighed if len(w.names) == n))
     together = _together(weighed)
     plain = [w for w in weighed if len(w.names) == size and not w.nameless]
-    return max(plain, key=lambda w: together[frozenset(w.names)]).model
+    likely = {id(w): together[frozenset(w.names)] for w in plain}
+    equal = max(likely.values()) / TUNING.verdict.equally_likely
+    simple = [w for w in plain if likely[id(w)] >= equal]
+    return min(simple, key=lambda w: (_parameters(w.model), -likely[id(w)]))
+
+
+def _parameters(model: Model) -> int:
+    return len(model.fitted.free)
 
 
 def _together(weighed: Sequence[Weighed]) -> dict[frozenset[str], float]:
@@ -148,6 +189,20 @@ def _together(weighed: Sequence[Weighed]) -> dict[frozenset[str], float]:
         of = frozenset(w.names)
         out[of] = out.get(of, 0.0) + w.probability
     return out
+
+
+def _weight(weighed: Sequence[Weighed], of: Weighed) -> float:
+    """Probability of the set of effects of an explanation, resembled or there."""
+    return _together(weighed)[frozenset(of.names)]
+
+
+def _trust(weighed: Sequence[Weighed], best: Weighed) -> dict[str, float]:
+    """Of each effect of the best explanation, how far it is to be trusted, with functions without
+    a name beside it and without.
+    """
+    alike = [w for w in weighed if set(w.names) == set(best.names)]
+    total = max(sum(w.probability for w in alike), SPAN)
+    return {name: sum(w.probability * w.trusts[name] for w in alike) / total for name in best.names}
 
 
 def taken_share(search: Search, model: Model) -> float:
@@ -168,12 +223,17 @@ def taken_share(search: Search, model: Model) -> float:
 
 
 def _probabilities(weighed: Sequence[Weighed]) -> dict[str, float]:
-    """Weight of all explanations that hold an effect."""
+    """Weight of all explanations that hold an effect, as far as it is to be trusted in each."""
     out: dict[str, float] = {}
     for w in weighed:
         for name in w.names:
-            out[name] = out.get(name, 0.0) + w.probability
+            out[name] = out.get(name, 0.0) + w.probability * w.trusts[name]
     return out
+
+
+def _unlisted(weighed: Sequence[Weighed]) -> float:
+    """Probability that none of the effects of the true explanation is there."""
+    return sum(w.probability * (1.0 - w.listed) for w in weighed)
 
 
 def _quiet(screen: Screen) -> dict[str, float]:

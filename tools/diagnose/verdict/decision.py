@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 from typing import Literal
 
 from gritd.tools.diagnose.fit.model import Model
@@ -17,6 +18,9 @@ class Weighed:
 
     names:    listed effects; none for the discrepancy of form alone.
     nameless: whether functions without a name act beside them.
+    share:    of the misfit that the effects take.
+    trust:    of each effect, the probability that it is there and nothing that resembles it, if
+        this explanation is the best.
     """
 
     model: Model
@@ -24,11 +28,37 @@ class Weighed:
     nameless: bool
     evidence: float
     probability: float = 0.0
+    share: float = 0.0
+    trust: tuple[float, ...] = ()
+
+    @property
+    def trusts(self) -> dict[str, float]:
+        """Of each effect by name, wholly if nothing was said."""
+        return dict(zip(self.names, self.trust or (1.0 for _ in self.names), strict=True))
+
+    @property
+    def listed(self) -> float:
+        """Probability that some of its effects are there, if it is the best."""
+        return 1.0 - prod(1.0 - trust for trust in self.trusts.values())
+
+
+@dataclass(frozen=True)
+class Resembled:
+    """An effect of the likeliest explanation that is not accepted; forms: the share by which ours
+    must be bent; share: of the misfit that the explanation takes.
+    """
+
+    name: str
+    share: float
+    forms: float
 
 
 @dataclass(frozen=True)
 class Decision:
-    """best: the model that is accepted, or the bare one; beside: what has no name beside it."""
+    """best: the model that is accepted, or the bare one; beside: what has no name beside it;
+    unlisted: probability that nothing of the list is there; resembled: what the likeliest
+    explanation has beside what is accepted.
+    """
 
     verdict: Verdict
     best: Model
@@ -38,3 +68,4 @@ class Decision:
     unlisted: float
     groups: dict[str, tuple[str, ...]]
     weighed: tuple[Weighed, ...] = ()
+    resembled: tuple[Resembled, ...] = ()

@@ -1,0 +1,60 @@
+"""Whether an effect of an explanation is what was left out, or something that resembles it.
+
+Either may have been there: the effect in some published form, or other physics that our formula can
+be bent to. Both explain the recordings by the same functions, so at any form error h, the share by
+which the formula is bent, their likelihood L(h) is one. They differ by what is expected. Published
+laws of an effect differ little, so its prior over h has hardly anything at the last size; what only
+resembles it mostly needs that. What is there takes most of the misfit, what resembles it any share
+s of it. With the share λ of explanations that mislead (calibration.py)
+
+    P(effect) = Σ L(h) (1 − λ) p(h | effect) p(s | effect) / Σ L(h) [(that) + λ p(h | other)]
+
+and p(s | effect) = 2 s against 1. L counts by the temperature of all evidence. A ripple whose line
+stands in the spectra is one, whatever its profile: of it h says nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gritd.estimator.effects.base import Effect, order_of
+from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.diagnose.fit.model import Model
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.search.promises import TURNING
+from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.verdict.calibration import Calibration
+
+
+def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[float, ...]:
+    """Of each effect of a model, the probability that it is there, if the model is the best
+    explanation and takes such a share of the misfit.
+    """
+    return tuple(
+        believed(_likelihood(rig, model, name, by), share, by.lapse) for name in model.names
+    )
+
+
+def believed(likelihood: Array, share: float, lapse: float) -> float:
+    """Probability that an effect is there. likelihood (h,): of each size of its form error."""
+    own, other = np.array(TUNING.verdict.form_own), np.array(TUNING.verdict.form_other)
+    there = (1.0 - lapse) * 2.0 * share * float(likelihood @ own)
+    return there / (there + lapse * float(likelihood @ other))
+
+
+def _likelihood(rig: Rig, model: Model, name: str, by: Calibration) -> Array:
+    """Of each size of the form error (h,), the largest 1; alike where h says nothing."""
+    effect = next(one for one in model.fitted.acting if one.name == name)
+    told = None if _has_line(rig, effect) else model.of_forms(name)
+    if told is None:
+        return np.ones(len(TUNING.fit.bending_sizes))
+    return np.asarray(np.exp((told - told.max()) / by.temperature))
+
+
+def _has_line(rig: Rig, effect: Effect) -> bool:
+    """Whether a ripple at the recordings' own rate is the effect's."""
+    if effect.fingerprint.covariate != TURNING:
+        return False
+    name = order_of(type(effect))
+    order = float(getattr(effect, name)) if name else 1.0
+    return any(abs(x.at - order) < TUNING.orders.same * x.cell for x in rig.lines.fresh())

@@ -26,10 +26,9 @@ NAMES = {"c": "c", "tan_phi": "tan φ"}
 def text(diagnosis: Diagnosis) -> str:
     """The verdict for a person."""
     lines = [
-        f"verdict: {diagnosis.verdict}",
-        diagnosis.summary,
-        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[:SHOWN]),
-        *(_hypothesis(of) for of in diagnosis.hypotheses[:SHOWN] if _told(of)),
+        f"verdict: {diagnosis.verdict}. {diagnosis.summary}",
+        *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[1:SHOWN]),
+        *(_hypothesis(of, diagnosis) for of in diagnosis.hypotheses[:SHOWN] if _told(of)),
         *_had(diagnosis.reference),
     ]
     if diagnosis.law is not None:
@@ -50,9 +49,12 @@ def _told(of: Hypothesis) -> bool:
     return of.accepted or of.probability >= 0.5 * 10.0**-DIGITS
 
 
-def _hypothesis(of: Hypothesis) -> str:
+def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> str:
+    """Beside accepted names the others are rivals; without any, they are no explanation."""
     chance = f"probability {of.probability:.{DIGITS}f}"
-    head = f"  {'accepted' if of.accepted else 'rival'}: {of.effect}, {chance}"
+    other = "rival" if diagnosis.accepted else "not accepted"
+    head = f"  {'accepted' if of.accepted else other}: {of.effect}, {chance}"
+    head += f", form off by {of.other_forms:.0%}" if of.other_forms else ""
     values = _listed(of.parameters)
     others = of.indistinguishable_from
     alike = f"; cannot be told apart from {', '.join(others)}" if others else ""

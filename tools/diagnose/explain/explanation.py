@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import hypot
 from typing import Any
 
@@ -28,6 +28,7 @@ from gritd.tools.diagnose.explain.result import (
 )
 from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
 from gritd.tools.diagnose.explain.soil import constants_of, soil_of
+from gritd.tools.diagnose.explain.summary import summary
 from gritd.tools.diagnose.explain.traces import scatters, traces
 from gritd.tools.diagnose.explain.wording import described, label
 from gritd.tools.diagnose.fit.heldout import HeldOut, condition_folds, held_out, rmse, run_folds
@@ -60,15 +61,15 @@ def explain(
         location = located()
 
     law = find_law(search, base, location) if decision.verdict == "unlisted" else None
-    left = remainders(problem, accepted)
+    left, fit = remainders(problem, accepted), _fit(problem, before, after)
     return Diagnosis(
         verdict=decision.verdict,
-        summary=_summary(decision, location, search.first.p, _subject(rig), strains(rig, base)),
+        summary=summary(decision, location, fit, search.first, rig, strains(rig, base)),
         test=_test(search.first),
         location=location,
         hypotheses=hypotheses,
         soil=soil,
-        fit=_fit(problem, before, after),
+        fit=fit,
         law=law.law if law else None,
         next_experiment=proposed,
         caveats=_caveats(problem, accepted, whole, redo, search.failed),
@@ -230,11 +231,6 @@ def _noise(problem: Problem) -> dict[str, dict[str, float]]:
 # ---- in words ----------------------------------------------------------------------------------
 
 
-def _subject(rig: Rig) -> str:
-    """What is compared."""
-    return "Model and recordings" if all(rig.new) else "Reference and new campaign"
-
-
 def _caveats(
     problem: Problem,
     accepted: Model,
@@ -297,43 +293,3 @@ def _remaining(
         f"Something without a name remains: {kinds}. It gains {decision.beside.gain:.0f} nats of"
         " evidence."
     )
-
-
-def _summary(
-    decision: Decision,
-    location: Sequence[Location],
-    p: float,
-    subject: str,
-    strained: Sequence[tuple[str, float]] = (),
-) -> str:
-    """strained: constants far from what is known of them [σ]."""
-    differ = f"{subject} differ (p = {p:.2g})"
-    far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
-    if decision.verdict == "consistent":
-        only = f" only with {far} from what is known" if far else ""
-        return f"{subject} agree (p = {p:.2g}){only}."
-    if decision.verdict == "insufficient":
-        but = f" but for {far} from what is known" if far else ""
-        return (
-            f"No mismatch shows (p = {p:.2g}){but}, and these recordings could not show most"
-            " effects at their usual size."
-        )
-
-    where = f" {location[0].where}." if location else ""
-    if decision.verdict == "unlisted":
-        return f"{differ} in a way no listed effect explains.{where}"
-
-    names = listed(list(decision.best.names))
-    verb = "explains" if len(decision.best.names) == 1 else "explain"
-    doubt = "".join(f" {sentence}" for sentence in _alike_in_words(decision))
-    return f"{differ}; {names} {verb} {decision.share:.0%} of it.{doubt}{where}"
-
-
-def _alike_in_words(decision: Decision) -> Iterator[str]:
-    """Of each accepted name, what it cannot be told apart from."""
-    names = decision.best.names
-    for name in names:
-        if rivals := decision.groups.get(name):
-            it = name if len(names) > 1 else "It"
-            alike = ", ".join(sorted(rivals))
-            yield f"{it} cannot be told apart from {alike} with these recordings."

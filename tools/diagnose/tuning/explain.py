@@ -52,6 +52,12 @@ class Explain:
     doubtful_constant: float = tuned(3.0, "σ", "from what is known: a constant is told")
     strained_soil: float = tuned(2.0, "σ", "from what was known: a soil parameter is told")
 
+    # --- summary.py ---
+    held_out_worse: float = tuned(
+        0.1, "share", "by which the held-out error of a channel grows: an explanation in part"
+    )
+    bent_far: float = tuned(0.3, "share", "by which our form is off: more is told as resembling")
+
     # --- experiment.py ---
     instrument: float = tuned(
         0.2, "-", "of an expected size: what tape, level or clamp meter can tell"

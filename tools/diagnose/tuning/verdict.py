@@ -23,6 +23,7 @@ class Verdict:
     tested: float = tuned(8.0, "nats", "a model so far behind the best is not tested", "run time")
 
     # --- decide.py ---
+    there: float = tuned(0.5, "probability", "of an effect of the best explanation, to be accepted")
     equally_likely: float = tuned(
         2.0, "odds", "of explanations of as many effects, below which the simplest comes first"
     )

@@ -28,8 +28,6 @@ from gritd.tools.diagnose.verdict.decision import Decision, Resembled, Verdict, 
 from gritd.tools.diagnose.verdict.nameless import Nameless, nameless_beside
 from gritd.tools.diagnose.verdict.resemblance import trusted
 
-EVEN = 0.5  # likelier there than not
-
 
 def decide(search: Search, jobs: int = 1) -> Decision:
     """The verdict on a search.
@@ -113,7 +111,7 @@ def judged(
     probability, unlisted = _probabilities(every), _unlisted(every)
     best = _best([w for w in every if w.names] or every)
     trust = _trust(every, best)
-    kept = [n for n in best.names if trust[n] > EVEN and probability[n] > unlisted]
+    kept = [n for n in best.names if trust[n] > TUNING.verdict.there and probability[n] > unlisted]
     told, share = _standing(search, best, kept, calibration)
     if told not in beside:
         beside = {told: attempted(lambda: nameless_beside(search.screening, told))}
@@ -160,7 +158,9 @@ def _standing(
         return search.bare, 0.0
 
     share = taken_share(search, model)
-    stands = all(p > EVEN for p in trusted(search.problem.stack.rig, model, share, by))
+    stands = all(
+        p > TUNING.verdict.there for p in trusted(search.problem.stack.rig, model, share, by)
+    )
     return (model, share) if stands else (search.bare, 0.0)
 
 

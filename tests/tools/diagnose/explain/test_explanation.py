@@ -1,4 +1,4 @@
-"""The summary of a diagnosis in words."""
+"""What remains, and parameters with their σ."""
 
 from __future__ import annotations
 
@@ -9,47 +9,10 @@ import numpy as np
 import pytest
 
 from gritd.estimator.effects.stribeck_friction import StribeckFriction
-from gritd.tools.diagnose.explain.explanation import _remaining, _summary, parameters
+from gritd.tools.diagnose.explain.explanation import _remaining, parameters
 from gritd.tools.diagnose.explain.result import Remainder
 from gritd.tools.diagnose.fit.model import Model
 from gritd.tools.diagnose.fit.problem import Free
-
-
-@pytest.mark.parametrize(
-    ("names", "groups", "told"),
-    [
-        (("a",), {}, "a explains 90% of it."),
-        (
-            ("a",),
-            {"a": ("d", "c")},
-            "a explains 90% of it. It cannot be told apart from c, d with these recordings.",
-        ),
-        (
-            ("a", "b"),
-            {"b": ("c",)},
-            "a and b explain 90% of it. b cannot be told apart from c with these recordings.",
-        ),
-    ],
-)
-def test_it_says_which_name_has_rivals(
-    names: tuple[str, ...], groups: dict[str, tuple[str, ...]], told: str
-) -> None:
-    decision: Any = SimpleNamespace(
-        verdict="explained", best=SimpleNamespace(names=names), groups=groups, share=0.9
-    )
-    assert _summary(decision, (), 0.003, "Model and recordings") == (
-        f"Model and recordings differ (p = 0.003); {told}"
-    )
-
-
-def test_agreement_with_a_strained_constant_says_so() -> None:
-    decision: Any = SimpleNamespace(verdict="consistent")
-    alone = _summary(decision, (), 0.3, "Model and recordings")
-    assert alone == "Model and recordings agree (p = 0.3)."
-    strained = _summary(decision, (), 0.08, "Model and recordings", [("k", 3.4)])
-    assert strained == (
-        "Model and recordings agree (p = 0.08) only with k +3.4 σ from what is known."
-    )
 
 
 @pytest.mark.parametrize("verdict", ["explained", "unlisted"])

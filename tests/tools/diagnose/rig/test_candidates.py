@@ -20,16 +20,38 @@ from tests.tools.diagnose.campaigns import plan, settings
 
 
 def tabled(run: Signals) -> Signals:
-    """The run with silence wherever a speed is changing."""
+    """The run as a table says it: silence wherever a speed is changing."""
     rates = np.gradient(run.wheel_speed, run.time), np.gradient(run.carriage_rate, run.time)
     changing = np.any([np.abs(r) > 0.1 * np.nanmax(np.abs(r)) for r in rates], axis=0)
     around = np.convolve(changing, np.ones(5), "same") > 0.0
-    return replace(run, wheel_speed=np.where(around, np.nan, run.wheel_speed))
+    silent = np.where(around, np.nan, run.wheel_speed)
+    return replace(run, wheel_speed=silent, info=replace(run.info, steady_states=True))
 
 
 @pytest.fixture(scope="module")
 def driven() -> list[Signals]:
     return record(plan(seconds=24.0, standstill=False), ())
+
+
+def test_short_runs_at_steady_speeds_are_no_table(driven: list[Signals]) -> None:
+    """They have times, places and wheel angles, so what goes with these may be what is left out."""
+    short = [_steady(run) for run in driven]
+    assert all(np.ptp(run.wheel_angle) < 2.0 * np.pi for run in short)
+    listed = candidates(short, ())
+    assert {"bed_inclination", "soil_patch", "gear_ripple"} <= listed.keys()
+
+
+def _steady(run: Signals) -> Signals:
+    """Two seconds of a run at one speed."""
+    at = slice(30, 50)
+    names = ("time", "wheel_angle", "wheel_speed", "carriage_angle", "carriage_rate", "doubt")
+    return replace(run, **{name: getattr(run, name)[at] for name in names})
+
+
+def test_the_scatter_of_a_table_is_no_sensors(driven: list[Signals]) -> None:
+    """An importer drew it, so nothing is said of how loud it is."""
+    assert WheelRig(driven, settings()).stated_noise
+    assert not WheelRig([tabled(run) for run in driven], settings()).stated_noise
 
 
 def test_a_driven_run_may_show_every_effect(driven: list[Signals]) -> None:

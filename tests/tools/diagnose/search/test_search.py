@@ -4,14 +4,17 @@ have taken its part.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gritd.estimator.effects import make
+from gritd.estimator.effects import EFFECTS, make
 from gritd.estimator.effects.side_wall_rubbing import SideWallRubbing
 from gritd.estimator.stages.situation import Reaction, Situation
 from gritd.tools.diagnose.fit.model import Model
@@ -25,14 +28,13 @@ from gritd.tools.diagnose.search.promises import Beside, Promise, _tried, promis
 from gritd.tools.diagnose.search.search import (
     Search,
     _bare,
-    _calmed,
     _free_near,
     _retested,
     _with_effect,
     begin,
     extended,
 )
-from gritd.tools.diagnose.tuning import TUNING, replaced
+from gritd.tools.diagnose.tuning import TUNING
 from gritd.tools.proof.ours.cases import record
 from tests.tools.diagnose.campaigns import plan, settings
 
@@ -99,40 +101,27 @@ def test_where_a_ripple_alone_raised_the_alarm_only_what_ripples_is_tried() -> N
     assert tried <= {"gear_ripple", "grousers", "hub_runout", "wheel_eccentricity"}
 
 
-def test_where_the_constants_strain_effects_are_added_with_the_constants_near(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A channel that is blurred until no ripple is left of it turns the ripple round: the fit of a
-    ripple that begins there ends at one of the wrong sign. All constants stay near.
-    """
-    ripple = make("gear_ripple", {"ripple_cos": 1.4, "ripple_sin": 0.4, "order": 15.0})
-    rig = WheelRig(record(plan(), (ripple, make("coulomb_friction", {"loss": 3.0}))), settings())
-    rng = np.random.default_rng(0)
-    search = begin(prepare_screening(fit_base(rig, rng), rng))
-    blur = [c.name for c in rig.constants].index("torque_blur")
+def test_a_candidate_whose_algebra_fails_ends_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its rivals are fitted, and it is told which one failed."""
+    kinds: list[Any] = [EFFECTS[name] for name in ("coulomb_friction", "bulldozing")]
+    offered = [Promise(9.0, kind, np.zeros(1), ()) for kind in kinds]
+    monkeypatch.setattr(searching, "promises", lambda *_: offered)
 
-    calm = replace(search, models=(search.base, _strained(search, blur, 0.0)))
-    assert _calmed(calm, 1) is calm
+    def fitted(_: Search, model: Model, promise: Promise) -> Model:
+        if promise.effect.name == "bulldozing":
+            raise np.linalg.LinAlgError("Eigenvalues did not converge")
+        return replace(model, names=(promise.effect.name,))
 
-    held: list[Model] = []
-    monkeypatch.setattr(searching, "_let_go", lambda _, model: held.append(model) or model)
-    search = replace(search, models=(search.base, _strained(search, blur, 8.0)))
-    with replaced("search", near=0.1):
-        assert {m.names for m in _calmed(search, 1).models[2:]} == {m.names for m in held}
+    monkeypatch.setattr(searching, "_with_effect", fitted)
+    rig = SimpleNamespace(aside=nullcontext, effects=dict.fromkeys(EFFECTS))
+    problem = SimpleNamespace(stack=SimpleNamespace(rig=rig), allowance=SimpleNamespace(parts=()))
+    screening: Any = SimpleNamespace(problem=problem, forms=())
+    bare = Model(cast(Any, None))
+    search = Search(screening, (bare, bare), cast(Any, None))
 
-    assert all(np.abs(m.fitted.u).max() <= 0.1 + 1e-9 for m in held)
-    both = next(m for m in held if set(m.names) == {"gear_ripple", "coulomb_friction"})
-    found = next(e for e in both.fitted.acting if e.name == "gear_ripple")
-    assert (found.ripple_cos, found.ripple_sin) == pytest.approx((1.4, 0.4), abs=0.1)
-    assert search.problem.far == TUNING.fit.far
-
-
-def _strained(search: Search, number: int, strain: float) -> Model:
-    """The bare model with one constant strained, not fitted."""
-    bare, u = _bare(search, search.base), np.zeros(len(search.base.fitted.u))
-    u[number] = strain
-    fitted = search.problem.descend((), (), u, np.zeros(0), 0)
-    return replace(bare, fitted=fitted)
+    found = extended(search, [bare], 3, 1)
+    assert [model.names for model in found.models[2:]] == [("coulomb_friction",)]
+    assert found.failed == (("bulldozing",),)
 
 
 def test_the_order_of_a_ripple_stays_where_the_spectrum_has_it() -> None:

@@ -27,7 +27,7 @@ from gritd.tools.diagnose.method import fit_base
 from gritd.tools.diagnose.rig.wheel import WheelRig
 from gritd.tools.diagnose.screen.screen import Screen
 from gritd.tools.diagnose.tuning import TUNING
-from gritd.tools.diagnose.verdict import decide
+from gritd.tools.diagnose.verdict import decide, resemblance
 from gritd.tools.diagnose.verdict.calibration import learnt
 from gritd.tools.proof.ours.calibrate import case_of, learn, log_truth, main, read
 from gritd.tools.proof.ours.cases import record
@@ -88,40 +88,92 @@ def test_the_calibration_is_learnt_from_what_was_true() -> None:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model of which the names alone matter."""
+    """A model of which names, number of parameters and form error alone matter."""
 
     names: tuple[str, ...]
+    parameters: int = 1
+
+    @property
+    def fitted(self) -> Any:
+        return SimpleNamespace(free=range(self.parameters))
+
+    def form_share(self, name: str) -> float:
+        return 0.4
 
 
-def _judged(listed: float, nameless: float, share: float, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """One effect against functions without a name, of so much evidence each [nats]."""
-    monkeypatch.setattr(decide, "taken_share", lambda *_: share)
+def _judged(listed: float, nameless: float, trust: float, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """One effect that is so far to be trusted against functions without a name, of so much evidence
+    each [nats].
+    """
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, best = Fit(()), Fit(("a",))
     search: Any = SimpleNamespace(bare=bare, screening=None)
     weighed: Any = [
         decide.Weighed(bare, (), False, 0.0),
-        decide.Weighed(best, ("a",), False, listed),
+        decide.Weighed(best, ("a",), False, listed, 0.0, 0.9, (trust,)),
         decide.Weighed(bare, (), True, nameless),
     ]
     return decide.judged(search, weighed, {}, learnt(30))
 
 
 def test_the_verdict_is_that_of_the_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
-    named = _judged(900.0, 200.0, 1.0, monkeypatch)
+    named = _judged(900.0, 200.0, 0.9, monkeypatch)
     assert named.verdict == "explained" and named.best.names == ("a",)
-    assert named.probability["a"] == pytest.approx(1.0 - learnt().lapse, abs=1e-6)
+    assert named.probability["a"] == pytest.approx(0.9) and not named.resembled
 
-    strange = _judged(200.0, 900.0, 1.0, monkeypatch)
+    strange = _judged(200.0, 900.0, 0.9, monkeypatch)
     assert strange.verdict == "unlisted" and strange.best.names == ()
-    assert strange.probability["a"] + strange.unlisted == pytest.approx(1.0 - learnt().lapse)
+    assert strange.probability["a"] + strange.unlisted == pytest.approx(1.0)
+
+
+def test_what_is_likelier_resembled_than_there_is_not_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = _judged(900.0, 200.0, 0.2, monkeypatch)
+    assert found.verdict == "unlisted" and found.probability["a"] == pytest.approx(0.2)
+    assert [(r.name, r.share, r.forms) for r in found.resembled] == [("a", 0.9, 0.4)]
+
+
+def test_no_name_is_stated_that_is_less_likely_than_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Listed effects together are likelier than none, but no single one is."""
+    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    by, names = learnt(30), "abc"
+    bare, every = Fit(()), [Fit((name,)) for name in names]
+    even = by.temperature * (by.nameless - by.listed + np.log(30))
+    listed = [decide.Weighed(cast(Any, fit), fit.names, False, even - 1.0) for fit in every]
+    none = decide.Weighed(cast(Any, bare), (), True, 0.0)
+    found = decide.judged(
+        cast(Any, SimpleNamespace(bare=bare, screening=None)), [none, *listed], {}, by
+    )
+    assert sum(found.probability.values()) > found.unlisted > max(found.probability.values())
+    assert found.verdict == "unlisted"
+
+
+def test_of_equals_the_simplest_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coulomb before Stribeck, unless Stribeck is clearly likelier."""
+    monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
+    bare, plain, richer = Fit(()), Fit(("plain",)), Fit(("richer",), 2)
+    search: Any = SimpleNamespace(bare=bare, screening=None)
+    for more, first in ((1.0, "plain"), (20.0, "richer")):
+        weighed: Any = [
+            decide.Weighed(richer, richer.names, False, 900.0 + more),
+            decide.Weighed(plain, plain.names, False, 900.0),
+        ]
+        assert decide.judged(search, weighed, {}, learnt(30)).best.names == (first,)
+
+
+def test_a_form_error_that_no_published_law_needs_tells_against_a_name() -> None:
+    """As much likelihood without bending and with it says little; bending that pays says much."""
+    straight, open_, bent = np.exp([[0.0, -3, -9, -9], [0.0, 0, 0, 0], [-9.0, -9, -9, 0]])
+    believed = [resemblance.believed(told, 0.9, 0.13) for told in (straight, open_, bent)]
+    assert believed[0] > 0.95 > believed[1] > 0.8 and believed[2] < 0.3
+    assert resemblance.believed(straight, 0.05, 0.13) < believed[0]
 
 
 def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """None is the likeliest number, but two of three say that there is something listed."""
-    monkeypatch.setattr(decide, "taken_share", lambda *_: 1.0)
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     by = learnt(30)
@@ -141,7 +193,6 @@ def test_explanations_with_one_and_with_two_effects_stand_together_against_none(
 
 def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """A companion gains little, and functions without a name gain much beside either model."""
-    monkeypatch.setattr(decide, "taken_share", lambda *_: 1.0)
     monkeypatch.setattr(decide, "nameless_beside", lambda *_: None)
     bare, one, two = Fit(()), Fit(("a",)), Fit(("a", "b"))
     alone: Any = [
@@ -153,13 +204,6 @@ def test_what_has_no_name_stands_beside_a_rival_too(monkeypatch: pytest.MonkeyPa
     assert decide.judged(search, alone, {}, learnt(30)).best is two
     alone.append(decide.Weighed(one, ("a",), True, 1000.0))
     assert decide.judged(search, alone, {}, learnt(30)).best is one
-
-
-def test_a_name_that_takes_less_than_a_tenth_is_no_explanation(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert _judged(900.0, 200.0, 0.3, monkeypatch).verdict == "explained"
-    assert _judged(900.0, 200.0, 0.05, monkeypatch).verdict == "unlisted"
 
 
 @pytest.mark.parametrize("referred", [False, True])

@@ -1,0 +1,67 @@
+"""The first sentences of a diagnosis."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gritd.tools.diagnose.explain.result import Fit, Location
+from gritd.tools.diagnose.explain.summary import summary, worse
+from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.verdict.decision import Resembled
+
+SCREEN = Screen({"a": 9.0}, {"a": (0.0, 1.0)}, {}, {}, np.zeros(300))
+RIG: Any = SimpleNamespace(new=[True])
+PLACE = Location("torque", "speed", 0.9, 0.003, 0.003, "Torque, 0.3 N·m more than the model")
+
+
+def _fit(torque: tuple[float, float], sinkage: tuple[float, float] = (0.004, 0.001)) -> Fit:
+    """Held-out errors before and after."""
+    units = {"torque": "N·m", "sinkage": "m"}
+    before, after = ({"torque": torque[n], "sinkage": sinkage[n]} for n in range(2))
+    return Fit(units, before, after, {"torque": 0.01, "sinkage": 0.0005})
+
+
+def _decision(verdict: str, *names: str, **more: Any) -> Any:
+    kept = {"groups": {}, "share": 0.9, "resembled": (), **more}
+    return SimpleNamespace(verdict=verdict, best=SimpleNamespace(names=names), **kept)
+
+
+def test_it_begins_with_the_place_and_the_error_on_unseen_runs_before_and_after() -> None:
+    told = summary(_decision("explained", "a"), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
+    place, _, names = told.partition(";")
+    assert place.startswith(PLACE.where)
+    assert names.index("0.3") < names.index("0.02") < names.index("90%")
+
+
+def test_a_channel_that_is_foretold_worse_comes_first() -> None:
+    """A torque that is mapped to the wrong side of a friction."""
+    fit = _fit((0.16, 0.27))
+    assert worse(fit) == ["torque"] and not worse(_fit((0.3, 0.02)))
+    told = summary(_decision("explained", "a"), [PLACE], fit, SCREEN, RIG)
+    assert told.startswith("In part only: torque") and "0.16" in told and "0.27" in told
+
+
+@pytest.mark.parametrize("names", [("a",), ("a", "b")])
+def test_it_says_which_name_has_rivals(names: tuple[str, ...]) -> None:
+    decision = _decision("explained", *names, groups={names[-1]: ("d", "c")})
+    told = summary(decision, [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
+    assert "cannot be told apart from c, d" in told
+    alone = summary(_decision("explained", *names), [PLACE], _fit((0.3, 0.02)), SCREEN, RIG)
+    assert "told apart" not in alone
+
+
+def test_an_effect_that_must_be_bent_far_is_said_to_resemble() -> None:
+    resembled = Resembled("torque_constant_error", 0.42, 0.4)
+    decision = _decision("unlisted", resembled=(resembled,))
+    told = summary(decision, [PLACE], _fit((0.3, 0.3)), SCREEN, RIG)
+    assert "resembles torque_constant_error" in told and "42%" in told and "40%" in told
+
+
+def test_agreement_with_a_strained_constant_says_so() -> None:
+    fit = _fit((0.01, 0.01))
+    assert "σ" not in summary(_decision("consistent"), [], fit, SCREEN, RIG)
+    assert "k +3.4 σ" in summary(_decision("consistent"), [], fit, SCREEN, RIG, [("k", 3.4)])

@@ -1,0 +1,112 @@
+"""The first sentences of a diagnosis: where, how much, before and after on runs that were held out,
+and what explains it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from gritd.estimator.effects import EFFECTS
+from gritd.tools.cli.wording import listed, number, shown, spelled
+from gritd.tools.diagnose.explain.result import Fit, Location
+from gritd.tools.diagnose.rig.interface import Rig
+from gritd.tools.diagnose.screen.screen import Screen
+from gritd.tools.diagnose.tuning import TUNING
+from gritd.tools.diagnose.verdict.decision import Decision, Resembled
+
+PLACE_OF = {  # stage of an effect -> where it acts
+    "soil": "the soil",
+    "contact": "the soil",
+    "wheel": "the wheel",
+    "testbed": "the testbed",
+    "drivetrain": "the drive",
+    "sensor": "the sensors",
+}
+
+
+def summary(
+    decision: Decision,
+    location: Sequence[Location],
+    fit: Fit,
+    screen: Screen,
+    rig: Rig,
+    strained: Sequence[tuple[str, float]] = (),
+) -> str:
+    """strained: constants far from what is known of them [σ]."""
+    subject = "Model and recordings" if all(rig.new) else "Reference and new campaign"
+    p = f"(p = {screen.p:.2g})"
+    if decision.verdict in ("consistent", "insufficient"):
+        return _quiet(decision, f"{subject} agree {p}", p, strained)
+
+    sentences = [f"{subject} differ {p}."]
+    if location:
+        first = location[0]
+        sentences = [f"{first.where} {p}; {_held_out(fit, first.channel)}."]
+    if decision.verdict == "unlisted":
+        sentences += ["No listed effect explains it.", *map(_resembling, decision.resembled)]
+        return " ".join(sentences)
+
+    names = listed(list(decision.best.names))
+    verb = "explains" if len(decision.best.names) == 1 else "explain"
+    sentences.append(f"{names} {verb} {decision.share:.0%} of the misfit.")
+    return " ".join((*_worse(fit), *sentences, *_alike(decision), *_beside(decision)))
+
+
+def worse(fit: Fit) -> list[str]:
+    """Channels whose held-out error has grown beyond the noise, the worst first: what was found
+    explains the misfit in part at best.
+    """
+    grown = {c: fit.after[c] - fit.before[c] for c in fit.unit}
+    share = TUNING.explain.held_out_worse
+    far = [c for c in grown if grown[c] > share * max(fit.before[c], fit.noise_floor[c])]
+    return sorted(far, key=lambda c: -grown[c] / fit.noise_floor[c])
+
+
+def _quiet(decision: Decision, agree: str, p: str, strained: Sequence[tuple[str, float]]) -> str:
+    far = listed([f"{name} {strain:+.1f} σ" for name, strain in strained])
+    if decision.verdict == "consistent":
+        return f"{agree}{f' only with {far} from what is known' if far else ''}."
+    return (
+        f"No mismatch shows {p}{f' but for {far} from what is known' if far else ''}, and these"
+        " recordings could not show most effects at their usual size."
+    )
+
+
+def _held_out(fit: Fit, channel: str) -> str:
+    unit, factor = shown(fit.unit[channel])
+    before, after = (number(of[channel] * factor) for of in (fit.before, fit.after))
+    return f"{spelled(channel)} on unseen runs {before} {unit} off before, {after} after"
+
+
+def _worse(fit: Fit) -> Iterator[str]:
+    for channel in worse(fit):
+        yield (
+            f"In part only: {_held_out(fit, channel)}. Check how the configuration maps this"
+            " channel: its side of the drive, sign and scale."
+        )
+
+
+def _alike(decision: Decision) -> Iterator[str]:
+    """Of each accepted name, what it cannot be told apart from."""
+    names = decision.best.names
+    for name in names:
+        if rivals := decision.groups.get(name):
+            it = name if len(names) > 1 else "It"
+            alike = ", ".join(sorted(rivals))
+            yield f"{it} cannot be told apart from {alike} with these recordings."
+
+
+def _beside(decision: Decision) -> Iterator[str]:
+    for of in decision.resembled:
+        yield f"What {of.name} would add is something else: its form fits badly."
+
+
+def _resembling(of: Resembled) -> str:
+    """What resembles the misfit and why it does not explain it."""
+    bent = of.forms > TUNING.explain.bent_far
+    why = f"in a form {of.forms:.0%} off ours" if bent else "and no more of it"
+    where = PLACE_OF[EFFECTS[of.name].stage]
+    return (
+        f"It resembles {of.name}, which takes {of.share:.0%} of the misfit, {why}: probably"
+        f" something else in {where}."
+    )

@@ -15,7 +15,7 @@ from gritd.estimator.effects.base import Parameter
 from gritd.estimator.visible import visible
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
 from gritd.tools.diagnose.explain.apply_form import set_discrepancy
-from gritd.tools.diagnose.explain.result import Diagnosis, Quantity, SoilFit
+from gritd.tools.diagnose.explain.result import Diagnosis, Quantity
 
 HEADER = "# made by gritd diagnose: "
 SOIL_KEYS = {"c": "cohesion", "tan_phi": "tan_phi", "k": "shear_modulus", "n": "exponent"}
@@ -41,18 +41,24 @@ def rewritten(text: str, configuration: Configuration, diagnosis: Diagnosis) -> 
     document = EditedYaml(_without_header(text), configuration.source)
     _set_effects(document, diagnosis)
     if diagnosis.soil is not None and is_known(diagnosis):
-        _set_soil(document, configuration.settings, diagnosis.soil)
-        if diagnosis.learnt is not None:
+        _set_soil(document, configuration.settings, _soil_of(diagnosis))
+        if diagnosis.learnt is not None and not _law_carries(diagnosis):
             set_discrepancy(document, diagnosis.learnt, configuration.source)
     return f"{HEADER}{visible(diagnosis.summary)}\n{document.text()}"
 
 
 def is_known(diagnosis: Diagnosis) -> bool:
-    """Whether the fitted soil is written. Where something without a name remains it needs δ beside
-    it, which carries what is left: see docs/decisions/0009.
+    """Whether the fitted soil is written. Where something without a name remains it needs beside it
+    what carries that, δ or a law: see docs/decisions/0009. A misfit has one carrier.
     """
     beside = diagnosis.verdict == "unlisted" and diagnosis.learnt is not None
     return diagnosis.verdict in KNOWN or beside
+
+
+def _law_carries(diagnosis: Diagnosis) -> bool:
+    """Whether a law is written: it foretells better than δ, or there is no δ."""
+    law = diagnosis.law
+    return law is not None and bool(law.parameters) and (law.carries or diagnosis.learnt is None)
 
 
 def _without_header(text: str) -> str:
@@ -64,7 +70,7 @@ def _set_effects(document: EditedYaml, diagnosis: Diagnosis) -> None:
     parameters_of = _had(diagnosis)
     for h in diagnosis.accepted:
         parameters_of[h.effect] = _more(h.effect, parameters_of.get(h.effect, {}), h.parameters)
-    if diagnosis.law is not None and diagnosis.law.parameters:
+    if diagnosis.law is not None and _law_carries(diagnosis):
         parameters_of["empirical_law"] = diagnosis.law.parameters
 
     for effect, parameters in parameters_of.items():
@@ -109,10 +115,17 @@ def _stated(parameter: Parameter, found: Quantity) -> str:
     return quantity(found.value, min(found.sigma, high), parameter.unit, bounds=(low, high))
 
 
-def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:
+def _soil_of(diagnosis: Diagnosis) -> Mapping[str, Quantity]:
+    """The soil that belongs to what is written beside it."""
+    assert diagnosis.soil is not None
+    law = diagnosis.law
+    return law.soil if law is not None and _law_carries(diagnosis) else diagnosis.soil.after
+
+
+def _set_soil(document: EditedYaml, settings: Settings, soil: Mapping[str, Quantity]) -> None:
     """The fitted soil as what is known before the next run, inside the filter's bounds."""
     for name, key in SOIL_KEYS.items():
-        fitted, before = soil.after[name], document.written("soil", key)
+        fitted, before = soil[name], document.written("soil", key)
         low, high = getattr(settings.filter, f"{key}_bounds", (0.0, inf))
         value = min(max(fitted.value, low), high)
         if name == "tan_phi" and document.has("soil", "phi"):
@@ -120,7 +133,7 @@ def _set_soil(document: EditedYaml, settings: Settings, soil: SoilFit) -> None:
         else:
             document.set(("soil", key), quantity(value, fitted.sigma, SOIL_UNITS[name], before))
 
-    _set_moduli(document, settings, soil.after["n"].value, soil.after["K"])
+    _set_moduli(document, settings, soil["n"].value, soil["K"])
 
 
 def _set_phi(document: EditedYaml, tangent: float, sigma: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import hypot
 from typing import Any
 
@@ -12,7 +13,7 @@ from gritd.tools.cli.parallel import meanwhile
 from gritd.tools.cli.wording import listed
 from gritd.tools.diagnose.explain.doubts import doubts, strains
 from gritd.tools.diagnose.explain.experiment import next_experiment
-from gritd.tools.diagnose.explain.law import find_law
+from gritd.tools.diagnose.explain.law import FittedLaw, find_law
 from gritd.tools.diagnose.explain.learnt import learnt_form
 from gritd.tools.diagnose.explain.locate import locate, unmoved
 from gritd.tools.diagnose.explain.remainder import discrepancies, missed_words, remainders
@@ -21,9 +22,11 @@ from gritd.tools.diagnose.explain.result import (
     Explanation,
     Fit,
     Hypothesis,
+    Law,
     Location,
     Quantity,
     Remainder,
+    SoilFit,
     Test,
 )
 from gritd.tools.diagnose.explain.ripples import late, latencies_of, left_over, ripples_of
@@ -70,7 +73,7 @@ def explain(
         hypotheses=hypotheses,
         soil=soil,
         fit=fit,
-        law=law.law if law else None,
+        law=_told(law, after, soil, rig) if law else None,
         next_experiment=proposed,
         caveats=_caveats(problem, accepted, whole, redo, search.failed),
         share=decision.share,
@@ -208,6 +211,20 @@ def parameters(rig: Rig, model: Model, name: str, forms: float = 0.0) -> dict[st
             other = forms * (value - p.off) if p.role == "strength" else 0.0
             found[p.name] = Quantity(value * unit, hypot(own, other) * unit, p.unit)
     return found
+
+
+def _told(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
+    """The law, and whether it carries the misfit: it takes nearly all, and foretells runs that were
+    held out better than the discrepancy of form does. Its soil is no better known than that of all
+    explanations.
+    """
+    better = float((law.held.log_density - form.log_density).sum()) > 0.0
+    carries = better and law.law.share > TUNING.explain.law_carries
+    if soil is None:
+        return replace(law.law, carries=carries)
+    beside = constants_of(rig, law.fitted, soil=True)
+    told = {n: replace(q, sigma=max(q.sigma, soil.after[n].sigma)) for n, q in beside.items()}
+    return replace(law.law, carries=carries, soil=told)
 
 
 # ---- fit and noise -- ------------------------------------------------------------------

@@ -40,8 +40,8 @@ Domain = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law on top of a model: its fit, soil and calibration fitted with it, and its held-out
-    prediction.
+    """A law on top of a model. fitted: with soil and calibration, without steps and waves, which
+    are no part of a configuration; held: its prediction of runs that are held out.
     """
 
     law: Law
@@ -80,7 +80,11 @@ def find_law(search: Search, model: Model, location: Sequence[Location]) -> Fitt
         start = replace(start, fitted=_with_terms(start, terms, form, domain))
 
     law = _law(search, model, start, prefix, terms, domain)
-    return FittedLaw(law, start.fitted, held_out(start.fitted, run_folds(stack)))
+    plain = start.fitted
+    if start.functions:
+        alone = Start(search.problem, model.fitted, (), start.columns[:, :0])
+        plain = _with_terms(alone, terms, form, domain) if terms else model.fitted
+    return FittedLaw(law, plain, held_out(plain, run_folds(stack)))
 
 
 # ---- steps and waves ---------------------------------------------------------------------------

@@ -148,7 +148,8 @@ class Fit:
 @dataclass(frozen=True)
 class Law:
     """An empirical expression for what no listed effect explains, in the channel's unit, valid
-    inside `domain`.
+    inside `domain`. carries: whether it foretells runs that were held out better than the
+    discrepancy of form does; then it alone is written into a configuration, else that alone.
     """
 
     channel: str
@@ -158,6 +159,8 @@ class Law:
     parameters: Mapping[
         str, Quantity
     ]  # of effect `empirical_law`, where it can be put into a configuration
+    carries: bool = False
+    soil: Mapping[str, Quantity] = field(default_factory=dict)  # as fitted beside it
 
 
 @dataclass(frozen=True)

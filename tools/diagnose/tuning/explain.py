@@ -98,6 +98,9 @@ class Explain:
 
     # --- law.py ---
     term_pays: float = tuned(3.0, "nats", "a term of a law must gain")
+    law_carries: float = tuned(
+        0.9, "share", "of the misfit that a law must take to be written in place of δ"
+    )
     law_domain: Range = tuned((0.005, 0.995), "quantile", "of a covariate: domain of a law")
 
     # --- locate.py ---

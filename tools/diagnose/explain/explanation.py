@@ -218,11 +218,11 @@ def _told(law: FittedLaw, form: HeldOut, soil: SoilFit | None, rig: Rig) -> Law:
     held out better than the discrepancy of form does. Its soil is no better known than that of all
     explanations.
     """
-    better = float((law.held.log_density - form.log_density).sum()) > 0.0
+    better = float((law.plain_held.log_density - form.log_density).sum()) > 0.0
     carries = better and law.law.share > TUNING.explain.law_carries
     if soil is None:
         return replace(law.law, carries=carries)
-    beside = constants_of(rig, law.fitted, soil=True)
+    beside = constants_of(rig, law.plain, soil=True)
     told = {n: replace(q, sigma=max(q.sigma, soil.after[n].sigma)) for n, q in beside.items()}
     return replace(law.law, carries=carries, soil=told)
 

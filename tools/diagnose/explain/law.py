@@ -40,13 +40,14 @@ Domain = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law on top of a model. fitted: with soil and calibration, without steps and waves, which
-    are no part of a configuration; held: its prediction of runs that are held out.
+    """A law on top of a model. held: its prediction of runs that are held out; plain: its fit, with
+    soil and calibration, without steps and waves, which are no part of a configuration.
     """
 
     law: Law
-    fitted: Fitted
     held: HeldOut
+    plain: Fitted
+    plain_held: HeldOut
 
 
 @dataclass(frozen=True)
@@ -80,11 +81,11 @@ def find_law(search: Search, model: Model, location: Sequence[Location]) -> Fitt
         start = replace(start, fitted=_with_terms(start, terms, form, domain))
 
     law = _law(search, model, start, prefix, terms, domain)
-    plain = start.fitted
+    plain, folds = start.fitted, run_folds(stack)
     if start.functions:
         alone = Start(search.problem, model.fitted, (), start.columns[:, :0])
         plain = _with_terms(alone, terms, form, domain) if terms else model.fitted
-    return FittedLaw(law, plain, held_out(plain, run_folds(stack)))
+    return FittedLaw(law, held_out(start.fitted, folds), plain, held_out(plain, folds))
 
 
 # ---- steps and waves ---------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from gritd.estimator.filter.learnt_soil import learnt_soil
 from gritd.estimator.model.learnt import LearntForm
 from gritd.tools.commands import diagnose, init
 from gritd.tools.diagnose.explain.apply import applied, rewritten
-from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Quantity, Reference
+from gritd.tools.diagnose.explain.result import Diagnosis, Hypothesis, Law, Quantity, Reference
 from tests import forms
 from tests.tools.report.cases import base, soil
 
@@ -55,6 +55,24 @@ def test_effects_and_soil_are_the_next_prior_and_comments_stay(rig: Path) -> Non
     assert replace(settings, soil=before.settings.soil, effects=()) == replace(
         before.settings, effects=()
     )
+
+
+@pytest.mark.parametrize("carries", [True, False])
+def test_a_misfit_without_a_name_has_one_carrier(rig: Path, carries: bool) -> None:
+    """A law with the soil beside it, or the discrepancy with the soil that is averaged beside it:
+    both would count the misfit twice.
+    """
+    terms = {"torque_slip": Quantity(-0.6, 0.05, "N*m")}
+    beside = {**soil(812.0, 64.0, 0.0).after, "c": Quantity(900.0, 70.0, "Pa")}
+    law = Law("torque", "torque −0.6·i", {}, 0.95, terms, carries, beside)
+    averaged = soil(812.0, 64.0, 0.0)
+    diagnosis = base(verdict="unlisted", hypotheses=(), soil=averaged, law=law, learnt=learnt())
+
+    after = rewritten(rig.read_text(), config.load(rig), diagnosis)
+    settings = config.loads(after, "new.yaml", rig.parent).settings
+    assert any(e.name == "empirical_law" for e in settings.effects) == carries
+    assert (settings.discrepancy is None) == carries
+    assert settings.soil.cohesion.value == (900.0 if carries else 812.0)
 
 
 @pytest.mark.parametrize("sigmas", [0.003, 1.0, 1e3])

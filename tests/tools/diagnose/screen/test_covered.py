@@ -44,7 +44,8 @@ def test_a_new_ripple_counts_by_the_covered_share(
 ) -> None:
     quiet = Screen({"loss": 0.0}, {"loss": (0.0, 1.0)}, {}, {}, np.zeros(300))
     given: Any = {
-        "_screen_beside_reference": quiet, "_covered": share, "_open_form": 0.0, "_ripple": 1e-6
+        "_screen_beside_reference": quiet, "_covered": share, "_open_form": 0.0, "_ripple": 1e-6,
+        "strain_of": 0.0,
     }  # fmt: skip
     for name, value in given.items():
         monkeypatch.setattr(screening, name, lambda *_, value=value: value)

@@ -42,8 +42,7 @@ def of_files(
     filter runs over them too, before and after.
     """
     settings = configuration.settings
-    files = in_order(files)
-    recordings, known = read_all(files), read_all(in_order(reference.files))
+    recordings, known = read_all(in_order(files)), read_all(in_order(reference.files))
     if own_rig:
         provenance.check_rig([*recordings, *known], settings, configuration.source)
 

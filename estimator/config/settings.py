@@ -13,6 +13,7 @@ from gritd.estimator.terramechanics.soil import PressureSinkage, Wheel
 ENGINES = ("filterpy", "plain")  # of the filter
 # [N], [N·m] an axis of the wrench whose zero is no better known than this is not measured
 UNMEASURED = 1e5
+NO_SIGNAL = "none"  # of a channel that a rig does not have
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,11 @@ class Channel:
     resolution: float | None = None  # one count in the number that is sent, where that is no count
     # fastest believable change [raw/s]; a faster one is a counter jump
     max_rate: float = inf
+
+    @property
+    def there(self) -> bool:
+        """Whether there is such a sensor: a drive without a carriage says `signal: none`."""
+        return self.signal != NO_SIGNAL
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,11 @@ SOURCES = {"motor_shunt": "torque of the motor", "wrench": "torque at the axle"}
 
 def reach(settings: Settings) -> str:
     """For check-config and info."""
+    if not settings.channels["carriage_encoder"].there:
+        return (
+            "nothing of the soil, as a drive without a carriage; "
+            "gritd calibrate torque and gritd diagnose read it"
+        )
     source, wrench = settings.drive.torque_source, settings.wrench
     torque = SOURCES.get(source, "")
     pull = "drawbar pull" if wrench is not None and wrench.pulls else ""

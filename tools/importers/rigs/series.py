@@ -154,6 +154,10 @@ def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings) -> 
         if run.repeated
     ]
 
+    if mapped.drive_alone:
+        alone = "gritd calibrate torque and gritd diagnose read it, no soil can be estimated"
+        return [*notes, f"note: a drive without a carriage: {alone}"]
+
     unstated = [run.info.name for run in runs if run.info.nominal_load is None]
     if unstated and mapped.named("load") is None:
         notes.append(

@@ -92,7 +92,9 @@ def _interval(runs: Sequence[SeriesRun], names: Sequence[str]) -> float:
 
 
 def _used(mapped: SeriesMap) -> dict[str, str]:
-    """Channel of the recording -> column. Raises RigFileError without both encoders."""
+    """Channel of the recording -> column. Raises RigFileError without both encoders; a drive alone
+    has no carriage.
+    """
     used = {}
     for channel, choices in (encoders.CHANNELS | ANALOGUE).items():
         names = [name for name in map(mapped.named, choices) if name is not None]
@@ -102,7 +104,7 @@ def _used(mapped: SeriesMap) -> dict[str, str]:
             )
         if names:
             used[channel] = names[0]
-        elif channel in encoders.CHANNELS:
+        elif channel in encoders.CHANNELS and not mapped.drive_alone:
             raise RigFileError(
                 f"columns: found none for the {channel}; expected one with channel: "
                 f"{' or '.join(choices)}",

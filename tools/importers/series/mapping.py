@@ -49,6 +49,12 @@ MEASURED = {
 }
 WRAPPING = ("wheel_angle", "wheel_count", "carriage_position", "carriage_count")
 AS_CONFIGURED = ("wheel_count", "carriage_count", "sinkage_volts", "shunt_volts")
+WHEEL_MOTION = {"wheel_angle", "wheel_speed", "rim_speed", "wheel_count"}
+MOTOR_TORQUE = {"current", "motor_torque", "shunt_volts"}
+OF_THE_BED = {
+    *("carriage_position", "carriage_speed", "carriage_count"),
+    *("sinkage", "sinkage_volts", "drawbar_pull"),
+}
 OF_THE_RUN = {
     "nominal_load": ("N", "weights of the run"),
     "start": ("m", "starting position on the bed"),
@@ -131,6 +137,15 @@ class SeriesMap:
     load: float | None  # [N] of every run that states no other
     operator: str = ""  # of every run that states no other
     notes: str = ""  # the same
+
+    @property
+    def drive_alone(self) -> bool:
+        """Whether there is a motor with its angle, and neither carriage nor sinkage: a wheel that
+        is lifted, or none.
+        """
+        there = {mapped.channel for mapped in self.columns.values()}
+        turned = bool(there & WHEEL_MOTION and there & MOTOR_TORQUE)
+        return turned and not there & OF_THE_BED
 
     def named(self, channel: str) -> str | None:
         """The column of a channel."""

@@ -11,6 +11,7 @@ from gritd.config import packaged
 from gritd.estimator.config import configuration as config
 from gritd.estimator.config.channels import LEAST_NOISE, UNITS
 from gritd.estimator.config.configuration import Configuration
+from gritd.estimator.config.settings import NO_SIGNAL
 from gritd.estimator.config.yamltree import read_text
 from gritd.tools.cli.command import USAGE
 from gritd.tools.cli.yaml_edit import EditedYaml, quantity
@@ -41,12 +42,15 @@ def _text(mapped: SeriesMap, given: Path | None) -> tuple[str, str, Path | None]
     """The file that is given, or the template with the map's wheel."""
     if given is not None:
         return read_text(given), str(given), given.resolve().parent
-    if mapped.radius is None or mapped.width is None:
+    radius, width = mapped.radius, mapped.width
+    if mapped.drive_alone and radius is None and width is None:
+        radius = width = 1.0  # of no consequence: no soil is touched
+    if radius is None or width is None:
         raise RigFileError(
             "wheel: found nothing in the map; expected its radius and width, or --config F", USAGE
         )
     text = packaged("rig_csv.yaml").read_text(encoding="utf-8")
-    filled = Template(text).substitute(radius=f"{mapped.radius:.9g}", width=f"{mapped.width:.9g}")
+    filled = Template(text).substitute(radius=f"{radius:.9g}", width=f"{width:.9g}")
     return filled, "rig_csv.yaml", None
 
 
@@ -80,6 +84,9 @@ def written(text: str, source: str, imported: Imported) -> str:
         document.set((*path, "noise"), _noise(noise, UNITS[channel][2]))
         document.set((*path, "stale_after"), _stale_after(intervals[channel]))
 
+    if "carriage_encoder" not in intervals:  # a drive alone
+        for channel in ("carriage_encoder", "sinkage_pot"):
+            document.set(("channels", channel, "signal"), NO_SIGNAL)
     if imported.axes:
         _set_wrench(document, imported.axes, intervals["wrench"])
     _set_source(document, imported)

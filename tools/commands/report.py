@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from argparse import Namespace
@@ -17,19 +18,22 @@ from gritd.tools.cli.command import DAMAGED, DONE, USAGE, CommandError, Parser, 
 from gritd.tools.cli.progress import Progress
 from gritd.tools.commands.estimate import check_same_rig, configurations_of, settings_of
 from gritd.tools.report import campaign, lab
+from gritd.tools.report.numbers import numbers
 
 
 def main(argv: Sequence[str]) -> int:
     """Exit 0; 3 where a recording is damaged. Raises CommandError."""
     arguments = _parser().parse_args(argv)
-    files.writable(arguments.output)
+    output = arguments.json or arguments.output
+    files.writable(output)
 
     told = _campaign(arguments, ["gritd", "report", *argv])
+    text = json.dumps(numbers(told), indent=1) if arguments.json else campaign.render(told)
     try:
-        arguments.output.write_text(campaign.render(told), encoding="utf-8")
+        output.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise CommandError(f"{arguments.output}: {(error.strerror or '').lower()}", USAGE) from None
-    print(arguments.output)
+        raise CommandError(f"{output}: {(error.strerror or '').lower()}", USAGE) from None
+    print(output)
 
     read = [run.run.recording for run in told.runs]
     damage = [f"{r.path}: {line}" for r in read for line in r.damage]
@@ -78,7 +82,11 @@ def _parser() -> Parser:
 
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recordings")
     add_configuration(parser, "for all runs, instead of the recorded configurations")
-    parser.add_argument(
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument(
+        "--json", type=Path, metavar="OUT", help="the figures as numbers, in place of the page"
+    )
+    form.add_argument(
         "-o",
         "--output",
         type=Path,

@@ -73,17 +73,19 @@ def _live(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None
 def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> None:
     """Recordings. Raises CommandError."""
     from gritd.tools.view.app import recorded
+    from gritd.tools.view.campaign import Campaign
     from gritd.tools.view.recorded import Recordings
     from gritd.tools.view.server import listening, serve
 
-    recordings = Recordings(arguments.files)
+    recordings, campaign = Recordings(arguments.files), Campaign(arguments.files)
     with closing(listening(place, arguments.any_port)) as listener:
 
         def begin() -> None:
             recordings.start()
+            campaign.start()
             _announce(place, listener)
 
-        serve(recorded(recordings, files), place, listener, begin)
+        serve(recorded(recordings, campaign, files), place, listener, begin)
 
 
 def _announce(place: Place, listener: socket.socket) -> None:

@@ -182,8 +182,7 @@ def _over_slip(of: Beside, channel: str, label: str) -> Markup:
     at = plot.axes(plot.limits(slip), plot.limits(measured, *computed.values()), TOP, BOTTOM)
 
     curves = [
-        plot.line(at, *_mean_over(slip, values), f"line {kind}")
-        for kind, values in computed.items()
+        plot.line(at, *mean_over(slip, values), f"line {kind}") for kind, values in computed.items()
     ]
 
     frame = plot.frame(at, label, below="slip [%]")
@@ -191,7 +190,7 @@ def _over_slip(of: Beside, channel: str, label: str) -> Markup:
     return plot.picture(HEIGHT, f"{label} against slip", frame, *curves, dots)
 
 
-def _mean_over(x: Array, y: Array) -> tuple[Array, Array]:
+def mean_over(x: Array, y: Array) -> tuple[Array, Array]:
     """Means of y (n,) in bins of x, at the bins' mean x."""
     edges = np.linspace(np.min(x), np.max(x), CURVE + 1)
     which = np.clip(np.digitize(x, edges) - 1, 0, CURVE - 1)

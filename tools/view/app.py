@@ -19,6 +19,7 @@ from gritd.estimator.daemon.publish import line_of
 from gritd.estimator.terramechanics.soil import Array
 
 if TYPE_CHECKING:  # the one does not load what the other needs
+    from gritd.tools.view.campaign import Campaign
     from gritd.tools.view.feed import Feed
     from gritd.tools.view.recorded import Recordings
     from gritd.tools.view.run_curves import Along
@@ -88,7 +89,7 @@ def live(feed: Feed, library: Mapping[str, Path], hub: Hub) -> Starlette:
     return _application(answers, library)
 
 
-def recorded(recordings: Recordings, library: Mapping[str, Path]) -> Starlette:
+def recorded(recordings: Recordings, campaign: Campaign, library: Mapping[str, Path]) -> Starlette:
     """The page of recordings."""
 
     async def about(request: Request) -> Response:
@@ -112,7 +113,11 @@ def recorded(recordings: Recordings, library: Mapping[str, Path]) -> Starlette:
         told = await asyncio.to_thread(recordings.moment, asked.run, asked.along, asked.at)
         return Response(line_of(told), media_type="application/json")
 
+    async def forces(request: Request) -> Response:
+        return Response(line_of(campaign.told), media_type="application/json")
+
     answers = {"/about": about, "/events": events, "/stretch": stretch, "/moment": moment}
+    answers["/campaign"] = forces
     return _application(answers, library)
 
 

@@ -15,6 +15,7 @@ from gritd.estimator.recording.salvage import read
 from gritd.tools.cli.command import CommandError
 from gritd.tools.commands import replay
 from gritd.tools.view import recorded
+from gritd.tools.view.campaign import Campaign
 from gritd.tools.view.charts import CHARTS
 from gritd.tools.view.downsample import envelope
 from gritd.tools.view.recorded import Recordings
@@ -113,6 +114,26 @@ SET = (
 )
 
 
+def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path]) -> None:
+    campaign = Campaign(paths)
+    assert campaign.told == {"state": "computing"}
+    campaign._run()
+    assert campaign.told["state"] == "done" and len(campaign.told["runs"]) == 2
+    for run in campaign.told["runs"]:
+        assert [round(part["load"], -1) for part in run["loads"]] == [40.0, 80.0]
+        for part in run["loads"]:
+            measured, original = part["torque"]["measured"], part["torque"]["original"]["value"]
+            assert len(measured) == len(part["slip"])
+            assert np.mean(original) == pytest.approx(np.mean(measured), rel=0.05)
+    json.dumps(campaign.told, allow_nan=False)
+
+
+def test_a_campaign_that_cannot_be_computed_says_why(tmp_path: Path) -> None:
+    campaign = Campaign([tmp_path / "none.mcap"])
+    campaign._run()
+    assert campaign.told["state"] == "failed" and "none.mcap" in campaign.told["reason"]
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
 def test_runs_over_each_other_play_scrub_and_zoom(paths: list[Path], tmp_path: Path) -> None:
@@ -138,5 +159,8 @@ def test_runs_over_each_other_play_scrub_and_zoom(paths: list[Path], tmp_path: P
         tab.wait(f"document.querySelector('#span').textContent !== {whole!r}")
         tab.value(SET.format("'way'", "change", "#along"))
         tab.wait("document.querySelector('#span').textContent.endsWith(' m')")
+        tab.wait("document.body.dataset.campaign === 'done'")
+        assert tab.value("document.querySelectorAll('#forces figure').length") >= 3
+        assert tab.value("document.documentElement.scrollWidth") <= 390
         assert tab.complaints == []
         assert all(url.startswith((address, "data:")) for url in tab.asked)

@@ -2,13 +2,13 @@
 import {written} from "./chart.js";
 
 const NS = "http://www.w3.org/2000/svg";
-const made = (into, name, values, words) => {
+export const picture = (into, name, values, words) => {
   const e = into.appendChild(document.createElementNS(NS, name));
   for (const key in values) e.setAttribute(key, values[key]);
   if (words !== undefined) e.textContent = words;
   return e;
 };
-const path = points => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
+export const path = points => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 
 // --- the plane ---
 
@@ -31,25 +31,25 @@ export const plane = (svg, told, ellipse, way, prior) => {
   const Y = v => BOX.bottom - (v - ys[0]) / (ys[1] - ys[0]) * (BOX.bottom - BOX.top);
   const at = points => path(points.map(([x, y]) => [X(x), Y(y)]));
 
-  for (const v of ticks(...xs)) {
-    made(svg, "line", {class: "grid", x1: X(v), x2: X(v), y1: BOX.top, y2: BOX.bottom});
-    made(svg, "text", {x: X(v), y: BOX.bottom + 17, "text-anchor": "middle"}, number(v));
+  for (const v of svgTicks(...xs)) {
+    picture(svg, "line", {class: "grid", x1: X(v), x2: X(v), y1: BOX.top, y2: BOX.bottom});
+    picture(svg, "text", {x: X(v), y: BOX.bottom + 17, "text-anchor": "middle"}, number(v));
   }
-  for (const v of ticks(...ys)) {
-    made(svg, "line", {class: "grid", x1: BOX.left, x2: BOX.right, y1: Y(v), y2: Y(v)});
-    made(svg, "text", {x: BOX.left - 7, y: Y(v) + 4, "text-anchor": "end"}, number(v));
+  for (const v of svgTicks(...ys)) {
+    picture(svg, "line", {class: "grid", x1: BOX.left, x2: BOX.right, y1: Y(v), y2: Y(v)});
+    picture(svg, "text", {x: BOX.left - 7, y: Y(v) + 4, "text-anchor": "end"}, number(v));
   }
-  made(svg, "text", {class: "strong", x: BOX.right, y: BOX.bottom + 36, "text-anchor": "end"}, "cohesion c [Pa]");
-  made(svg, "text", {class: "strong", x: BOX.left - 7, y: BOX.top - 12, "text-anchor": "end"}, "tan φ");
+  picture(svg, "text", {class: "strong", x: BOX.right, y: BOX.bottom + 36, "text-anchor": "end"}, "cohesion c [Pa]");
+  picture(svg, "text", {class: "strong", x: BOX.left - 7, y: BOX.top - 12, "text-anchor": "end"}, "tan φ");
 
-  const inside = made(svg, "svg", {x: 0, y: 0, width: 480, height: 330});
-  const clip = made(made(inside, "defs", {}), "clipPath", {id: "inside"});
-  made(clip, "rect", {x: BOX.left, y: BOX.top, width: BOX.right - BOX.left, height: BOX.bottom - BOX.top});
-  const plot = made(inside, "g", {"clip-path": "url(#inside)"});
-  if (known) made(plot, "path", {class: "prior", d: at(stated)});
-  made(plot, "path", {class: "way", d: at(passed)});
-  made(plot, "path", {class: "ellipse", d: at(outline) + "Z"});
-  made(plot, "circle", {class: "centre", cx: X(ellipse.c), cy: Y(ellipse.tan_phi), r: 3.5});
+  const inside = picture(svg, "svg", {x: 0, y: 0, width: 480, height: 330});
+  const clip = picture(picture(inside, "defs", {}), "clipPath", {id: "inside"});
+  picture(clip, "rect", {x: BOX.left, y: BOX.top, width: BOX.right - BOX.left, height: BOX.bottom - BOX.top});
+  const plot = picture(inside, "g", {"clip-path": "url(#inside)"});
+  if (known) picture(plot, "path", {class: "prior", d: at(stated)});
+  picture(plot, "path", {class: "way", d: at(passed)});
+  picture(plot, "path", {class: "ellipse", d: at(outline) + "Z"});
+  picture(plot, "circle", {class: "centre", cx: X(ellipse.c), cy: Y(ellipse.tan_phi), r: 3.5});
 
   const words = `Filled: the estimate within 2σ, c ${written(ellipse.c, 0)} ± ${written(ellipse.ax / 2, 0)} Pa, tan φ ` +
     `${written(ellipse.tan_phi, 4)} ± ${written(Math.hypot(ellipse.ay, ellipse.by) / 2, 4)}. Line: its way in this window.` +
@@ -58,13 +58,13 @@ export const plane = (svg, told, ellipse, way, prior) => {
   svg.setAttribute("aria-label", words);
 };
 
-const span = values => {
+export const span = values => {
   const low = values.reduce((a, b) => Math.min(a, b), Infinity), high = values.reduce((a, b) => Math.max(a, b), -Infinity);
   const room = Math.max(high - low, 1e-6) * 0.12;
   return [low - room, high + room];
 };
 
-const ticks = (low, high) => {
+export const svgTicks = (low, high) => {
   const raw = (high - low) / 5, power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map(s => s * power).find(s => s >= raw);
   const found = [];
@@ -86,28 +86,28 @@ export const wheel = (svg, told, rim) => {
   const on = (theta, r) => [MIDDLE + r * Math.sin(theta), axle + r * Math.cos(theta)];
   const edge = rim.theta.map(t => on(t, SIZE));
   // the surface ahead, the arc of contact, the rut behind
-  made(svg, "path", {class: "soil", d: path([[480, 330], [480, GROUND], ...edge, [0, bottom], [0, 330]]) + "Z"});
-  made(svg, "line", {class: "thin", "stroke-dasharray": "3 4", x1: 0, x2: MIDDLE + SIZE * Math.sin(entry), y1: GROUND, y2: GROUND});
-  made(svg, "circle", {class: "tyre", cx: MIDDLE, cy: axle, r: SIZE});
-  made(svg, "circle", {class: "thin", cx: MIDDLE, cy: axle, r: 4});
+  picture(svg, "path", {class: "soil", d: path([[480, 330], [480, GROUND], ...edge, [0, bottom], [0, 330]]) + "Z"});
+  picture(svg, "line", {class: "thin", "stroke-dasharray": "3 4", x1: 0, x2: MIDDLE + SIZE * Math.sin(entry), y1: GROUND, y2: GROUND});
+  picture(svg, "circle", {class: "tyre", cx: MIDDLE, cy: axle, r: SIZE});
+  picture(svg, "circle", {class: "thin", cx: MIDDLE, cy: axle, r: 4});
 
   const most = rim.sigma.reduce((a, b) => Math.max(a, b), 1e-9), peak = rim.sigma.indexOf(most);
   const shear = rim.tau.reduce((a, b) => Math.max(a, Math.abs(b)), 0), greatest = rim.tau.findIndex(v => Math.abs(v) === shear);
   const scale = STRESS / Math.max(most, shear);
   const out = values => values.map((v, i) => on(rim.theta[i], SIZE + Math.abs(v) * scale));
-  made(svg, "path", {class: "normal", d: path([...edge, ...out(rim.sigma).reverse()]) + "Z"});
-  made(svg, "path", {class: "shear", d: path(out(rim.tau))});
+  picture(svg, "path", {class: "normal", d: path([...edge, ...out(rim.sigma).reverse()]) + "Z"});
+  picture(svg, "path", {class: "shear", d: path(out(rim.tau))});
   const degrees = t => `${written(t * 180 / Math.PI, 1)}°`;
   for (const theta of [entry, rim.theta[peak], 0]) {
     const [x, y] = on(theta, SIZE);
-    made(svg, "line", {class: "thin", x1: MIDDLE, y1: axle, x2: x, y2: y});
+    picture(svg, "line", {class: "thin", x1: MIDDLE, y1: axle, x2: x, y2: y});
   }
 
-  const [ex, ey] = on(entry, SIZE), words = (x, y, text, kind, anchor = "start") => made(svg, "text", {class: kind, x, y, "text-anchor": anchor}, text);
+  const [ex, ey] = on(entry, SIZE), words = (x, y, text, kind, anchor = "start") => picture(svg, "text", {class: kind, x, y, "text-anchor": anchor}, text);
   words(Math.min(ex + 12, 400), ey - 8, `θ₁ ${degrees(entry)}`, "strong");
   words(10, GROUND - 6, "surface", "");
   words(10, bottom + 16, `rut, sinkage ${written(rim.sinkage * 1e3, 1)} mm`, "strong");
-  made(svg, "path", {class: "thin", d: `M${MIDDLE - 28} 20h56m-7 -5l7 5l-7 5`});
+  picture(svg, "path", {class: "thin", d: `M${MIDDLE - 28} 20h56m-7 -5l7 5l-7 5`});
   words(MIDDLE, 14, "travel", "", "middle");
 
   const said = `Wheel of radius ${written(rim.radius * 1e3, 0)} mm, in contact from θ₁ ${degrees(entry)} to the bottom. Outwards from the rim, ` +

@@ -1,4 +1,5 @@
 // The page over recordings: a time line to play and scrub, several runs laid over each other by time or way.
+import {campaign} from "./campaign.js";
 import {Chart, watched, written} from "./chart.js";
 import {placed, stretch} from "./data.js";
 import {plane, wheel} from "./pictures.js";
@@ -16,7 +17,7 @@ const end = run => (page.along === "time" ? run.duration : run.way);
 const whole = () => [0, Math.max(...shown().map(end), end(active()), 1e-3)];
 const span = () => page.span || whole();
 const clock = seconds => {
-  const minutes = Math.floor(seconds / 60), rest = (seconds - 60 * minutes).toFixed(seconds < 600 && span()[1] - span()[0] < 100 ? 2 : 0);
+  const minutes = Math.floor(seconds / 60), rest = (seconds - 60 * minutes).toFixed(span()[1] - span()[0] < 20 ? 2 : 0);
   return `${minutes}:${rest.padStart(rest.includes(".") ? 5 : 2, "0")}`;
 };
 const words = place => (page.along === "time" ? clock(place) : `${written(place, 3)} m`);
@@ -229,5 +230,5 @@ export const recorded = async about => {
   watched(page.charts, draw);
   page.at = active().duration;
   await chosen(0);
-  await reading(about);
+  await Promise.all([reading(about), campaign()]);
 };

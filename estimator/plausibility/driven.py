@@ -21,6 +21,7 @@ from gritd.estimator.wheel.window_choice import Cadence
 MOVES = 4.0  # [σ] of its noise, a speed that is one …
 SLOW = 0.1  # … and of the run's fastest: what is slower is a start or an end
 LEAST = 5  # readings in a window
+AT_MOST = 500_000  # readings of a channel that are looked at: bounds memory and time
 FIRST = 0.4  # [s] windows in which speeds are looked at where their length is still to be chosen
 
 
@@ -74,6 +75,7 @@ class Driven:
     wrap: float = 0.0  # [rad] by which the wheel's angle falls back; 0 where it does not
 
 
+@np.errstate(all="ignore")  # numbers that are none stay none
 def driven(
     name: str, raw: Mapping[str, Raw], settings: Settings, stated_load: float | None
 ) -> Driven:
@@ -188,8 +190,10 @@ def with_driving(course: Course, noise: Array) -> Course:
 
 
 def _edges(stamps: Ints, length: int) -> tuple[Ints, Ints]:
-    """Beginning and end (n,) [ns] of the windows side by side that hold readings."""
-    number = np.unique((stamps - stamps[0]) // length)
+    """Beginning and end (n,) [ns] of the windows side by side that hold readings; of a long run
+    every so many, so that they hold AT_MOST readings.
+    """
+    number = np.unique((stamps - stamps[0]) // length)[:: stamps.size // AT_MOST + 1]
     after: Ints = stamps[0] + number * length - 1
     return after, after + length
 

@@ -94,7 +94,7 @@ def _of_column(quantity: str, source: Source) -> list[Remedy]:
 
 def _of_scale(name: str, taken: str, per: float, units: Mapping[str, float]) -> list[Remedy]:
     return [
-        Remedy(factor / per, f"the scale of {name} looks like {taken}, the readings like {unit}")
+        Remedy(factor / per, f"{name} has {unit} taken for {taken}")
         for unit, factor in units.items()
         if unit != taken
     ]

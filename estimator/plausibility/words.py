@@ -8,7 +8,8 @@ from math import isfinite
 import numpy as np
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.plausibility.checks import Contradiction, contradictions
+from gritd.estimator.plausibility.checks import contradictions
+from gritd.estimator.plausibility.contradiction import Contradiction
 from gritd.estimator.plausibility.driven import Driven
 from gritd.estimator.plausibility.mistakes import OF_A_RECORDING, Sources
 from gritd.estimator.terramechanics.soil import Array
@@ -75,13 +76,13 @@ def table(given: Sequence[tuple[Driven, Settings]]) -> Iterator[str]:
         yield "  ".join([f"{row[0]:<{widths[0]}}", *(f"{cell:>{width}}" for cell, width in cells)])
 
 
+@np.errstate(all="ignore")  # numbers that are none stay none
 def _row(run: Driven, settings: Settings) -> tuple[str, ...]:
     clock, course = run.clock, run.course
     driving, radius = course.driving, settings.wheel.radius
     load = course.load[driving] if np.isfinite(course.load).any() else settings.load.nominal.value
 
-    with np.errstate(divide="ignore", invalid="ignore"):
-        torque, pull = course.torque[driving] / (radius * load), course.pull[driving] / load
+    torque, pull = course.torque[driving] / (radius * load), course.pull[driving] / load
     return (
         run.name,
         f"{1.0 / clock.interval:.4g}" if clock.interval else DASH,

@@ -198,7 +198,7 @@ def _measured(
 
     channels = _channels(meaning.channel)
     options = tuple(_option(channel, columns[0], known[0], unit) for channel in channels)
-    asks = "; ".join(filter(None, (meaning.asks, _doubts(channels[0], known[0], unit, columns[0]))))
+    asks = "; ".join(filter(None, (meaning.asks, _doubts(channels[0], known[0], unit))))
     return Proposal(name, meaning.channel, meaning.sure, options, asks)
 
 
@@ -227,18 +227,15 @@ def _factor(unit: Unit | None, plain: str) -> str:
     return f", factor: {unit.factor:.7g}"
 
 
-def _doubts(channel: str, known: Array, unit: Unit | None, column: Column) -> str:
+def _doubts(channel: str, known: Array, unit: Unit | None) -> str:
     """What else has to be decided: a sign, a unit that nothing tells, counts."""
     doubts = []
     if _falls(channel, known):
         doubts.append(f"{_turned(channel)}: as it is, or factor: -1")
     if np.ptp(known) == 0.0:
         doubts.append("the same throughout: an imposed speed")
-    if (
-        unit is None
-        and column.resolution == 1.0
-        and channel in ("wheel_angle", "carriage_position")
-    ):
+    whole = bool(np.all(known == np.round(known)))
+    if unit is None and whole and channel in ("wheel_angle", "carriage_position"):
         counted = "wheel_count" if channel == "wheel_angle" else "carriage_count"
         doubts.append(f"whole numbers: counts are channel: {counted}, unit: count, with --config")
     return "; ".join(doubts)

@@ -1,0 +1,195 @@
+"""What cannot be of a run's sinkage and forces.
+
+Soil mechanics gives the bounds; TOLERANCE is how far the forces of published rigs stray from what
+was stated (loads by 10 %, the radius of a wheel with lugs by another 10 %).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gritd.estimator.config.settings import Settings
+from gritd.estimator.model.balance import bekker_entry_angle
+from gritd.estimator.offline.windows import Bools
+from gritd.estimator.plausibility.contradiction import (
+    FEW,
+    LEAST,
+    MOST,
+    Contradiction,
+    datum,
+    entry_angle,
+    load_of,
+    told,
+)
+from gritd.estimator.plausibility.driven import Course, Driven
+from gritd.estimator.plausibility.mistakes import Sources, remedies, turned
+from gritd.estimator.terramechanics.soil import Array, Soil
+
+TOLERANCE = 0.25  # of a force
+# sinkage over that of the stated soil: half way, in powers of ten, to 1/1000
+BEARING = 1.0 / 30.0
+
+
+def sinkage(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+    course, radius = run.course, settings.wheel.radius
+    touching = course.driving & ~(course.load < settings.load.minimum)
+    known = course.sinkage[touching & np.isfinite(course.sinkage)]
+    if known.size < LEAST:
+        return
+
+    sinkage, expected = float(np.median(known)), _expected_sinkage(course, settings)
+    shown = f"{1e3 * sinkage:.3g} mm"
+    if abs(sinkage) > radius:
+        likely = [
+            r.words for r in remedies("sinkage", sources) if _usual(sinkage * r.factor, radius)
+        ]
+        yield told(
+            "deep", f"sinkage is {shown}, beyond the radius of {1e3 * radius:.3g} mm", likely
+        )
+    elif _highest(course) < -max(datum(settings), FEW * radius):
+        yield told(
+            "above", f"sinkage is {shown} while the wheel drives", [turned("sinkage", sources)]
+        )
+    elif 0.0 < sinkage < BEARING * expected:
+        likely = [
+            r.words for r in remedies("sinkage", sources) if _usual(sinkage * r.factor, radius)
+        ]
+        if likely:
+            yield told(
+                "shallow",
+                f"sinkage is {shown}; the stated soil gives {1e3 * expected:.2g} mm",
+                likely,
+            )
+
+
+def _highest(course: Course) -> float:
+    """The sinkage [m] that is hardly ever passed in the run: before it a wheel may hang."""
+    return float(np.percentile(course.sinkage[np.isfinite(course.sinkage)], 100.0 * MOST))
+
+
+def _usual(sinkage: float, radius: float) -> bool:
+    return FEW * radius < abs(sinkage) < radius
+
+
+def _expected_sinkage(course: Course, settings: Settings) -> float:
+    """By the stated soil under the load [m]."""
+    soil, wheel = settings.soil, settings.wheel
+    load = load_of(course, settings)
+    stated = Soil(
+        soil.cohesion.value,
+        soil.tan_phi.value,
+        soil.shear_modulus.value,
+        soil.exponent.value,
+        soil.pressure_sinkage.modulus(wheel.width),
+    )
+    angle = bekker_entry_angle(wheel, stated, np.array([load]))
+    return float(wheel.radius * (1.0 - np.cos(angle[0])))
+
+
+def load(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+    load = run.course.load[run.course.driving]
+    load = load[np.isfinite(load)]
+    if load.size < LEAST:
+        return
+
+    low, usual, high = np.percentile(load, (5.0, 50.0, 95.0))
+    if usual < -settings.load.minimum:
+        yield told(
+            "negative load", f"load is {usual:.3g} N, and no soil pulls", [turned("load", sources)]
+        )
+        return
+    stated = run.stated_load
+    if stated is None or low / (1.0 + TOLERANCE) <= stated <= high * (1.0 + TOLERANCE):
+        return
+    likely = [
+        remedy.words
+        for remedy in remedies("load", sources)
+        if abs(usual * remedy.factor / stated - 1.0) < TOLERANCE
+    ]
+    yield told(
+        "stated load", f"load is {usual:.3g} N as measured and {stated:.3g} N as stated", likely
+    )
+
+
+def torque(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+    """Where slip is positive, soil is sheared backward all along the contact (Eq. 6): T > 0."""
+    course = run.course
+    torque, slip = course.forward * course.torque[course.driving], course.slip
+    known = np.isfinite(torque) & (slip > FEW)
+    if np.count_nonzero(known) < LEAST:
+        return
+    if float(np.mean(torque[known] < 0.0)) > MOST:
+        usual = float(np.median(torque[known]))
+        yield told(
+            "torque",
+            f"torque is {usual:.3g} N·m against the motion of a wheel that slips forward",
+            [turned("torque", sources)],
+        )
+
+
+def pull(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
+    course, load = run.course, load_of(run.course, settings)
+    known = course.driving & np.isfinite(course.torque + course.pull)
+    known[course.driving] &= course.slip > 0.0
+    torque, pull = (course.forward * x[known] for x in (course.torque, course.pull))
+    if pull.size < LEAST or float(np.median(torque)) <= 0.0 or load <= settings.load.minimum:
+        return
+
+    shear = torque / settings.wheel.radius
+    least, most = _bounds(course, known, settings, shear)
+    given = course.load[known], course.sinkage[known]
+    rises = _rise(pull, shear, *given[:1]) or _rise(pull, shear, *given)
+    if rises < 0.0:
+        fact = f"pull changes by {rises:.2f} of torque over radius, and must rise with it"
+        yield told("falling pull", fact, [turned("pull", sources)])
+    elif off := _outside(pull, least, most, load):
+        likely = [
+            remedy.words
+            for remedy in remedies("pull", sources)
+            if not _outside(pull * remedy.factor, least, most, load)
+        ]
+        turning = _outside(-pull, least, most, load) < 0.5 * off
+        likely = [turned("pull", sources)] if turning else likely
+        yield told(
+            "pull",
+            f"pull is {np.median(pull):.3g} N, where torque over radius allows "
+            f"{np.median(least):.3g} to {np.median(most):.3g} N",
+            likely or ["the torque, its constant, or the radius is another"],
+        )
+
+
+def _rise(pull: Array, shear: Array, *given: Array) -> float:
+    """By how much the pull (n,) rises with torque over radius (n,), other things (n,) being the
+    same; 0 where that explains less than half of what is left of it. 1/cos θ, by `_bounds`.
+    """
+    given = tuple(x for x in given if np.all(np.isfinite(x)) and np.ptp(x) > 0.0)
+    columns = np.column_stack([np.ones(pull.size), *given])
+    left = [x - columns @ np.linalg.lstsq(columns, x, rcond=None)[0] for x in (pull, shear)]
+    together, squares = float(left[0] @ left[1]), [float(x @ x) for x in left]
+    if together**2 <= 0.5 * squares[0] * squares[1]:
+        return 0.0
+    return together / squares[1]
+
+
+def _bounds(course: Course, known: Bools, settings: Settings, shear: Array) -> tuple[Array, Array]:
+    """Least and largest pull (m,) [N] of stresses that turn the wheel with this torque; shear:
+    T/r (m,) [N].
+
+    All stress at one angle θ gives DP = T/(r cos θ) − W tan θ, which falls with θ; the contact
+    lies between 0 and θ₁. Eqs. (8)-(10) are sums of such.
+    """
+    wheel, load = settings.wheel, load_of(course, settings)
+    sinkage = course.sinkage[known] + 0.5 * datum(settings)
+    angle = entry_angle(wheel, np.nan_to_num(sinkage, nan=wheel.radius))
+    return shear / np.cos(angle) - load * np.tan(angle), shear
+
+
+def _outside(pull: Array, least: Array, most: Array, load: float) -> float:
+    """How far most of the pulls (n,) lie outside their bounds, over the load; 0 within a
+    tolerance.
+    """
+    off = np.maximum(least - pull, pull - most) / load
+    worst = float(np.percentile(off, 100.0 * MOST))
+    return worst if worst > 0.5 * TOLERANCE else 0.0

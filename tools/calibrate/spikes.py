@@ -15,6 +15,7 @@ from gritd.tools.cli.command import DAMAGED, CommandError
 NEIGHBOURS = 7  # readings whose median a reading is compared with; a step passes
 FAR = 8.0  # [σ] from it
 STEPS = 3.0  # and so many of the smallest differences: an encoder at rest has no noise
+TURN = 3.0  # and so many of the usual differences about it: where a movement turns round
 MOST = 0.05  # of the readings: more are no single spikes
 
 
@@ -30,8 +31,9 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     quantum = float(steps[steps > 0.0].min()) if (steps > 0.0).any() else 0.0
     # of second differences: neither a level nor a steady change counts as noise
     noise = NORMAL * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0)
-    limit = max(FAR * noise, STEPS * quantum)
-    far: NDArray[np.bool_] = off > limit
+    about = sliding_window_view(np.abs(np.diff(padded)), NEIGHBOURS - 1)
+    usual = np.partition(about, 2, axis=1)[:, 2]  # up to three spikes among them do not raise it
+    far: NDArray[np.bool_] = off > max(FAR * noise, STEPS * quantum) + TURN * usual
     return far
 
 

@@ -26,6 +26,7 @@ from gritd.tools.cli import configuration_file
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser, number, whole
 from gritd.tools.cli.files import recording
 from gritd.tools.cli.yaml_edit import EditedYaml
+from gritd.tools.importers import plates
 
 TO_DO = {  # while the sensors are recorded
     "datum": "lift the wheel and lower it until it touches the surface, three times or more",
@@ -156,16 +157,20 @@ def _soil(arguments: argparse.Namespace, settings: Settings) -> Outcome:
 
 
 def _press(path: Path, arguments: argparse.Namespace, settings: Settings) -> soil.Press:
-    """A text file, or a recording of this testbed pressing a plate."""
-    if path.suffix.lower() != ".mcap":
-        return soil.read(path)
-    _check_wrench("wrench", settings)
-    if arguments.plate is None:
-        raise CommandError(f"{path}: expected --plate, the diameter of the plate, with it", USAGE)
-    radius = known_value(arguments.plate, "m") / 2.0
-    if radius <= 0.0:
+    """A table by a map, a text file, or a recording of this testbed pressing a plate."""
+    diameter = None if arguments.plate is None else known_value(arguments.plate, "m")
+    if diameter is not None and diameter <= 0.0:
         raise CommandError(f"--plate {arguments.plate}: expected a diameter above 0", USAGE)
-    return press.read(recording(path), settings, radius, arguments.touch_force)
+
+    if path.suffix.lower() == ".mcap":
+        _check_wrench("wrench", settings)
+        if diameter is None:
+            raise CommandError(f"{path}: expected --plate, its diameter, with it", USAGE)
+        return press.read(recording(path), settings, diameter / 2.0, arguments.touch_force)
+    if arguments.map is None:
+        return soil.read(path)
+    log = plates.plate_log(path, plates.load(arguments.map), diameter)
+    return soil.of_press(path.name, log.radius, log.force, log.depth, arguments.touch_force)
 
 
 PROCEDURES: dict[str, Procedure] = {
@@ -305,9 +310,12 @@ def _add_readings(command: argparse.ArgumentParser) -> None:
 
 def _add_presses(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "files", nargs="*", type=Path, metavar="FILE", help="plate tests, text or .mcap"
+        "files", nargs="*", type=Path, metavar="FILE", help="plate tests: tables, or .mcap"
     )
-    command.add_argument("--plate", metavar="DIAMETER", help="of the plate in recordings: '60 mm'")
+    command.add_argument(
+        "--map", type=Path, metavar="MAP.yaml", help="which columns of FILE are force and depth"
+    )
+    command.add_argument("--plate", metavar="DIAMETER", help="of the plate: '60 mm'")
     command.add_argument(
         "--record",
         action="append",

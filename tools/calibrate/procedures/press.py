@@ -32,16 +32,6 @@ def read(recorded: Recording, settings: Settings, radius: float, contact: float)
     filled = np.isfinite(weight)
     weight, height = weight[filled], height[filled]
 
-    hanging = np.flatnonzero(weight < contact)
-    first = int(hanging[0]) if hanging.size else weight.size - 1
-    last = first + int(np.argmax(weight[first:]))
-    free = hanging[hanging < last]
-    if not free.size or weight[last] < contact:
-        raise CommandError(
-            f"{recorded.path}: found no press; expected the load to rise from below "
-            f"{contact:g} N, the plate in the air, to its largest value",
-            DAMAGED,
-        )
-    pressed = slice(int(free[-1]), last + 1)
-    rows = np.column_stack([weight[pressed], 1e3 * (height[pressed] - height[free[-1]])])
-    return soil.of_rows(recorded.path.name, radius, rows)
+    if not (weight < contact).any():
+        raise CommandError(f"{recorded.path}: {soil.NO_PRESS.format(contact)}", DAMAGED)
+    return soil.of_press(recorded.path.name, radius, weight, height, contact)

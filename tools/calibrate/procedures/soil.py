@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from gritd.estimator.config.settings import Settings, Uncertain
 from gritd.estimator.terramechanics.soil import Array
+from gritd.tools.calibrate import spikes
 from gritd.tools.calibrate.outcome import Calibrated, Outcome
 from gritd.tools.cli.command import DAMAGED, FAILED, USAGE, CommandError
 
@@ -24,9 +26,14 @@ DIAMETER = re.compile(r"plate\s*diameter\s*:?\s*([\d.]+)\s*(mm|cm|m)\b", re.IGNO
 PAIR = re.compile(r"\s*(-?\d+\.?\d*)\s*[,;\t]\s*(-?\d+\.?\d*)\s*$")
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHALLOW = 2e-3  # [m] a plate has not met the soil with all of its face before
+BEFORE = 5e-3  # [m] that a plate may have sunk in before its force is told from none
 FEWEST = 8  # points of a test
 SURE = 2.0  # [σ] from which k_c is told from 0
 UNLIKE = 1.5  # the largest plate over the smallest, from which they may tell k_c: a wheel is wider
+NO_PRESS = (
+    "found no press; expected the load to rise from below {:g} N, the plate in the air, to its "
+    "largest value"
+)
 EXPONENTS = (0.1, 3.0)  # between which a soil's exponent lies
 
 
@@ -75,6 +82,44 @@ def of_rows(name: str, radius: float, rows: Array) -> Press:
         )
 
     return Press(name, radius, depth[used], pressure[used])
+
+
+def of_press(name: str, radius: float, force: Array, depth: Array, contact: float) -> Press:
+    """Force [N] and depth [m] of one press, (n,), in the order of time, up to the largest force.
+    Depth counts from the surface, which the plate meets a little before the force rises above
+    `contact` [N]; where the force never was below, as it is written. Raises CommandError.
+    """
+    far = spikes.spikes(force) | spikes.spikes(depth)
+    spikes.told(far, "plate", f"{name}: ")
+    force, depth = force[~far], depth[~far]
+
+    hanging = np.flatnonzero(force < contact)
+    first = int(hanging[0]) if hanging.size else 0
+    last = first + int(np.argmax(force[first:])) if force.size else 0
+    if not force.size or force[last] < contact:
+        raise CommandError(f"{name}: {NO_PRESS.format(contact)}", DAMAGED)
+
+    free = hanging[hanging < last]
+    begin = int(free[-1]) if free.size else 0
+    force, depth = force[begin : last + 1], depth[begin : last + 1]
+    zero = _surface(force, depth) if free.size else 0.0
+    return of_rows(name, radius, np.column_stack([force, 1e3 * (depth - zero)]))
+
+
+def _surface(force: Array, depth: Array) -> float:
+    """The depth [m] from which a power law fits best, up to BEFORE above the first reading."""
+    used = (depth > depth[0] + SHALLOW) & (force > 0.0)
+    if used.sum() < FEWEST:
+        return float(depth[0])
+    force, depth, first = force[used], depth[used], float(depth[0])
+
+    def misfit(zero: float) -> float:
+        design = np.column_stack([np.ones_like(depth), np.log(depth - zero)]) * force[:, None]
+        seen = force * np.log(force)
+        found = np.linalg.lstsq(design, seen, rcond=None)[0]
+        return float(((seen - design @ found) ** 2).sum())
+
+    return float(minimize_scalar(misfit, bounds=(first - BEFORE, first), method="bounded").x)
 
 
 def exponent(press: Press) -> float:

@@ -80,7 +80,7 @@ def deciding(search: Search) -> list[Model]:
     if len(search.models) < 2:
         return [search.base]
     best = search.weight(search.best())
-    near = [m for m in search.models[1:] if search.weight(m) > best - TUNING.verdict.tested]
+    near = [m for m in search.models[1:] if search.weight(m) > best - TUNING.search.little]
     return list(dict.fromkeys([search.bare, *near]))
 
 

@@ -88,7 +88,7 @@ def find_changes(screening: Screening, model: Model) -> Changes:
         return {}
 
     nulls = np.max([largest for each in competitions for largest in _nulls(each)], axis=0)
-    threshold = max(tail_quantile(nulls, TUNING.explain.change_chance), TUNING.explain.change_least)
+    threshold = max(tail_quantile(nulls, TUNING.screen.level), TUNING.explain.pays)
 
     changes: Changes = {}
     for competition in competitions:

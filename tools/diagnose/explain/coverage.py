@@ -36,14 +36,14 @@ def _outside(stack: Stack) -> str:
         values = stack.covariate(name)
         known, asked = values[driving & ~stack.new], values[driving & stack.new]
         room = TUNING.explain.beyond * max(
-            float(np.ptp(known)), TUNING.explain.beyond_floor * abs(float(np.mean(known)))
+            float(np.ptp(known)), TUNING.explain.beyond * abs(float(np.mean(known)))
         )
 
         for beyond, end, word in (
             (asked > known.max() + room, float(known.max()), "above"),
             (asked < known.min() - room, float(known.min()), "below"),
         ):
-            if np.mean(beyond) > TUNING.explain.beyond_share:
+            if np.mean(beyond) > TUNING.explain.beyond:
                 parts.append(f"{np.mean(beyond):.0%} {word} {value_of(stack, name, end)}")
 
     return "; ".join(parts) or "nothing"

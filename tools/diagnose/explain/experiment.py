@@ -140,10 +140,7 @@ def _read(rig: Rig, one: Model, other: Model, key: str) -> float:
                 rig.effects[f.name].confusable_with.get(name) == key for name in rival.names
             )
             if tells and f.parameter.role == "strength":
-                gain = max(
-                    gain,
-                    min(0.5 * float(x / TUNING.explain.instrument) ** 2, TUNING.explain.gain_most),
-                )
+                gain = max(gain, 0.5 * float(x / TUNING.explain.instrument) ** 2)
 
     return gain
 
@@ -208,14 +205,8 @@ def _shape_of_misfit(search: Search) -> NextExperiment | None:
 
     shape, menu = max(evidence, key=lambda s: evidence[s]), search.problem.stack.rig.menu
     key = menu.along.get(shape.along[0], menu.otherwise)
-    gain = float(
-        np.clip(
-            evidence[shape] / max(len(search.problem.stack.rig.runs), 1),
-            0.0,
-            TUNING.explain.gain_most,
-        )
-    )
-    return _foretold(key, gain)
+    gain = evidence[shape] / max(len(search.problem.stack.rig.runs), 1)
+    return _foretold(key, max(gain, 0.0))
 
 
 # ---- what is foreseen --------------------------------------------------------------------------
@@ -244,9 +235,7 @@ def _values(foreseen: Foreseen | None) -> Array:
 
 
 def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float:
-    """Half the squared change in units of noise, the soil's uncertainty among it, no more than MOST
-    [nats].
-    """
+    """Half the squared change in units of noise, the soil's uncertainty among it [nats]."""
     stack = search.problem.stack
     sigma = []
     for channel, colour in zip(here.channels, search.problem.noise.colours, strict=True):
@@ -262,4 +251,4 @@ def _gain(search: Search, here: Foreseen, change: Array, slopes: Array) -> float
     ready, soil = np.nan_to_num(change) / scale, np.nan_to_num(slopes) / scale[:, None]
     pulled = soil.T @ ready
     taken = pulled @ np.linalg.solve(np.eye(soil.shape[1]) + soil.T @ soil, pulled)
-    return float(np.clip(0.5 * (ready @ ready - taken), 0.0, TUNING.explain.gain_most))
+    return float(max(0.5 * (ready @ ready - taken), 0.0))

@@ -148,7 +148,7 @@ def _forward(fitted: Fitted, columns: Array) -> list[int]:
     while len(kept) < len(b):
         tried = {i: _value(a, b, [*kept, i]) for i in range(len(b)) if i not in kept}
         i = max(tried, key=lambda k: tried[k])
-        if tried[i] < best + TUNING.explain.term_pays:
+        if tried[i] < best + TUNING.explain.pays:
             break
         kept, best = [*kept, i], tried[i]
 

@@ -295,7 +295,7 @@ def _ends(values: Array, places: int, least: float, most: float = np.inf) -> tup
     """
     beyond = TUNING.explain.learnt_beyond
     low, high = (float(np.quantile(values, q)) for q in (beyond, 1.0 - beyond))
-    margin, unit = TUNING.explain.learnt_margin * max(abs(low), abs(high)), 10.0**-places
+    margin, unit = TUNING.explain.beyond * max(abs(low), abs(high)), 10.0**-places
     low, high = low - margin, high + margin
     ends = np.clip((np.floor(low / unit) * unit, np.ceil(high / unit) * unit), least, most)
     return round(float(ends[0]), places), round(float(ends[1]), places)

@@ -295,7 +295,7 @@ def _taken_up(projected: Projected, families: list[Family]) -> list[Family]:
 
 def _adds(evidence: float, before: float) -> bool:
     """Whether one more family of a channel is worth naming."""
-    least = max(TUNING.explain.beside_gain, TUNING.explain.least_share * before)
+    least = max(TUNING.explain.pays, TUNING.explain.least_share * before)
     return evidence >= before + least
 
 
@@ -341,7 +341,7 @@ def _ripples(
         whole = _gain(projected, _joined(here))[0]
         share = float(nats[best, 0] / max(nats[best, 0] + whole, SPAN))
         q = min(p * len(channels), 1.0)  # any of them may ripple by noise (Bonferroni)
-        if q <= TUNING.explain.order_chance and share >= TUNING.explain.least_share:
+        if q <= TUNING.screen.level and share >= TUNING.explain.least_share:
             amplitude = size * _amplitude(left, best, best + orders.size)
             words = wording.ripple(stack, channel, float(orders[best]), amplitude, share)
             location = Location(channel, "wheel_angle", share, p, q, words)
@@ -392,7 +392,7 @@ def _strains(stack: Stack, model: Model) -> list[Place]:
     constants = zip(stack.rig.constants, model.fitted.u.tolist(), nats.tolist(), strict=True)
     for constant, u, taken in constants:
         channel, kind = constant.channel, constant.kind
-        if kind in STRAINED and abs(u) > TUNING.explain.strain_far:
+        if kind in STRAINED and abs(u) > TUNING.explain.doubtful_constant:
             words = wording.strain(channel, kind, constant.of(u), constant.unit, u)
             p, share = float(2.0 * ndtr(-abs(u))), taken / float(nats.sum())
             places.append(Place(taken, Location(channel, "constant", share, p, p, words)))

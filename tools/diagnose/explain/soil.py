@@ -70,7 +70,7 @@ def _beside_prior(known: Constant, fitted: Quantity) -> Quantity:
     (Birge 1932, Phys. Rev. 40, 207-227): the form of the model may have moved the soil, or the
     earlier measurement was wrong, and the recordings do not tell which.
     """
-    reach, strain = TUNING.explain.contradicts, known.strain(fitted.value)
+    reach, strain = TUNING.explain.strained_soil, known.strain(fitted.value)
     if abs(strain) <= reach:
         return fitted
     return replace(fitted, sigma=max(fitted.sigma, known.spread(strain, abs(strain) / reach)))

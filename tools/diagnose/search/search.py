@@ -143,7 +143,7 @@ def _settled(search: Search) -> Search:
 
 
 def _near(search: Search, model: Model) -> bool:
-    return search.weight(model) > search.weight(search.best()) - TUNING.search.behind
+    return search.weight(model) > search.weight(search.best()) - TUNING.search.little
 
 
 # ---- one more effect ---------------------------------------------------------------------------
@@ -177,7 +177,7 @@ def _least_promise(model: Model, every: Sequence[Promise]) -> float:
     """What an effect must gain by linear algebra beside a model to be fitted [nats]: a share of the
     best, which a fit may turn round; one more effect also some of what the verdict asks of it.
     """
-    alone = TUNING.search.companion if model.names else TUNING.search.promising
+    alone = TUNING.search.little if model.names else TUNING.search.promising
     top = max((promise.gain for promise in every), default=0.0)
     return max(alone, TUNING.search.promised_share * top - TUNING.search.promised_less)
 
@@ -195,7 +195,7 @@ def _with_effect(search: Search, model: Model, promise: Promise) -> Model:
     """
     every = [_fitted_with(search, model, start) for start in (promise, *promise.others)]
     made = max(every, key=lambda m: m.evidence)
-    if made.evidence > model.evidence - TUNING.search.lost:
+    if made.evidence > model.evidence - TUNING.search.little:
         return made
 
     strengths = [p.role == "strength" for p in promise.effect.parameters()]

@@ -24,8 +24,6 @@ class Explain:
     change_values: int = tuned(8, "values", "on either side of a change")
     swept_levels: int = tuned(8, "levels", "of a covariate at least, for it to count as swept")
     level_held: float = tuned(0.015, "-", "share of the values that makes a level")
-    change_chance: float = tuned(0.01, "probability", "of any change point by noise alone")
-    change_least: float = tuned(3.0, "nats", "a change must gain")
     change_rounds: int = tuned(6, "rounds", "of one more change", "run time")
     run_share: float = tuned(
         0.5, "share", "of a channel's misfit that offsets of runs take before changes are sought"
@@ -37,10 +35,10 @@ class Explain:
     )
     change_range: Range = tuned((0.01, 0.99), "quantile", "of a covariate, where changes are tried")
 
-    # --- coverage.py ---
+    pays: float = tuned(3.0, "nats", "a change, a term of a law or a further place must gain")
+
+    # --- coverage.py, learnt.py ---
     beyond: float = tuned(0.02, "-", "of the range: farther out a covariate is outside")
-    beyond_floor: float = tuned(0.02, "-", "of a covariate's mean: its range counts as no less")
-    beyond_share: float = tuned(0.02, "-", "of the values that must be outside to be told")
 
     # --- doubts.py, result.py ---
     loud: float = tuned(
@@ -67,7 +65,6 @@ class Explain:
     )
     foreseen_together: int = tuned(10, "values", "that count as one: neighbours share their noise")
     gain_enough: float = tuned(10.0, "nats", "decide")
-    gain_most: float = tuned(50.0, "nats", "more is told as so much")
     rivals: int = tuned(4, "explanations", "that an experiment is to tell apart", "run time")
     gain_worth: float = tuned(1.0, "nats", "from which on two are said to be told apart")
     foreseen_step: float = tuned(0.1, "σ", "of a constant, for differences")
@@ -77,9 +74,6 @@ class Explain:
     shown_hypotheses: int = tuned(12, "hypotheses", "that are shown")
     slight_explanation: float = tuned(
         1e-2, "probability", "below which an explanation does not count for the soil"
-    )
-    contradicts: float = tuned(
-        2.0, "σ", "of what was known: soil further away contradicts it, and its σ reaches back"
     )
 
     # --- reconciled.py ---
@@ -97,7 +91,6 @@ class Explain:
     summed_far: float = tuned(40.0, "σ", "of the prior: farther is no soil")
 
     # --- law.py ---
-    term_pays: float = tuned(3.0, "nats", "a term of a law must gain")
     law_carries: float = tuned(
         0.9, "share", "of the misfit that a law must take to be written in place of δ"
     )
@@ -106,12 +99,7 @@ class Explain:
     # --- locate.py ---
     false_discovery: float = tuned(0.05, "probability", "false-discovery rate of the list")
     places_listed: int = tuned(8, "places", "listed at most")
-    order_chance: float = tuned(
-        0.01, "probability", "of the strongest order in any channel by noise alone"
-    )
-    strain_far: float = tuned(3.0, "σ", "from its calibration: a constant is a place")
     least_share: float = tuned(0.05, "-", "of a misfit: less is not worth naming")
-    beside_gain: float = tuned(3.0, "nats", "a covariate must gain beside those already named")
     lowest_order: float = tuned(3.0, "1/turn", "lower orders belong to the wheel's angle")
     ridge: float = tuned(1e-9, "-", "keeps normal equations regular", "rounding")
 
@@ -165,9 +153,6 @@ class Explain:
     learnt_shrunk: float = tuned(0.999, "-", "factor on correlations that are rounded", "rounding")
     learnt_beyond: float = tuned(
         0.005, "quantile", "of slip, load and speed that may lie beyond either end of the domain"
-    )
-    learnt_margin: float = tuned(
-        0.02, "-", "of the ends of the domain: slip, load and speed scatter about what was held"
     )
     learnt_outside: float = tuned(
         0.03, "-", "σ of δ, in its size, that is new where it was not learnt", "run time"

@@ -27,12 +27,13 @@ class Search:
     curved: float = tuned(
         0.1, "share", "of an effect's linear evidence by which its fit may do better"
     )
-    behind: float = tuned(12.0, "nats", "a model so far behind the best starts nothing")
-    lost: float = tuned(
+    little: float = tuned(
         8.0,
         "nats",
-        "below the model that it holds, a fit begins anew",
-        "what an effect's prior costs",
+        "that decide little: a third of what the verdict asks of one more effect. A model so far "
+        "behind starts nothing, an effect that promises less is not fitted beside others, a fit so "
+        "far below the model that it holds begins anew",
+        "run time",
     )
     same: float = tuned(
         1e-6, "nats", "gains closer than this are one, and the first is taken", "rounding"
@@ -43,12 +44,6 @@ class Search:
         0.35, "-", "of the best gain by linear algebra, from which an effect is fitted", "run time"
     )
     promised_less: float = tuned(6.0, "nats", "less than that share", "run time")
-    companion: float = tuned(
-        8.0,
-        "nats",
-        "that one more effect must gain by linear algebra: a third of what the verdict asks",
-        "run time",
-    )
     least_precision: float = tuned(0.1, "-", "share of its precision that a strength's start keeps")
     least_start: float = tuned(
         0.02, "expected sizes", "of a strength that has a sign: at its bound it has no slope"

@@ -109,7 +109,7 @@ class Breadth:
         """Whether the model is nearly as likely as the best one so far, as they count."""
         search = self._search
         best = max(search.weight(m) - search.news(m) + counted[m] for m in search.models[1:])
-        return search.weight(model) > best - TUNING.verdict.tested
+        return search.weight(model) > best - TUNING.search.little
 
     def _predicted(self, model: Model) -> Array:
         if model not in self._density:

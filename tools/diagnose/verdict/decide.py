@@ -39,7 +39,7 @@ def decide(search: Search, jobs: int = 1) -> Decision:
         verdict: Verdict = (
             "consistent" if power(search, screen) >= TUNING.verdict.power else "insufficient"
         )
-        return Decision(verdict, search.bare, 0.0, None, _quiet(screen), 0.0, {})
+        return Decision(verdict, search.bare, 0.0, None, _quiet(search, screen), 0.0, {})
 
     evidence = Breadth(search, jobs).evidence()
     best = max(search.models[1:], key=lambda m: search.weight(m) - search.news(m) + evidence[m])
@@ -236,16 +236,14 @@ def _unlisted(weighed: Sequence[Weighed]) -> float:
     return sum(w.probability * (1.0 - w.listed) for w in weighed)
 
 
-def _quiet(screen: Screen) -> dict[str, float]:
-    """Probabilities where nothing alarms: what the screen itself leaves to each effect."""
+def _quiet(search: Search, screen: Screen) -> dict[str, float]:
+    """Probabilities where nothing alarms: of each effect by the screen's evidence, against none."""
     listed = screen.listed
-    weight = {
-        n: float(np.exp(min(e, TUNING.verdict.quiet_most) / TUNING.verdict.quiet_temperature))
-        / max(len(listed), 1)
-        for n, e in listed.items()
-    }
-    total = TUNING.verdict.quiet_weight + sum(weight.values())
-    return {n: w / total for n, w in weight.items()}
+    by = learnt(len(search.problem.stack.rig.effects), search.problem.stack.referred)
+    evidence, one = np.array([*listed.values(), 0.0]), np.array([*(1 for _ in listed), 0])
+    weights = by.weights(evidence, one, np.zeros(len(one)))
+    shares = np.exp(weights - logsumexp(weights))
+    return dict(zip(listed, shares.tolist(), strict=False))
 
 
 def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:

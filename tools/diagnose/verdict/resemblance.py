@@ -9,7 +9,7 @@ s of it. With the share λ of explanations that mislead (calibration.py)
 
     P(effect) = Σ L(h) (1 − λ) p(h | effect) p(s | effect) / Σ L(h) [(that) + λ p(h | other)]
 
-and p(s | effect) = 2 s against 1. L counts by the temperature of all evidence. A ripple whose line
+and p(s | effect) = 4 s³ against 1. L counts by the temperature of all evidence. A ripple whose line
 stands in the spectra is one, whatever its profile: of it h says nothing.
 """
 
@@ -37,8 +37,9 @@ def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[floa
 
 def believed(likelihood: Array, share: float, lapse: float) -> float:
     """Probability that an effect is there. likelihood (h,): of each size of its form error."""
+    power = TUNING.verdict.share_power
     own, other = np.array(TUNING.verdict.form_own), np.array(TUNING.verdict.form_other)
-    there = (1.0 - lapse) * 2.0 * share * float(likelihood @ own)
+    there = (1.0 - lapse) * power * share ** (power - 1.0) * float(likelihood @ own)
     return there / (there + lapse * float(likelihood @ other))
 
 

@@ -40,7 +40,7 @@ def believed(likelihood: Array, share: float, lapse: float) -> float:
     power = TUNING.verdict.share_power
     own, other = np.array(TUNING.verdict.form_own), np.array(TUNING.verdict.form_other)
     there = (1.0 - lapse) * power * share ** (power - 1.0) * float(likelihood @ own)
-    return there / (there + lapse * float(likelihood @ other))
+    return float(there / (there + lapse * float(likelihood @ other)))
 
 
 def _likelihood(rig: Rig, model: Model, name: str, by: Calibration) -> Array:

@@ -9,8 +9,9 @@ s of it. With the share λ of explanations that mislead (calibration.py)
 
     P(effect) = Σ L(h) (1 − λ) p(h | effect) p(s | effect) / Σ L(h) [(that) + λ p(h | other)]
 
-and p(s | effect) = 4 s³ against 1. L counts by the temperature of all evidence. A ripple whose line
-stands in the spectra is one, whatever its profile: of it h says nothing.
+and p(s | effect) = 4 s³ against 1. L is not tempered as evidence between explanations is: both
+priors were counted by it. A ripple whose line stands in the spectra is one, whatever its profile:
+of it h says nothing.
 """
 
 from __future__ import annotations
@@ -30,9 +31,7 @@ def trusted(rig: Rig, model: Model, share: float, by: Calibration) -> tuple[floa
     """Of each effect of a model, the probability that it is there, if the model is the best
     explanation and takes such a share of the misfit.
     """
-    return tuple(
-        believed(_likelihood(rig, model, name, by), share, by.lapse) for name in model.names
-    )
+    return tuple(believed(_likelihood(rig, model, name), share, by.lapse) for name in model.names)
 
 
 def believed(likelihood: Array, share: float, lapse: float) -> float:
@@ -43,13 +42,13 @@ def believed(likelihood: Array, share: float, lapse: float) -> float:
     return float(there / (there + lapse * float(likelihood @ other)))
 
 
-def _likelihood(rig: Rig, model: Model, name: str, by: Calibration) -> Array:
+def _likelihood(rig: Rig, model: Model, name: str) -> Array:
     """Of each size of the form error (h,), the largest 1; alike where h says nothing."""
     effect = next(one for one in model.fitted.acting if one.name == name)
     told = None if _has_line(rig, effect) else model.of_forms(name)
     if told is None:
         return np.ones(len(TUNING.fit.bending_sizes))
-    return np.asarray(np.exp((told - told.max()) / by.temperature))
+    return np.asarray(np.exp(told - told.max()))
 
 
 def _has_line(rig: Rig, effect: Effect) -> bool:

@@ -238,12 +238,12 @@ def _unlisted(weighed: Sequence[Weighed]) -> float:
 
 def _quiet(search: Search, screen: Screen) -> dict[str, float]:
     """Probabilities where nothing alarms: of each effect by the screen's evidence, against none."""
-    listed = screen.listed
-    by = learnt(len(search.problem.stack.rig.effects), search.problem.stack.referred)
-    evidence, one = np.array([*listed.values(), 0.0]), np.array([*(1 for _ in listed), 0])
-    weights = by.weights(evidence, one, np.zeros(len(one)))
+    listed, count = screen.listed, len(search.problem.stack.rig.effects)
+    by = learnt(count, search.problem.stack.referred)
+    prior = np.log(TUNING.search.odds / max(count, 1))
+    weights = np.array([0.0, *(prior + e / by.temperature for e in listed.values())])
     shares = np.exp(weights - logsumexp(weights))
-    return dict(zip(listed, shares.tolist(), strict=False))
+    return dict(zip(listed, shares[1:].tolist(), strict=True))
 
 
 def _groups(weighed: Sequence[Weighed], best: Model) -> dict[str, tuple[str, ...]]:

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.config.nearest import did_you_mean
 from gritd.tools.importers.files import Array, RigFileError
 from gritd.tools.importers.series.times import Nanoseconds
 
 SHOWN = 40  # characters of a name in a message
 ROOM = 120  # of several
 Told = Callable[[int], None]  # takes the bytes of a file that were read
+COMPARED = 2000  # names with which a mistyped one is compared
 FEW = 5  # rows that are told one by one
 
 
@@ -136,6 +138,14 @@ class Wanted:
 
 
 EVERYTHING = Wanted()
+
+
+def no_column(path: Path, name: str, known: Sequence[str]) -> RigFileError:
+    """That a file has no column of a name, with those that it has."""
+    meant = did_you_mean(name, known[:COMPARED])
+    return RigFileError(
+        f"{path}: found no column {name[:SHOWN]!r}{meant}; expected one of {shortened(known)}"
+    )
 
 
 def shortened(names: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gritd.estimator.limits import limits, raised
 from gritd.tools.importers.files import LARGEST, RigFileError
 from gritd.tools.importers.series.cells import OddCell
-from gritd.tools.importers.series.columns import SeriesTable, Told, told_rows
+from gritd.tools.importers.series.columns import SeriesTable, Told, no_column, told_rows
 from gritd.tools.importers.series.dialect import Layout, joined, layout, split
 from gritd.tools.importers.series.mapping import Mapped
 from gritd.tools.importers.series.text_columns import Builder, Loose, Numbers, Times, Words
@@ -22,7 +22,7 @@ from gritd.tools.importers.series.times import TimeFormatError
 
 HEAD = 10  # lines that are looked at, or more
 FIRST = 2000  # rows that tell the last digit of a column
-GUESSED = 200_000  # cells of a block that are enough for a proposal
+GUESSED = 1_000_000  # cells that are enough for a proposal
 ZEROS = "zero bytes, as a loss of power leaves them"
 CUT = "cut in the row"
 Rows = list[list[str]]
@@ -34,8 +34,8 @@ def read(
     rows: int | None = None,
     told: Told | None = None,
 ) -> SeriesTable:
-    """The columns that a map names, those that the file has; without one all columns. `rows`: about
-    so many are enough. Raises RigFileError.
+    """The columns that a map names; without one all columns. `rows`: so many are enough. Raises
+    RigFileError.
     """
     with text_file(path) as text:
         head = _head(text)
@@ -46,21 +46,21 @@ def read(
         rows_of = list(joined(head))
         form = layout(path, [line for _, line in rows_of], columns or ())
         begin = rows_of[form.start][0]
+        missing = [name for name in columns or () if not form.places(name)]
+        if missing:
+            known = [name or f"column {at}" for at, name in enumerate(form.names, start=1)]
+            raise no_column(path, missing[0], known)
+
         table = _Table(path, form, _builders(form, head[begin:], columns))
         lines, first = head[begin:], begin + 1
-        while lines and (rows is None or table.rows < rows):
-            few = lines[: _enough(rows, form)]
-            table.add(few, first, text)
+        most = None if rows is None else min(rows, max(GUESSED // form.width, HEAD))
+        while lines and (most is None or table.rows < most):
+            table.add(lines[:most], first, text)
             first += len(lines)
             if told is not None:
                 told(text.position)
             lines = text.block()
         return table.whole(text.cut)
-
-
-def _enough(rows: int | None, form: Layout) -> int | None:
-    """Lines of a block that are read; None for all."""
-    return None if rows is None else min(rows, max(GUESSED // form.width, HEAD))
 
 
 def _head(text: TextFile) -> list[str]:

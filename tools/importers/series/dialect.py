@@ -24,6 +24,7 @@ GAP = 0.9  # what a gap in words counts, beside a value
 CELLS = 100_000  # that are looked at for it
 FARTHEST = 500  # lines above the rows in which the names of the map are looked for
 JOINED = 20  # lines of one row, whose quotes may hold ends of lines
+SOME = 1000  # fields of a line that tell for all
 ABOVE = 3  # lines above the rows among which the header is looked for
 MARKS = frozenset({"", "-", "--", "1/min", "1/s", "counts", "ticks", "°", "sec", "bool", "none"})
 PLACE = re.compile(r"(?:column )?([1-9]\d{0,6})")
@@ -151,7 +152,7 @@ def _separator(path: Path, lines: Sequence[str]) -> tuple[str, Rows]:
         if width < 2 or count < SHARE * len(rows):
             continue
         rows = [row for row in rows if len(row) == width][-max(CELLS // width, 3) :]
-        cells = [cell for row in rows for cell in row[:1000]]
+        cells = [cell for row in rows for cell in row[:SOME]]
         found.append((sum(map(_sense, cells)) / len(cells), separator, rows))
 
     if not found:
@@ -243,7 +244,8 @@ def _is_header(names: Sequence[str], width: int) -> bool:
 
 
 def _are_units(names: Sequence[str]) -> bool:
-    return sum(_is_unit(name) for name in names) > 0.6 * len(names)
+    some = names[:SOME]
+    return sum(_is_unit(name) for name in some) > SHARE * len(some)
 
 
 def _is_unit(text: str) -> bool:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gritd.estimator.config.nearest import did_you_mean
 from gritd.tools.cli.command import USAGE
 from gritd.tools.importers.files import LARGEST, RigFileError, below
 from gritd.tools.importers.formats import registry
@@ -18,11 +17,11 @@ from gritd.tools.importers.formats.made import common
 from gritd.tools.importers.series import csv_text
 from gritd.tools.importers.series.columns import (
     EVERYTHING,
-    SHOWN,
     Column,
     SeriesTable,
     Told,
     Wanted,
+    no_column,
     shortened,
 )
 from gritd.tools.importers.series.mapping import CLOCK, DATE, TIME, Mapped, MapSource, SeriesMap
@@ -197,11 +196,7 @@ def _place(path: Path, tables: Sequence[SeriesTable], name: str) -> Place:
             USAGE,
         )
 
-    known = [full for table in read(path, SAMPLE) for full in table.columns]
-    raise RigFileError(
-        f"{path}: found no column {name[:SHOWN]!r}{did_you_mean(name, known)}; expected one of "
-        f"{shortened(known)}"
-    )
+    raise no_column(path, name, [full for table in read(path, SAMPLE) for full in table.columns])
 
 
 def _clock_of(

@@ -30,6 +30,9 @@ from gritd.estimator.terramechanics.soil import Array, Soil
 TOLERANCE = 0.25  # of a force
 # sinkage over that of the stated soil: half way, in powers of ten, to 1/1000
 BEARING = 1.0 / 30.0
+PAIRED = 200  # windows of a run that are compared in pairs, and the least pairs that tell
+CLEAR = 0.7  # share of pairs that fall less those that rise; of constant slip it is noise
+SMALL = 0.5  # slip up to which the pull rises with it in every soil
 
 
 def sinkage(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
@@ -130,47 +133,71 @@ def torque(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contra
 
 
 def pull(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradiction]:
-    course, load = run.course, load_of(run.course, settings)
+    if load_of(run.course, settings) > settings.load.minimum:
+        found = _falling(run.course, settings, sources) or _beyond(run.course, settings, sources)
+        yield from [found] if found else []
+
+
+def _falling(course: Course, settings: Settings, sources: Sources) -> Contradiction | None:
+    """The pull rises with the torque; where that is not known, with slip while it is small."""
+    slip = np.full(course.pull.size, np.nan)
+    slip[course.driving] = course.slip
+    turning = bool(np.isfinite(course.torque).any())
+    other = course.forward * course.torque / settings.wheel.radius if turning else slip
+    known = (slip > 0.0) & np.isfinite(course.pull + other) & (turning | (slip < SMALL))
+    if np.count_nonzero(known) < LEAST or (turning and float(np.median(other[known])) <= 0.0):
+        return None
+
+    load = load_of(course, settings)
+    pull, felt = course.forward * course.pull[known], course.load[known]
+    apart = FEW * load if turning else FEW
+    together = _together(pull, other[known], np.nan_to_num(felt, nan=load), apart)
+    if together > -CLEAR:
+        return None
+    what = "torque over radius" if turning else "slip"
+    fact = f"pull falls where {what} rises under one load, in {50 - 50 * together:.0f} % of pairs"
+    return told("falling pull", fact, [turned("pull", sources)])
+
+
+def _beyond(course: Course, settings: Settings, sources: Sources) -> Contradiction | None:
+    """The pull is that of stresses which turn the wheel with the measured torque."""
     known = course.driving & np.isfinite(course.torque + course.pull)
     known[course.driving] &= course.slip > 0.0
     torque, pull = (course.forward * x[known] for x in (course.torque, course.pull))
-    if pull.size < LEAST or float(np.median(torque)) <= 0.0 or load <= settings.load.minimum:
-        return
+    if pull.size < LEAST or float(np.median(torque)) <= 0.0:
+        return None
 
-    shear = torque / settings.wheel.radius
-    least, most = _bounds(course, known, settings, shear)
-    given = course.load[known], course.sinkage[known]
-    rises = _rise(pull, shear, *given[:1]) or _rise(pull, shear, *given)
-    if rises < 0.0:
-        fact = f"pull changes by {rises:.2f} of torque over radius, and must rise with it"
-        yield told("falling pull", fact, [turned("pull", sources)])
-    elif off := _outside(pull, least, most, load):
-        likely = [
-            remedy.words
-            for remedy in remedies("pull", sources)
-            if not _outside(pull * remedy.factor, least, most, load)
-        ]
-        turning = _outside(-pull, least, most, load) < 0.5 * off
-        likely = [turned("pull", sources)] if turning else likely
-        yield told(
-            "pull",
-            f"pull is {np.median(pull):.3g} N, where torque over radius allows "
-            f"{np.median(least):.3g} to {np.median(most):.3g} N",
-            likely or ["the torque, its constant, or the radius is another"],
-        )
+    load = load_of(course, settings)
+    least, most = _bounds(course, known, settings, torque / settings.wheel.radius)
+    if not (off := _outside(pull, least, most, load)):
+        return None
+    likely = [
+        remedy.words
+        for remedy in remedies("pull", sources)
+        if not _outside(pull * remedy.factor, least, most, load)
+    ]
+    if _outside(-pull, least, most, load) < 0.5 * off:
+        likely = [turned("pull", sources)]
+    low, high = float(np.median(least)), float(np.median(most))
+    allowed = f"{low:.3g} to {high:.3g} N" if np.isfinite(low) else f"{high:.3g} N at most"
+    return told(
+        "pull",
+        f"pull is {np.median(pull):.3g} N, where torque over radius allows {allowed}",
+        likely or ["the torque, its constant, or the radius is another"],
+    )
 
 
-def _rise(pull: Array, shear: Array, *given: Array) -> float:
-    """By how much the pull (n,) rises with torque over radius (n,), other things (n,) being the
-    same; 0 where that explains less than half of what is left of it. 1/cos θ, by `_bounds`.
+def _together(pull: Array, other: Array, load: Array, apart: float) -> float:
+    """Whether the pull (n,) rises with another quantity (n,): the mean sign over pairs of windows
+    under one load that are so far apart; 0 where there are too few.
     """
-    given = tuple(x for x in given if np.all(np.isfinite(x)) and np.ptp(x) > 0.0)
-    columns = np.column_stack([np.ones(pull.size), *given])
-    left = [x - columns @ np.linalg.lstsq(columns, x, rcond=None)[0] for x in (pull, shear)]
-    together, squares = float(left[0] @ left[1]), [float(x @ x) for x in left]
-    if together**2 <= 0.5 * squares[0] * squares[1]:
+    some = np.unique(np.linspace(0, pull.size - 1, PAIRED).astype(np.int64))
+    first, second = np.triu_indices(some.size, 1)
+    rise, way, heavier = (x[some][second] - x[some][first] for x in (pull, other, load))
+    pairs = (np.abs(way) > apart) & (np.abs(heavier) < FEW * np.median(load))
+    if np.count_nonzero(pairs) < PAIRED:
         return 0.0
-    return together / squares[1]
+    return float(np.mean(np.sign(rise[pairs] * way[pairs])))
 
 
 def _bounds(course: Course, known: Bools, settings: Settings, shear: Array) -> tuple[Array, Array]:
@@ -178,12 +205,14 @@ def _bounds(course: Course, known: Bools, settings: Settings, shear: Array) -> t
     T/r (m,) [N].
 
     All stress at one angle θ gives DP = T/(r cos θ) − W tan θ, which falls with θ; the contact
-    lies between 0 and θ₁. Eqs. (8)-(10) are sums of such.
+    lies between 0 and θ₁. Eqs. (8)-(10) are sums of such. A motor's torque holds what the drive
+    loses, so nothing is the least.
     """
-    wheel, load = settings.wheel, load_of(course, settings)
+    if settings.drive.torque_source != "wrench":
+        return np.full(shear.size, -np.inf), shear
     sinkage = course.sinkage[known] + 0.5 * datum(settings)
-    angle = entry_angle(wheel, np.nan_to_num(sinkage, nan=wheel.radius))
-    return shear / np.cos(angle) - load * np.tan(angle), shear
+    angle = entry_angle(settings.wheel, np.nan_to_num(sinkage, nan=settings.wheel.radius))
+    return shear / np.cos(angle) - load_of(course, settings) * np.tan(angle), shear
 
 
 def _outside(pull: Array, least: Array, most: Array, load: float) -> float:

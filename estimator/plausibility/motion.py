@@ -8,6 +8,7 @@ import numpy as np
 
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.plausibility.contradiction import (
+    FEW,
     LEAST,
     MOST,
     Contradiction,
@@ -124,17 +125,21 @@ def slip(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contradi
 
     slip = float(np.median(course.slip[np.isfinite(course.slip)]))
     likely = _ratios(ratio, sources)
-    if slip < BRAKED and _drives(course):
+    if slip < BRAKED and _drives(course, settings):
         yield told("braked", f"slip is {slip:.2f} while the wheel drives", likely)
     elif slip > SPINNING and likely and sources["wheel"].unit and not _sheared(course, settings):
         yield told("spinning", f"slip is {slip:.2f} throughout", likely)._replace(alone=False)
 
 
-def _drives(course: Course) -> bool:
-    """Whether torque or pull are those of a wheel that drives."""
-    forces = [course.torque[course.driving], course.pull[course.driving]]
-    known = [course.forward * float(np.nanmedian(f)) for f in forces if np.isfinite(f).any()]
-    return any(value > 0.0 for value in known)
+def _drives(course: Course, settings: Settings) -> bool:
+    """Whether torque or pull are those of a wheel that drives, in a tenth of the windows: one that
+    skids neither pulls nor takes torque.
+    """
+    least = FEW * load_of(course, settings)
+    forces = (course.torque / settings.wheel.radius, course.pull)
+    driving = [course.forward * force[course.driving] for force in forces]
+    known = [force[np.isfinite(force)] for force in driving]
+    return any(force.size and np.percentile(force, 100.0 * MOST) > least for force in known)
 
 
 def _sheared(course: Course, settings: Settings) -> bool:

@@ -27,6 +27,7 @@ CONSTANT = ("drive", "torque_constant")
 STILL = 0.02  # of the fastest speed: slower is no turning
 SPEEDS = 4  # steady speeds that friction is found from: two, both ways
 BLOCK = 1.0  # [s] over which current and torque are compared
+READINGS = 20  # of each; a slower log is compared over longer
 
 
 # --- a lever ---
@@ -179,16 +180,17 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
     torque = torque * settings.wrench.torque.scale.value
     turning = _turning(recorded, settings)
 
+    block = max(BLOCK, READINGS * max(float(np.median(np.diff(t))) for t in (at, time)))
     points, instants = [], []
-    for begin in np.arange(time[0], time[-1] - BLOCK, BLOCK):
-        one, other = (_inside(t, v, begin) for t, v in ((at, current), (time, torque)))
-        if one is not None and other is not None and turning(begin) and turning(begin + BLOCK):
+    for begin in np.arange(time[0], time[-1] - block, block):
+        one, other = (_inside(t, v, begin, block) for t, v in ((at, current), (time, torque)))
+        if one is not None and other is not None and turning(begin) and turning(begin + block):
             points.append(Point(mean_of(one), mean_of(other)))
             instants.append(begin)
     if len(points) < SPEEDS:
         raise CommandError(
-            f"{recorded.path}: found {len(points)} s of driving with current and torque; "
-            "expected some at several loads or slips",
+            f"{recorded.path}: found {len(points) * block:g} s of driving with current and "
+            "torque; expected some at several loads or slips",
             DAMAGED,
         )
 
@@ -200,8 +202,9 @@ def by_sensor(recorded: Recording, settings: Settings) -> Outcome:
         np.hypot(line.scale.sigma, line.scale.value * relative.sigma / abs(relative.value))
     )
     usual = float(np.sqrt((line.expected**2).mean()))
+    least, most = torque.min(), torque.max()
     rows = (
-        f"{len(points)} s of driving, torque {torque.min():.3g} to {torque.max():.3g} N*m",
+        f"{len(points) * block:.0f} s of driving, torque {least:.3g} to {most:.3g} N*m",
         f"residual {line.rms:.3g} N*m r.m.s., {usual:.2g} N*m expected",
         f"the motor's torque is {-line.offset.value:.3g} N*m more than the sensor's at no torque",
     )
@@ -239,9 +242,9 @@ def _without_creep(points: Sequence[Point], instants: Sequence[float]) -> tuple[
     )
 
 
-def _inside(time: Array, values: Array, begin: float) -> Array | None:
-    inside = values[(time >= begin) & (time < begin + BLOCK)]
-    return inside if inside.size >= 20 else None
+def _inside(time: Array, values: Array, begin: float, block: float) -> Array | None:
+    inside = values[(time >= begin) & (time < begin + block)]
+    return inside if inside.size >= 0.9 * READINGS else None
 
 
 def _turning(recorded: Recording, settings: Settings) -> Callable[[float], bool]:

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 import random
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from gritd.config import packaged
-from gritd.drivers.build import build_decoder
+from gritd.drivers.build import build_decoder, keys_of
+from gritd.drivers.can_signals import amiss_elsewhere
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing import Frame, Framing
 from gritd.drivers.framing_can import pack
 from gritd.estimator.config import configuration as config
 from gritd.estimator.messages.readings import NS, Reading
 from gritd.tools.dev.fuzz.case import START, Case, mutated
+
+NUMBER = re.compile(rb"\d+")
+WILD = (b"0", b"-5", b"1e999", b"1000000000", b"99999999999999999999", b"nan", b"")
 
 
 def serial_stream(framing: Callable[[], Framing], encode: Callable[[Frame], bytes]) -> Case:
@@ -53,7 +58,7 @@ def can_messages(_: Path) -> Case:
     """
     settings = config.load(packaged()).settings
     decoder = build_decoder(settings, settings.devices["bus"])
-    ids = [0x110, 0x111, 0x112, 0x120, 0x121, 0x7FF]
+    ids = [0x110, 0x111, 0x112, 0x120, 0x121, 0x122, 0x7FF]
 
     def case(rng: random.Random) -> str:
         word = rng.choice(ids) if rng.random() < 0.9 else rng.getrandbits(32)
@@ -69,17 +74,25 @@ def values_of(reading: Reading) -> tuple[float, ...]:
     return reading.value if isinstance(reading.value, tuple) else (float(reading.value),)
 
 
+def _wild(text: bytes, rng: random.Random) -> bytes:
+    """A few numbers of a text replaced by ones that cannot be."""
+    places = {match.start() for match in rng.sample(list(NUMBER.finditer(text)), 3)}
+    return NUMBER.sub(lambda m: rng.choice(WILD) if m.start() in places else m[0], text)
+
+
 def databases(folder: Path) -> Case:
-    """A damaged DBC file: read, or refused in one line."""
+    """A damaged DBC file, or one with impossible numbers: read, or refused in one line."""
     settings = config.load(packaged()).settings
     device = settings.devices["bus"]
     good = Path(device.dbc).read_bytes()
     path = folder / "fuzz.dbc"
 
     def case(rng: random.Random) -> str:
-        path.write_bytes(mutated(good, rng, 3))
+        path.write_bytes(_wild(good, rng) if rng.random() < 0.5 else mutated(good, rng, 3))
+        changed = replace(device, dbc=str(path))
         try:
-            build_decoder(settings, replace(device, dbc=str(path)))
+            amiss_elsewhere(changed, keys_of(settings, device))
+            build_decoder(settings, changed)
         except DeviceSettingsError as error:
             return "" if "\n" not in str(error) else f"more than one line: {error}"
         return ""

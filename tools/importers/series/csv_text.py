@@ -99,7 +99,7 @@ def _first(form: Layout, lines: Sequence[str]) -> list[tuple[str, ...]]:
         fields = _fields(line, form.separator)
         if len(fields) == form.width:
             rows.append(fields)
-    return list(zip(*rows, strict=True))
+    return list(zip(*rows, strict=True)) or [()] * form.width
 
 
 def _all(form: Layout, first: Sequence[Sequence[str]]) -> Iterator[tuple[str, int]]:

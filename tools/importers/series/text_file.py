@@ -28,6 +28,7 @@ QUOTED = 20  # lines over which a quote may stay open
 BEGIN = 1 << 16  # [bytes] that tell what a file is
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 CONTROL = re.compile(r"[\x01-\x08\x0e-\x19\x1b-\x1f]")  # characters that no text has
+BINARY = 0.002  # share of them beyond which a file is none
 DAMAGE = (
     OSError,
     EOFError,
@@ -57,7 +58,8 @@ class TextFile:
         self._lines = io.TextIOWrapper(
             io.BufferedReader(self._bytes, BLOCK), _encoding(begin), "gritd-cp1252"
         )
-        if CONTROL.search(begin.decode(_encoding(begin), "gritd-cp1252")):
+        letters = begin.decode(_encoding(begin), "gritd-cp1252")
+        if len(CONTROL.findall(letters)) > BINARY * len(letters):
             raise RigFileError(f"{path}: found bytes that are no text; expected a text file")
 
     @property

@@ -249,9 +249,10 @@ def of_texts(words: Sequence[str], unit: int) -> Nanoseconds:
     """
     try:
         values = np.array(list(map(float, words)))
-        if values.size and np.max(np.abs(values)) * unit < EXACT:
+        largest = float(np.max(np.abs(values), initial=0.0)) * unit
+        if largest < EXACT:
             return np.round(values * unit).astype(np.int64)
-        if values.size and np.max(np.abs(values)) * unit < 0.999 * LATEST:
+        if largest < 0.999 * LATEST:
             return np.array(list(map(int, words)), dtype=np.int64) * unit
     except ValueError:  # a gap, a decimal comma, a fraction with many digits
         pass

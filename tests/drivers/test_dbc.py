@@ -5,15 +5,12 @@ what cannot be read is one line that quotes nothing.
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gritd.drivers.can_signals import amiss_elsewhere, database
-from gritd.drivers.dbc import MAX_DBC_BYTES
 from gritd.drivers.errors import DeviceSettingsError
 from gritd.drivers.framing_can import CanFraming, pack
 from tests.drivers.rig import DBC, FUZZ, can_device
@@ -131,26 +128,6 @@ def test_a_pipe_or_a_device_is_refused_at_once(tmp_path):
     for path in (tmp_path / "pipe", "/dev/zero"):
         with pytest.raises(DeviceSettingsError, match="no regular file"):
             database(can_device(dbc=str(path)), ["A.B"])
-
-
-@pytest.mark.parametrize(
-    "line", ["BO_ 7 A: 8 X\n", "BO_ riddle\n", ' SG_ S : 0|8@1+ (1,0) [0|0] "" X\n']
-)
-def test_a_large_database_takes_little_memory(tmp_path, line):
-    text = HEAD + WANTED
-    room = MAX_DBC_BYTES - len(text) - 1
-    (tmp_path / "large.dbc").write_text(text + line * (room // len(line)))
-    code = (
-        "from contextlib import suppress\n"
-        "from gritd.drivers.dbc import DbcError, DbcFile\n"
-        "peak = lambda: int(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])\n"
-        "before = peak()\n"
-        "with suppress(DbcError):\n"
-        f"    DbcFile({str(tmp_path / 'large.dbc')!r}, ['Wheel'], elsewhere=True)\n"
-        "print(peak() - before)\n"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert int(out.stdout) < 50 << 10  # [KiB], beside the interpreter's own
 
 
 def test_multiplexed_signals_of_the_wanted_message_are_read(read):

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gritd.drivers.build import build_readers
 from gritd.drivers.queue import ReadingQueue
@@ -25,6 +26,7 @@ from gritd.tools.cli.terminal import LiveLine
 PATIENCE = 5.0  # [s] for the first reading
 SHOWN = 0.2  # [s] between two lines of what is seen
 
+Flags = NDArray[np.bool_]
 Drain = Callable[[], list[Reading]]
 
 
@@ -42,7 +44,7 @@ class Live:
         """Raises CommandError where the sensor says nothing."""
         with reading(self.settings) as drain:
             read = [self._one(drain, signal, value) for value in known]
-        spiky = next((line for _, line in read if line), "")
+        spiky = spikes.told(np.concatenate([found for _, found in read]), signal.channel)
         return points_of([one for one, _ in read], known, signal, spiky)
 
     def touches(self, signal: Signal, count: int) -> list[float]:
@@ -54,16 +56,16 @@ class Live:
                 read.append(mean_of(self._read(drain, signal)[1]).value)
             return read
 
-    def _one(self, drain: Drain, signal: Signal, known: Uncertain) -> tuple[Plateau, str]:
-        """What is read at one value, and a line on its spikes."""
+    def _one(self, drain: Drain, signal: Signal, known: Uncertain) -> tuple[Plateau, Flags]:
+        """What is read at one value, and which of the readings were spikes."""
         self.ask(f"set {known.value / self.factor:g} {self.shown}")
-        seconds, values, told = self._read(drain, signal)
+        seconds, values, found = self._read(drain, signal)
         creeps = creep_of(seconds, values)
-        return Plateau(float(seconds[0]), float(seconds[-1]), mean_of(values), creeps), told
+        return Plateau(float(seconds[0]), float(seconds[-1]), mean_of(values), creeps), found
 
-    def _read(self, drain: Drain, signal: Signal) -> tuple[Array, Array, str]:
-        """Times [s] and raw values of some seconds, beginning now, without spikes, and a line on
-        these; shows what it sees.
+    def _read(self, drain: Drain, signal: Signal) -> tuple[Array, Array, Flags]:
+        """Times [s] and raw values of some seconds, beginning now, without spikes, and which of all
+        readings these were; shows what it sees.
         """
         drain()
         line, values, stamps = LiveLine(sys.stderr), list[float](), list[int]()
@@ -91,8 +93,8 @@ class Live:
         line.clear()
         read = np.array(values)
         found = spikes.spikes(read)
-        told = spikes.told(found, signal.channel)
-        return np.array(stamps)[~found] / NS, read[~found], told
+        spikes.told(found, signal.channel)
+        return np.array(stamps)[~found] / NS, read[~found], found
 
 
 def _value(reading: Reading, signal: Signal) -> float:

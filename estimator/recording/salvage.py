@@ -11,8 +11,7 @@ gone through chunk by chunk, which is several times slower and finds what is wro
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from itertools import chain
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -42,7 +41,7 @@ from gritd.estimator.recording.tables import NOTHING, Fields, Tables
 from gritd.estimator.recording.topics import RAW_TOPICS
 from gritd.estimator.recording.walk import Contents, Walk
 
-__all__ = ["Message", "Recording", "glance", "read"]
+__all__ = ["Message", "Recording", "RecordingCheck", "opened_to_read", "read", "take_metadata"]
 
 # [bytes] unpacked chunks kept for the next pass; a longer recording is unpacked again
 MAX_KEPT = 16 << 20
@@ -71,16 +70,10 @@ def read(
     recording = Recording(path)
     wanted = Tables(tables)
 
-    with reported(path, "read"), file_opened(path, buffering=0) as file:
-        try:
-            walk = Walk(file, path.stat().st_size)
-            known = {topic.name: topic for topic in topics}
-            times = _Check(recording, known, wanted).whole(file, walk)
-        except RecordingError as error:
-            message = str(error)
-            raise RecordingError(
-                message if message.startswith(str(path)) else f"{path}: {message}"
-            ) from None
+    known = {topic.name: topic for topic in topics}
+    with opened_to_read(path) as file:
+        walk = Walk(file, path.stat().st_size)
+        times = RecordingCheck(recording, known, wanted).whole(file, walk)
 
     if len(recording.damage) > MAX_LINES:
         recording.damage[MAX_LINES:] = [f"and {len(recording.damage) - MAX_LINES} more places"]
@@ -90,23 +83,20 @@ def read(
     return recording
 
 
-def glance(path: Path | str, tables: Mapping[str, Fields], chunks: int) -> Recording:
-    """A first look at a recording: metadata, and what so many chunks hold that lie evenly spread
-    over the file. Each is checked, the file as a whole is not. Raises RecordingError as `read`.
-    """
-    path = Path(path)
-    recording = Recording(path)
-    wanted = Tables(tables)
-
+@contextmanager
+def opened_to_read(path: Path) -> Iterator[BinaryIO]:
+    """The file; whatever is wrong with it is a RecordingError that names it."""
     with reported(path, "read"), file_opened(path, buffering=0) as file:
-        walk = Walk(file, path.stat().st_size)
-        _Check(recording, {}, wanted).glance(file, walk, chunks)
+        try:
+            yield file
+        except RecordingError as error:
+            message = str(error)
+            raise RecordingError(
+                message if message.startswith(str(path)) else f"{path}: {message}"
+            ) from None
 
-    recording._tables = wanted.done()
-    return recording
 
-
-def _take_metadata(recording: Recording, contents: Contents) -> None:
+def take_metadata(recording: Recording, contents: Contents) -> None:
     for name, entries in contents.metadata.items():
         if seal_holds(
             name,
@@ -145,7 +135,7 @@ def _take_times(recording: Recording) -> None:
         rows.flags.writeable = False
 
 
-class _Check:
+class RecordingCheck:
     """The one pass that decides what is good: fills in a Recording's sources, blocks, counts and
     damage.
     """
@@ -185,20 +175,9 @@ class _Check:
                 recording.damage.insert(0, line)
 
         recording.closed, recording.attachments = contents.closed, contents.attachments
-        _take_metadata(recording, contents)
+        take_metadata(recording, contents)
         self._count_lost(expected, numbered=contents.library == LIBRARY)
         return self._times
-
-    def glance(self, file: BinaryIO, walk: Walk, chunks: int) -> None:
-        """Raises RecordingError where this is no MCAP file."""
-        walk.begin()
-        self._summary(walk.contents.summary)
-        first = next(walk.blocks(), None)  # what stands before it is metadata
-
-        for block in chain(() if first is None else (first,), walk.spread(chunks)):
-            with suppress(Damaged):
-                self._block(file, block)
-        _take_metadata(self._recording, walk.contents)
 
     def _pile(self, file: BinaryIO, pile: Sequence[tuple[Block, int]]) -> bool:
         """Check neighbouring blocks; False where nothing is read from one on. With each stands how

@@ -90,18 +90,28 @@ class Walk:
 
         yield from self._blocks
 
-    def spread(self, count: int) -> Iterator[Block]:
-        """Chunks near so many places, evenly spread over the file, but for its first, in order."""
-        before = -1
+    def spread(self, count: int, after: int) -> Iterator[Block]:
+        """Chunks near so many places behind `after`, evenly spread over the file, and the last
+        ones. In file order.
+        """
+        room = max(self._limit - len(MAGIC) - _NEAR, 0)
         for number in range(1, count + 1):
-            start = len(MAGIC) + number * (self._limit - len(MAGIC)) // (count + 1)
-            place = self._find_chunk(start, _NEAR, 2 * _NEAR)
-            if place is not None and place > before:
-                _, length = RECORD_HEAD.unpack(self._read(place, RECORD_HEAD.size))
-                end = place + RECORD_HEAD.size + length
-                block = self._chunk_head(place + RECORD_HEAD.size, length)
-                yield replace(block, index=(end, self._indexes(end)))
-                before = place
+            start = len(MAGIC) + number * room // count
+            place = self._find_chunk(max(start, after), _NEAR, 2 * _NEAR)
+            if place is not None:
+                block, after = self._chunk_at(place)
+                yield block
+
+        while count and (place := self._find_chunk(after, _NEAR, 2 * _NEAR)) is not None:
+            block, after = self._chunk_at(place)
+            yield block
+
+    def _chunk_at(self, place: int) -> tuple[Block, int]:
+        """The chunk whose record begins there, and where what follows it begins."""
+        _, length = RECORD_HEAD.unpack(self._read(place, RECORD_HEAD.size))
+        start = place + RECORD_HEAD.size
+        end = self._indexes(start + length)
+        return replace(self._chunk_head(start, length), index=(start + length, end)), end
 
     def _too_many(self) -> str:
         """What there is more of than a recording has; '' as a rule."""

@@ -45,6 +45,11 @@ COMMANDS = {
         "gritd.tools.commands.diagnose",
         "where model and recordings differ, and which physics was left out",
     ),
+    "runs": ("gritd.tools.commands.runs", "the runs of a folder: rig, load, status, c, tan φ"),
+    "diff": (
+        "gritd.tools.commands.diff",
+        "how two recordings differ in what they were made with",
+    ),
     "info": ("gritd.tools.commands.info", "what a recording is and holds: rates, gaps, health"),
     "export": ("gritd.tools.commands.export", "a recording as tables, CSV or Parquet"),
     "effects": (

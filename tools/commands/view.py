@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 from gritd.tools.cli.command import DONE, USAGE, CommandError, Parser, whole
 from gritd.tools.cli.optional import require
+from gritd.tools.cli.progress import Progress
+from gritd.tools.recordings.catalogue import runs_of
 from gritd.tools.service.client import add_socket
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 NEEDS = ("starlette", "uvicorn")
 BEHIND = 5  # nice: the page waits for the daemon, never the daemon for the page
 DEFAULT_PORT = 8250
+MOST = 50  # recordings of a page
 EXPECTED = "expected a first line of 16 characters or more, as openssl rand -hex 16 gives"
 
 
@@ -77,7 +80,10 @@ def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> 
     from gritd.tools.view.recorded import Recordings
     from gritd.tools.view.server import listening, serve
 
-    recordings, campaign = Recordings(arguments.files), Campaign(arguments.files)
+    paths = _paths(arguments.files)
+    with Progress("a first look", len(paths)) as progress:
+        recordings = Recordings(paths, progress.advance)
+    campaign = Campaign(paths)
     with closing(listening(place, arguments.any_port)) as listener:
 
         def begin() -> None:
@@ -86,6 +92,17 @@ def _recorded(arguments: Namespace, place: Place, files: Mapping[str, Path]) -> 
             _announce(place, listener)
 
         serve(recorded(recordings, campaign, files), place, listener, begin)
+
+
+def _paths(given: Sequence[Path]) -> list[Path]:
+    """The recordings: those that are named, and the runs of a folder that is. Raises CommandError
+    where there are none, or more than a page is for.
+    """
+    found = [run for path in given for run in (runs_of(path) if path.is_dir() else [path])]
+    if not 0 < len(found) <= MOST:
+        expected = f"expected 1 to {MOST}: gritd runs lists them"
+        raise CommandError(f"{given[0]}: found {len(found)} recordings; {expected}", USAGE)
+    return found
 
 
 def _announce(place: Place, listener: socket.socket) -> None:
@@ -122,7 +139,11 @@ def _parser() -> Parser:
         prog="gritd view", description="Show the running daemon, or recordings, in a browser."
     )
     parser.add_argument(
-        "files", nargs="*", type=Path, metavar="FILE", help="recordings, in place of the daemon"
+        "files",
+        nargs="*",
+        type=Path,
+        metavar="FILE",
+        help="recordings, or folders of them, in place of the daemon",
     )
     add_socket(parser)
     parser.add_argument(

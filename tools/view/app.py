@@ -16,6 +16,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import BaseRoute, Route
 
 from gritd.estimator.daemon.publish import line_of
+from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.terramechanics.soil import Array
 
 if TYPE_CHECKING:  # the one does not load what the other needs
@@ -113,11 +114,21 @@ def recorded(recordings: Recordings, campaign: Campaign, library: Mapping[str, P
         told = await asyncio.to_thread(recordings.moment, asked.run, asked.along, asked.at)
         return Response(line_of(told), media_type="application/json")
 
+    async def difference(request: Request) -> Response:
+        asked = Asked.of(request, len(recordings.runs))
+        if asked is None or not 0 <= asked.other < len(recordings.runs):
+            return _senseless()
+        try:
+            found = await asyncio.to_thread(recordings.differences, asked.run, asked.other)
+        except (OSError, RecordingError) as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        return JSONResponse(found)
+
     async def forces(request: Request) -> Response:
         return Response(line_of(campaign.told), media_type="application/json")
 
     answers = {"/about": about, "/events": events, "/stretch": stretch, "/moment": moment}
-    answers["/campaign"] = forces
+    answers |= {"/campaign": forces, "/diff": difference}
     return _application(answers, library)
 
 
@@ -142,6 +153,7 @@ class Asked(NamedTuple):
     run: int
     along: Along
     at: float
+    other: int  # run
 
     @classmethod
     def of(cls, request: Request, runs: int = 1) -> Asked | None:
@@ -156,6 +168,7 @@ class Asked(NamedTuple):
                 int(given.get("run", "0")),
                 "way" if given.get("along") == "way" else "time",
                 float(given.get("at", "0")),
+                int(given.get("other", "0")),
             )
         except (ValueError, KeyError):
             return None

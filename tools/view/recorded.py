@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
@@ -12,13 +12,14 @@ import numpy as np
 
 from gritd.estimator.config.configuration import ConfigError, loads
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
+from gritd.estimator.recording.glance import glance
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.recording.recording import Recording
-from gritd.estimator.recording.salvage import glance
 from gritd.estimator.terramechanics.soil import Array
 from gritd.estimator.visible import visible
 from gritd.tools.cli import files
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
+from gritd.tools.recordings.difference import differences
 from gritd.tools.service.setup import setup
 from gritd.tools.view.charts import CHARTS, layout
 from gritd.tools.view.frame import Setup, moment
@@ -42,6 +43,8 @@ class Run:
     setup: Setup
     curves: RunCurves
     damage: list[str] = field(default_factory=list)
+    operator: str = ""
+    notes: str = ""
 
     def described(self) -> dict[str, Any]:
         return {
@@ -52,16 +55,28 @@ class Run:
             "way": float(self.curves.way[-1]),
             "load": self.load,
             "whole": self.curves.whole,
+            "operator": visible(self.operator),
+            "notes": visible(self.notes),
+            "testbed": self.setup.testbed,
+            **_end(self.curves),
             "prior": self.setup.prior,
             "damage": [visible(line) for line in self.damage[:5]],
         }
 
 
+def _nothing() -> None:
+    """Nobody wants to know."""
+
+
 class Recordings:
     """Several runs. Raises CommandError for a file that is none, or without ticks."""
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.runs = [first_look(path) for path in paths]
+    def __init__(self, paths: Sequence[Path], looked: Callable[[], None] = _nothing) -> None:
+        """`looked` is called after the first look at each."""
+        self.runs: list[Run] = []
+        for path in paths:
+            self.runs.append(first_look(path))
+            looked()
         self._rest = Thread(target=self._read_on, name="reader", daemon=True)
 
     def start(self) -> None:
@@ -75,6 +90,14 @@ class Recordings:
             "runs": [run.described() for run in self.runs],
             "busy": any(not run.curves.whole for run in self.runs),
         }
+
+    def differences(self, run: int, other: int) -> list[dict[str, Any]]:
+        """How two runs differ in what they were made with. Raises RecordingError, OSError."""
+        first, second = (glance(self.runs[number].path, {}, 0) for number in (run, other))
+        return [
+            {name: visible(text) for name, text in vars(each).items()} | {"matters": each.matters}
+            for each in differences(first, second)
+        ]
 
     def events(self, run: int = 0) -> list[dict[str, Any]]:
         return [event._asdict() for event in events_of(self.runs[run].curves)]
@@ -126,6 +149,13 @@ class Recordings:
                     run.damage = [str(error)]
 
 
+def _end(curves: RunCurves) -> dict[str, str]:
+    """Status and estimate at the end, in words."""
+    tick = curves.tick(len(curves.time) - 1)
+    told = {v["label"]: f"{v['value']} ± {v['sigma']}" for v in moment(tick, Setup())["values"]}
+    return {"status": Status(tick["status"]).name, "c": told["c"], "tan_phi": told["tan φ"]}
+
+
 def _condition(tick: dict[str, Any], bit: int) -> str:
     return "stale" if tick["stale"] & bit else "stuck" if tick["stuck"] & bit else "ok"
 
@@ -144,7 +174,9 @@ def first_look(path: Path) -> Run:
 
     name = path.stem
     damage = recording.damage if whole else []
-    return Run(path, name, recording.run.nominal_load, _setup(recording, name), curves, damage)
+    run = recording.run
+    of_run = (run.nominal_load, _setup(recording, name), curves, damage, run.operator, run.notes)
+    return Run(path, name, *of_run)
 
 
 def _curves(recording: Recording, whole: bool) -> RunCurves:

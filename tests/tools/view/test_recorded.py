@@ -114,6 +114,12 @@ SET = (
 )
 
 
+def test_what_two_runs_were_made_with_is_compared(recordings: Recordings) -> None:
+    keys = {each["key"]: each["matters"] for each in recordings.differences(0, 1)}
+    assert keys == {"run.name": False}
+    assert recordings.differences(0, 0) == []
+
+
 def test_a_campaign_has_forces_by_load_and_estimates_run_by_run(paths: list[Path]) -> None:
     campaign = Campaign(paths)
     assert campaign.told == {"state": "computing"}
@@ -159,6 +165,8 @@ def test_runs_over_each_other_play_scrub_and_zoom(paths: list[Path], tmp_path: P
         tab.wait(f"document.querySelector('#span').textContent !== {whole!r}")
         tab.value(SET.format("'way'", "change", "#along"))
         tab.wait("document.querySelector('#span').textContent.endsWith(' m')")
+        tab.value("document.querySelector('#differences').open = true")
+        tab.wait("document.querySelector('#keys-of tbody').textContent.includes('run.name')")
         tab.wait("document.body.dataset.campaign === 'done'")
         assert tab.value("document.querySelectorAll('#forces figure').length") >= 3
         assert tab.value("document.documentElement.scrollWidth") <= 390

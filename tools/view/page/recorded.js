@@ -155,6 +155,7 @@ const chosen = async number => {
     return tick;
   }));
   listed();
+  quietly(differed());
   moved(page.at);
   await load();
 };
@@ -174,13 +175,28 @@ const listed = () => {
     box.addEventListener("change", () => { run.shown = box.checked; quietly(load()); });
     radio.addEventListener("change", () => quietly(chosen(run.number)));
     row.append(name, drawn, above, made("td", run.load === null ? "–" : `${run.load} N`), made("td", clock(run.duration)),
-      made("td", `${written(run.way, 3)} m`));
+      made("td", `${written(run.way, 3)} m`, "more"), made("td", run.status), made("td", run.c), made("td", run.tan_phi), made("td", run.notes, "more"));
     return row;
   }));
   byId("runs").hidden = page.runs.length < 2;
-  const [run] = [active()], day = new Date(run.start * 1000).toISOString().slice(0, 16).replace("T", " ");
-  byId("about").textContent = `gritd · ${run.name} · ${day} UTC · ${run.file}`;
+  byId("differences").hidden = page.runs.length < 2;
+  const run = active(), day = new Date(run.start * 1000).toISOString().slice(0, 16).replace("T", " ");
+  byId("about").textContent = `${["gritd", run.testbed, run.name, `${day} UTC`, run.operator, run.notes].filter(Boolean).join(" · ")}`;
   document.title = `${run.name} – gritd`;
+};
+
+// How the run above differs from another in what it was made with.
+const differed = async () => {
+  const others = page.runs.filter(run => run.number !== page.active), select = byId("other");
+  const before = select.value;
+  select.replaceChildren(...others.map(run => Object.assign(made("option", run.name), {value: run.number})));
+  if (others.some(run => String(run.number) === before)) select.value = before;
+  if (!byId("differences").open || others.length === 0) return;
+  const found = await (await fetch(`diff?run=${page.active}&other=${select.value}`)).json();
+  found.sort((a, b) => b.matters - a.matters);
+  table("keys-of", found.map(d => [d.key, d.first || "nothing", d.second || "nothing", d.matters ? "yes" : "no"]));
+  byId("keys-of").hidden = found.length === 0;
+  byId("alike").hidden = found.length > 0;
 };
 
 // What was read of the files so far; asked again until it is all.
@@ -212,6 +228,8 @@ const wire = () => {
   byId("speed").addEventListener("change", event => { page.speed = Number(event.target.value); });
   byId("along").addEventListener("change", event => { page.along = event.target.value; page.at = 0; zoomed(null); moved(0); });
   byId("scrub").addEventListener("input", event => moved(Number(event.target.value) / 1000 * end(active())));
+  byId("differences").addEventListener("toggle", () => quietly(differed()));
+  byId("other").addEventListener("change", () => quietly(differed()));
   const keys = {" ": () => play(!page.playing), "+": () => scaled(0.5), "-": () => scaled(2),
     ArrowLeft: () => shifted(-0.25), ArrowRight: () => shifted(0.25), Escape: () => zoomed(null)};
   addEventListener("keydown", event => {

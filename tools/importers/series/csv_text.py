@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,21 +38,10 @@ def read(
     RigFileError.
     """
     with text_file(path) as text:
-        head = _head(text)
-        if not head:
-            found = f"cannot be read: {text.cut}" if text.cut else "found nothing in it"
-            raise RigFileError(f"{path}: {found}; expected a table")
-
-        rows_of = list(joined(head))
-        form = layout(path, [line for _, line in rows_of], columns or ())
-        begin = rows_of[form.start][0]
-        missing = [name for name in columns or () if not form.places(name)]
-        if missing:
-            known = [name or f"column {at}" for at, name in enumerate(form.names, start=1)]
-            raise no_column(path, missing[0], known)
-
-        table = _Table(path, form, _builders(form, head[begin:], columns))
+        head = _head(path, text)
+        form, begin = _form(path, head, columns or ())
         lines, first = head[begin:], begin + 1
+        table = _Table(path, form, _builders(form, lines, columns))
         most = None if rows is None else min(rows, max(GUESSED // form.width, HEAD))
         while lines and (most is None or table.rows < most):
             table.add(lines[:most], first, text)
@@ -63,11 +52,28 @@ def read(
         return table.whole(text.cut)
 
 
-def _head(text: TextFile) -> list[str]:
+def _head(path: Path, text: TextFile) -> list[str]:
+    """The first lines. Raises RigFileError where there are none."""
     head: list[str] = []
     while len(head) < HEAD and (lines := text.block()):
         head += lines
+    if not head:
+        found = f"cannot be read: {text.cut}" if text.cut else "found nothing in it"
+        raise RigFileError(f"{path}: {found}; expected a table")
     return head
+
+
+def _form(path: Path, head: Sequence[str], wanted: Collection[str]) -> tuple[Layout, int]:
+    """How a table is written, and the line in which its rows begin. Raises RigFileError where it
+    lacks a column that is wanted.
+    """
+    rows = list(joined(head))
+    form = layout(path, [line for _, line in rows], wanted)
+    missing = next((name for name in wanted if not form.places(name)), None)
+    if missing is not None:
+        known = [name or f"column {at}" for at, name in enumerate(form.names, start=1)]
+        raise no_column(path, missing, known)
+    return form, rows[form.start][0]
 
 
 def _builders(

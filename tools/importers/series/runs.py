@@ -127,18 +127,23 @@ def _parts(
     notes += left_out(table, ~order.kept, "the time does not rise")
     parts = _long(table, order, name, notes)
     for number, rows in enumerate(parts, start=1):
-        called = name if len(parts) == 1 else f"{name}-{number}"
-        info = replace(info_of(table.at(rows), name, mapped), name=called)
-        run = SeriesRun(
-            info,
-            table.at(rows),
-            (times[rows] - times[rows][0]) / NS,
-            int(times[rows][0]) if times[rows][0] > EPOCH else None,
-            repeated=int(again.sum()) if number == 1 else 0,
-            notes=tuple(notes) if number == 1 else (),
-            began=int(times[rows][0]),
-        )
+        run = _run(table.at(rows), times[rows], name, mapped)
+        if len(parts) > 1:
+            run = replace(run, info=replace(run.info, name=f"{name}-{number}"))
+        if number == 1:
+            run = replace(run, repeated=int(again.sum()), notes=tuple(notes))
         yield run if mapped.resample is None else resampled(run, mapped.resample)
+
+
+def _run(table: SeriesTable, times: Nanoseconds, name: str, mapped: SeriesMap) -> SeriesRun:
+    began = int(times[0])
+    return SeriesRun(
+        info_of(table, name, mapped),
+        table,
+        (times - began) / NS,
+        began if began > EPOCH else None,
+        began=began,
+    )
 
 
 def _long(table: SeriesTable, order: Order, name: str, notes: list[str]) -> list[Rows]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 STEP = re.compile(r"([^.\[\]]+)(?:\[([^\]]*)\])?(?:\.|$)")
 NAMES = ("name", "names", "joint_names")  # fields that name the elements of the arrays beside them
+TIMES = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # fields of a time
 MOST = 64  # elements of an array that get names of their own; a longer one is no set of channels
 NS = 1_000_000_000
 
@@ -31,7 +32,7 @@ def getter(path: str) -> Getter:
 
 def value_at(path: str) -> Callable[[Any], Any]:
     """What takes a field out of a message; None where it is not in it."""
-    steps = [(match[1], match[2]) for match in STEP.finditer(path)]
+    steps = [(match[1], _index(match[2])) for match in STEP.finditer(path)]
 
     def get(message: Any) -> Any:
         value = message
@@ -44,8 +45,14 @@ def value_at(path: str) -> Callable[[Any], Any]:
     return get
 
 
+def _index(text: str | None) -> str | int | None:
+    return int(text) if text is not None and text.isdecimal() else text
+
+
 def number(value: Any) -> float:
     """A field as a number; NaN where it is none."""
+    if isinstance(value, float):  # as most are
+        return float(value)
     if isinstance(value, str | bytes) or value is None:
         return math.nan
     if (time := nanoseconds(value)) is not None:
@@ -58,10 +65,12 @@ def number(value: Any) -> float:
 
 def nanoseconds(value: Any) -> int | None:
     """A time or a duration; None for anything else."""
-    seconds, rest = _field(value, "sec"), _field(value, "nanosec")
-    if rest is None:
-        seconds, rest = (_field(value, name) for name in ("secs", "nsecs"))
-    return None if seconds is None or rest is None else int(seconds) * NS + int(rest)
+    for names in TIMES:
+        rest = _field(value, names[1])
+        seconds = None if rest is None else _field(value, names[0])
+        if seconds is not None:
+            return int(seconds) * NS + int(rest)
+    return None
 
 
 def stamp(message: Any) -> int | None:
@@ -114,17 +123,18 @@ def _is_plain(name: str) -> bool:
     return bool(name) and not name.isdecimal() and not re.search(r"[\[\]]", name)
 
 
-def _element(parent: Any, values: Any, index: str) -> Any:
+def _element(parent: Any, values: Any, index: str | int) -> Any:
     """An element by its number or by its name; None where there is none."""
-    if not isinstance(values, Sequence | np.ndarray):
+    if not isinstance(values, np.ndarray | list | tuple):
         return None
-    if index.isdecimal():
-        return values[int(index)] if int(index) < len(values) else None
+    if isinstance(index, int):
+        return values[index] if index < len(values) else None
 
-    names = _names(parent)
-    if index in names:
-        at = names.index(index)
-        return values[at] if at < len(values) else None
+    for field in NAMES:
+        names = _field(parent, field)
+        if isinstance(names, list) and index in names:
+            at = names.index(index)
+            return values[at] if at < len(values) else None
     return next((each for each in values if _field(each, "name") == index), None)
 
 
@@ -139,14 +149,14 @@ def _names(message: Any) -> list[str]:
 
 def _field(message: Any, name: str) -> Any:
     """A field of a message; None where it has none such."""
-    if isinstance(message, Mapping):
+    if type(message) is dict:  # of JSON
         return message.get(name)
     return getattr(message, name, None)
 
 
 def _fields(value: Any) -> Sequence[str]:
     """The names of a message's fields; none where it is no message."""
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         return [str(name) for name in value]
     fields = getattr(type(value), "__dataclass_fields__", {})
     return [name for name in fields if name != "__msgtype__"]

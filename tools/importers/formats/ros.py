@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,8 +49,7 @@ class _Topic:
             values.append(get(message))
 
 
-@dataclass(frozen=True)
-class _Message:
+class _Message(NamedTuple):
     """One message as a file holds it. Times [ns] are those of receipt and of publishing."""
 
     topic: str

@@ -34,7 +34,7 @@ def read(path: Path, wanted: Wanted) -> list[SeriesTable]:
 
 def _names(file: Any, numbers: list[int]) -> dict[int, str]:
     """A name for each group: its own where no other has it, else with its number."""
-    own = {at: file.groups[at].channel_group.acq_name or "" for at in numbers}
+    own = {at: getattr(file.groups[at].channel_group, "acq_name", "") or "" for at in numbers}
     given = list(own.values())
     alone = {at: name for at, name in own.items() if name and given.count(name) == 1}
     return {at: alone.get(at, f"{own[at] or 'group'}[{at}]") for at in numbers}

@@ -76,6 +76,8 @@ def speed(run: Driven, settings: Settings, sources: Sources) -> Iterator[Contrad
     rim, fastest = _rim(run.course), (GRAVITY * settings.wheel.radius) ** 0.5
     if run.course.count < LEAST or SLOWEST <= rim <= fastest or run.clock.interval > LONGEST:
         return
+    if not np.isfinite(run.course.travel).any():  # a drive alone
+        return
     likely = [] if "wheel" in sources and sources["wheel"].speed else _times(run, sources)
     if rim < SLOWEST:
         if likely:

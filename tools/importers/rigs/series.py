@@ -22,7 +22,7 @@ from gritd.tools.importers.series.columns import SeriesTable, Told, Wanted
 from gritd.tools.importers.series.convert import AXES, converted
 from gritd.tools.importers.series.encoders import SPEEDS
 from gritd.tools.importers.series.guess import guessed
-from gritd.tools.importers.series.mapping import SeriesMap, load
+from gritd.tools.importers.series.mapping import AS_CONFIGURED, SeriesMap, load
 from gritd.tools.importers.series.plausible import driven_of, sources_of
 from gritd.tools.importers.series.runs import SeriesRun, check
 from gritd.tools.importers.series.sources import RunFiles, read, runs_files, series_files
@@ -124,7 +124,10 @@ def _import(
     behind = runs[0].resampled
     tell("every row is a reading" if behind == 1.0 else f"means over {behind:.1f} rows")
     driven = driven_of(runs, imported.streams, configured.settings)
-    for line in (*told(driven, sources_of(mapped)), *_notes(mapped, runs, settings)):
+    for line in (
+        *told(driven, sources_of(mapped)),
+        *_notes(mapped, runs, settings, given),
+    ):
         tell(line)
     return paths
 
@@ -144,7 +147,9 @@ def _configuration(text: str, given: Path | None, path: Path) -> config.Configur
 # --- what is told ---
 
 
-def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings) -> list[str]:
+def _notes(
+    mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings, given: Path | None
+) -> list[str]:
     """What the user should know of what was not given."""
     left_out = (line for run in runs for line in (*run.table.notes, *run.notes))
     notes = [f"note: {line}" for line in dict.fromkeys(left_out)]
@@ -154,6 +159,7 @@ def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings) -> 
         if run.repeated
     ]
 
+    notes += _unstated(mapped, given)
     if mapped.drive_alone:
         alone = "gritd calibrate torque and gritd diagnose read it, no soil can be estimated"
         return [*notes, f"note: a drive without a carriage: {alone}"]
@@ -167,4 +173,19 @@ def _notes(mapped: SeriesMap, runs: Sequence[SeriesRun], settings: Settings) -> 
 
     if not any(mapped.named(axis) for axis in AXES):
         notes.append("note: no force is measured; only the torque can tell of the soil")
+    return notes
+
+
+def _unstated(mapped: SeriesMap, given: Path | None) -> list[str]:
+    """Calibrations of the template that stand for nobody's."""
+    if given is not None:
+        return []
+    notes = [
+        f"note: {name}: {channel} is scaled as in the template, which knows nothing; give --config"
+        for channel in AS_CONFIGURED
+        if (name := mapped.named(channel)) is not None
+    ]
+    current = mapped.named("current")
+    if current is not None and mapped.torque_constant is None:
+        notes.append(f"note: {current}: no torque_constant is stated; taken is 1 N*m/A")
     return notes

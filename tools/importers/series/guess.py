@@ -149,11 +149,15 @@ def _unused(
 
 
 def _lacking(taken: dict[str, str]) -> list[str]:
-    """Questions about what an import needs and no column was taken for."""
+    """Questions about what an import needs and no column was taken for. A motor and its angle alone
+    can be imported.
+    """
+    lacking = {e: channels for e, channels in CHANNELS.items() if not set(channels) & set(taken)}
+    if list(lacking) == ["carriage_encoder"] and set(ANALOGUE["motor_shunt"]) & set(taken):
+        return ["# no column was taken for the carriage: as it stands, a drive alone"]
     return [
         f"# ? no column was taken for the {encoder}: one with channel: {' or '.join(channels)}"
-        for encoder, channels in CHANNELS.items()
-        if not set(channels) & set(taken)
+        for encoder, channels in lacking.items()
     ]
 
 

@@ -13,7 +13,8 @@
 #include "complex_numbers.h"
 
 #define INTEGRALS 8               /* A1, A2, B1, B2, B3, C1, C2, C3 */
-#define PARTS 7                   /* of the shift: see filter/shift.py */
+#define PARTS 12                  /* of the shift: see filter/shift.py */
+#define LN_K 6                    /* of them powers of ln k */
 #define FARTHEST 1.0              /* as in shift.py */
 #define COLUMNS (PARTS * INTEGRALS)
 #define POWERS 14                 /* of the polynomials in theta_1 and in slip */
@@ -172,20 +173,23 @@ static void shift_at(Closed *self, double k, double theta_1, double slip, form e
     const double low = far > -FARTHEST ? far : -FARTHEST;
     const double ln_k = low < FARTHEST ? low : FARTHEST;
     tabulated(self, theta_1, slip);
+    const double n = e.exponent;
     for (int q = 0; q < INTEGRALS; q++) {
         for (int p = 0; p < 3; p++) {
             const double *t = self->point[p] + q;
-            const double by_n = t[3 * INTEGRALS] + ln_k * t[4 * INTEGRALS];
-            const double by_peak = t[5 * INTEGRALS] + ln_k * t[6 * INTEGRALS];
-            out[p][q] = t[0] + ln_k * (t[INTEGRALS] + ln_k * t[2 * INTEGRALS]) +
-                        e.exponent * by_n + peak * by_peak;
+#define T(part) t[(part) * INTEGRALS]
+            const double along_n = T(6) + ln_k * T(7), along_peak = T(9) + ln_k * T(10);
+            double series = T(LN_K - 1), slope = (LN_K - 1.0) * T(LN_K - 1);
+            for (int power = LN_K - 2; power >= 0; power--) series = T(power) + ln_k * series;
+            out[p][q] = series + n * (along_n + n * T(8)) + peak * (along_peak + peak * T(11));
             if (p == 0) {
-                out[3][q] = t[INTEGRALS] + (2.0 * ln_k) * t[2 * INTEGRALS] +
-                            e.exponent * t[4 * INTEGRALS] + peak * t[6 * INTEGRALS];
+                for (int power = LN_K - 2; power >= 1; power--) slope = power * T(power) + ln_k * slope;
+                out[3][q] = slope + n * T(7) + peak * T(10);
                 if (ln_k != far) out[3][q] = 0.0 * out[3][q];
-                out[4][q] = by_n;
-                out[5][q] = by_peak;
+                out[4][q] = along_n + (2.0 * n) * T(8);
+                out[5][q] = along_peak + (2.0 * peak) * T(11);
             }
+#undef T
         }
         out[2][q] = out[2][q] + e.c2 * out[5][q];
     }

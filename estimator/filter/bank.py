@@ -6,9 +6,11 @@ measured is its evidence: where the equations fit, the smallest size foretells b
 not, a larger one does. With little driven, all of them count, and what is told is as uncertain as
 that.
 
-A misfit shows only in part. What c, tan φ, k and the calibrations can imitate they take for
-themselves, and of what is left out of the physics that is most. So the size that is seen is not
-that of the misfit: where any is seen, what is told is what the largest size leaves.
+The equations hold where one of the FORM.holding smallest sizes explains the record: what sensors
+and arithmetic leave. Beyond, a misfit shows only in part. What c, tan φ, k and the calibrations can
+imitate they take for themselves, and of what is left out of the physics that is most. So the size
+that is seen is not that of the misfit: where any is seen, what is told is what the largest size
+leaves.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ def weights(bank: Bank) -> Vector:
 
 def told(bank: Bank) -> Estimate:
     """What the members say together."""
-    exact = weights(bank)[0]
-    return mixed((bank[0], bank[-1]), (exact, 1.0 - exact))
+    hold = weights(bank)[: FORM.holding]
+    return mixed((*bank[: FORM.holding], bank[-1]), (*hold, 1.0 - _sum(hold)))
 
 
 def leading(bank: Bank) -> int:
@@ -44,8 +46,8 @@ def leading(bank: Bank) -> int:
 
 
 def misfit(bank: Bank) -> float:
-    """Probability that the equations miss more than the smallest size says."""
-    return 1.0 - weights(bank)[0]
+    """Probability that the equations do not hold."""
+    return 1.0 - _sum(weights(bank)[: FORM.holding])
 
 
 def _sum(values: Sequence[float]) -> float:

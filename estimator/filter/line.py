@@ -53,7 +53,8 @@ def line_of(measurement: Measurement, mean: WheelState, x: Vector) -> Line:
         hypot(miss, quantity.by_slip * mean.doubts[0], quantity.by_load * mean.doubts[1])
         for miss, quantity in zip(misses, prediction, strict=False)
     ]
-    shared = [quantity.by_slip * mean.grain for quantity in prediction[:2]]
+    narrowing = mean.odometry.narrowing if mean.odometry else 1.0
+    shared = [quantity.by_slip * mean.grain * narrowing for quantity in prediction[:2]]
     kept = measurement.kept(mean)
     lasting = _lasting([own[at] for at in kept], [shared[at] for at in kept])
     return Line(y, update.H, update.R, lasting)

@@ -28,7 +28,7 @@ from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.wheel.chain import Added, Here
 from gritd.estimator.wheel.geometry import EntryAngle, entry_angle
 from gritd.estimator.wheel.sync import Measured
-from gritd.estimator.wheel.wheel_state import WheelState
+from gritd.estimator.wheel.wheel_state import WheelState, slip_over
 
 CAPACITY = 36  # stretches that are linearised anew
 SHORTEST = 5  # windows merged into one stretch while it is recent …
@@ -70,7 +70,9 @@ class Stretch(NamedTuple):
         )
 
     def merged(self, now: WheelState, radius: float, elapsed: float, windows: int = 1) -> Stretch:
-        """The stretch with one more window, or several. Sigmas stay those of a single window."""
+        """The stretch with one more window, or several. Sigmas stay those of a single window; that
+        of slip is what it would be if the windows were independent.
+        """
         weight = windows / (self.windows + windows)
         old = self.mean
 
@@ -79,8 +81,10 @@ class Stretch(NamedTuple):
 
         sinkage = mean(old.sinkage, now.sinkage)
         angle: EntryAngle = entry_angle(radius, sinkage.value)
+        both = old.odometry and now.odometry and old.odometry.joined(now.odometry)
         state = old._replace(
-            slip=mean(old.slip, now.slip),
+            slip=slip_over(both, old) if both else mean(old.slip, now.slip),
+            odometry=both,
             sinkage=sinkage,
             theta_1=angle,
             theta_m=old.theta_m + (now.theta_m - old.theta_m) * weight,

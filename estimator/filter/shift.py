@@ -8,7 +8,8 @@ therefore eight functions of θ₁ and i for a soil of given k and n and a stres
 c₂. They are tabulated once, as Chebyshev polynomials, with what changes when ln k, n and the place
 λ = θₘ/θ₁ of the peak do:
 
-    Δ = Δ₀ + κ (Δ₁ + κ Δ₂) + ν (Δ₃ + κ Δ₄) + μ (Δ₅ + κ Δ₆)
+    Δ = Δ₀ + κ (Δ₁ + κ (Δ₂ + κ (Δ₃ + κ (Δ₄ + κ Δ₅)))) + ν (Δ₆ + κ Δ₇ + ν Δ₈)
+        + μ (Δ₉ + κ Δ₁₀ + μ Δ₁₁)
 
 κ, ν, μ: ln k, n and λ less those of the prior. The filter stays exact in c, tan φ and W, and the
 triangles in k and λ too.
@@ -19,7 +20,7 @@ BLAS, whose order depends on the processor: compiled/closed.c gives the same bit
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import cos, log, pi
@@ -40,15 +41,16 @@ SLIP = (-0.1, 1.0)
 NODES = (20, 20)  # of θ₁ and i
 DEGREE = (13, 13)
 # of ln k, n and λ, between which a polynomial stands for the shift: about what priors leave open
-STEP_LN_K, STEP_N, STEP_PEAK = 0.3, 0.1, 0.05
+STEP_LN_K, STEP_N, STEP_PEAK = 0.3, 0.15, 0.07
 FARTHEST = 1.0  # of ln k: beyond it the shift stays as it is
+POWERS = 6  # of ln k
 QUANTUM = 2.0**-30  # of a coefficient; the largest is about 0.2, and the table is good to 1e-4
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
 ORDER = 24  # quadrature nodes in each zone
 PEAK = 0.999  # of θₘ/θ₁: at the entry itself σₘ says nothing of the modulus
 INTEGRALS = len(Integrals._fields)
-PARTS = 7  # Δ₀ … Δ₆
+PARTS = POWERS + 6  # Δ₀ … Δ₁₁
 
 Vector = tuple[float, ...]
 
@@ -70,15 +72,15 @@ class IntegralShift:
         )
         ordered, n = in_order(effects), float(soil.exponent)
 
-        def shift(ln_k: int, exponent: int = 0, peak: int = 0) -> Array:
-            """So many steps from the prior."""
-            k = float(np.exp(self.ln_k + ln_k * STEP_LN_K))
-            varied = replace(soil, shear_modulus=k, exponent=n + exponent * STEP_N)
-            moved = replace(wheel, c1=wheel.c1 + peak * STEP_PEAK)
+        def shift(ln_k: float, exponent: float = 0.0, peak: float = 0.0) -> Array:
+            """So far from the prior."""
+            k = float(np.exp(self.ln_k + ln_k))
+            varied = replace(soil, shear_modulus=k, exponent=n + exponent)
+            moved = replace(wheel, c1=wheel.c1 + peak)
             return _shift(moved, varied, ordered, share, theta_1, slip)
 
         coefficients = _fitted(np.concatenate(_parts(shift)))
-        # (DEGREE[0] + 1, DEGREE[1] + 1, 56)
+        # (DEGREE[0] + 1, DEGREE[1] + 1, 96)
         self.coefficients: Array = np.ascontiguousarray(coefficients.transpose(1, 2, 0))
         self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
@@ -96,20 +98,27 @@ class IntegralShift:
         """
         far = log(k) - self.ln_k
         ln_k, peak = min(max(far, -FARTHEST), FARTHEST), c1 + c2 * slip
-        t0, t1, t2, t3, t4, t5, t6 = self._table(theta_1, slip)  # each (3, 8)
+        t = self._table(theta_1, slip)  # each (3, 8)
 
-        by_n, by_peak = t3 + ln_k * t4, t5 + ln_k * t6
-        value, by_theta_1, by_slip = t0 + ln_k * (t1 + ln_k * t2) + exponent * by_n + peak * by_peak
-        by_slip = by_slip + c2 * by_peak[0]
-        by_ln_k = t1[0] + (2.0 * ln_k) * t2[0] + exponent * t4[0] + peak * t6[0]
+        along_n, along_peak = t[6] + ln_k * t[7], t[9] + ln_k * t[10]
+        value, by_theta_1, by_slip = (
+            _power_series(t[:POWERS], ln_k)
+            + exponent * (along_n + exponent * t[8])
+            + peak * (along_peak + peak * t[11])
+        )
+        by_n = along_n[0] + (2.0 * exponent) * t[8][0]
+        by_peak = along_peak[0] + (2.0 * peak) * t[11][0]
+        by_slip = by_slip + c2 * by_peak
+        slopes = [power * t[power][0] for power in range(1, POWERS)]
+        by_ln_k = _power_series(slopes, ln_k) + exponent * t[7][0] + peak * t[10][0]
         if ln_k != far:
             by_ln_k = 0.0 * by_ln_k
 
-        every = (value, by_theta_1, by_slip, by_ln_k, by_n[0], by_peak[0])
+        every = (value, by_theta_1, by_slip, by_ln_k, by_n, by_peak)
         return Shift(*[Integrals(*row.tolist()) for row in every])
 
     def _tabulated(self, theta_1: float, slip: float) -> Array:
-        """Δ₀ … Δ₆ at one point, each with its derivatives by θ₁ and by i: (7, 3, 8)."""
+        """Δ₀ … Δ₁₁ at one point, each with its derivatives by θ₁ and by i: (12, 3, 8)."""
         rows = np.array(_polynomials(*_unit(theta_1, THETA_1), DEGREE[0]))
         columns = np.array(_polynomials(*_unit(slip, SLIP), DEGREE[1]))
 
@@ -122,21 +131,47 @@ class IntegralShift:
 
 
 def _parts(shift: Callable[..., Array]) -> list[Array]:
-    """Δ₀ … Δ₆ from the shift some steps of ln k, n and λ from the prior."""
-    here, more, less = shift(0), shift(1), shift(-1)
-    parts = [
-        here,
-        (more - less) / (2.0 * STEP_LN_K),
-        (more - 2.0 * here + less) / (2.0 * STEP_LN_K**2),
-    ]
+    """Δ₀ … Δ₁₁ from the shift so far from the prior."""
+    nodes = [FARTHEST * x for x in _nodes((-1.0, 1.0), POWERS).tolist()]
+    parts = _through(nodes, [shift(node) for node in nodes])
+    here = shift(0.0)
 
     for name, step in (("exponent", STEP_N), ("peak", STEP_PEAK)):
-        slopes = [
-            (shift(ln_k, **{name: 1}) - shift(ln_k, **{name: -1})) / (2.0 * step)
-            for ln_k in (-1, 0, 1)
+        pairs = [
+            (shift(ln_k, **{name: step}), shift(ln_k, **{name: -step}))
+            for ln_k in (-STEP_LN_K, 0.0, STEP_LN_K)
         ]
-        parts += [slopes[1], (slopes[2] - slopes[0]) / (2.0 * STEP_LN_K)]
+        slopes = [(more - less) / (2.0 * step) for more, less in pairs]
+        more, less = pairs[1]
+        parts += [
+            slopes[1],
+            (slopes[2] - slopes[0]) / (2.0 * STEP_LN_K),
+            (more - 2.0 * here + less) / (2.0 * step**2),
+        ]
     return parts
+
+
+def _through(nodes: list[float], values: list[Array]) -> list[Array]:
+    """Coefficients of the powers of the polynomial with these values at the nodes."""
+    weights = []  # of each value in each power, falling
+    for node in nodes:
+        others = [other for other in nodes if other != node]
+        scale = 1.0
+        for other in others:
+            scale *= node - other
+        weights.append(np.poly(others) / scale)
+
+    stacked = np.array(values)
+    rows = np.array(weights).T[::-1]  # (powers, nodes)
+    return [np.add.reduce(row[:, None, None, None] * stacked, axis=0) for row in rows]
+
+
+def _power_series(terms: Sequence[Array], x: float) -> Array:
+    """Σ termₙ xⁿ, by Horner's rule."""
+    total = terms[-1]
+    for term in terms[-2::-1]:
+        total = term + x * total
+    return total
 
 
 def true_integrals(

@@ -43,6 +43,7 @@ from gritd.estimator.wheel.wheel_state import (
     WheelState,
     classify,
     grain,
+    odometry,
     required_bits,
     steady_since,
 )
@@ -145,7 +146,7 @@ class Tracker:
         if closes:
             state = self._closed(state, snapshot, now, elapsed)
             if status == Status.TRACKING and not state.choosing:
-                now = now._replace(grain=grain(self.settings, now, state.window / NS))
+                now = self._counted(now, snapshot, state.window / NS)
                 now = self.measurement.with_columns(now, snapshot, context, state.estimate)
                 state, aids = self._update(state, now, elapsed)
 
@@ -155,6 +156,14 @@ class Tracker:
         if aids and state.resets != state.resets_told:
             state = state._replace(resets_told=state.resets)
         return state, account
+
+    def _counted(self, now: WheelState, snapshot: Snapshot, window: float) -> WheelState:
+        """A window [s] with what its encoders say of it and of its neighbours together."""
+        radius = self.measurement.chain.wheel.radius
+        return now._replace(
+            grain=grain(self.settings, now, window),
+            odometry=odometry(now, snapshot, radius, window),
+        )
 
     def reviewed(self, state: TrackState) -> TrackState:
         """The state with the review that is under way done at once."""
@@ -232,9 +241,7 @@ class Tracker:
             window_end=snapshot.evaluated,
             began=snapshot.evaluated if state.began < 0 else state.began,
             before=now if snapshot.ready else None,
-            steady=steady_since(state.steady, now, snapshot.wheel_angle)
-            if snapshot.ready
-            else None,
+            steady=steady_since(state.steady, now, snapshot) if snapshot.ready else None,
             recall=recall,
             started=state.started or snapshot.ready,
             origin=snapshot.carriage_position

@@ -18,8 +18,8 @@ class ChangeTuning:
     alarm: float = 11.2
 
     # Share of the torque by which the closed forms, shifted to the true stresses, may be off in a
-    # stretch: the shift is first-order in ln k and n. Judgement.
-    model_error: float = 0.001
+    # stretch: what the table of the shift misses. Judgement.
+    model_error: float = 0.0002
 
     # [prior σ/√s] random walk of the soil right after a change: a ramp goes on changing. Learnt
     # from ramps of 20 s.
@@ -89,15 +89,19 @@ class FormTuning:
     # so it does not average out while they last; the longest stretches of a schedule are this long.
     lasting: float = 10.0
 
-    # Sizes of the error of form of which nothing was learnt, in shares of the load: no more than
-    # integrals and tables miss; what a good model misses; what a wrong one does. A factor of eight
-    # between them: with five conditions a record tells such sizes apart. Judgement.
-    sizes: tuple[float, ...] = (0.0005, 0.004, 0.032)
+    # Sizes of the error of form of which nothing was learnt, in shares of the load: what integrals
+    # and tables miss; what sensors and their filters do; what a good model misses; what a wrong one
+    # does. A factor of seven between them: with five conditions a record tells such sizes apart.
+    # Judgement.
+    sizes: tuple[float, ...] = (0.0001, 0.0007, 0.005, 0.035)
+
+    # So many of them, the smallest, are no miss of the equations.
+    holding: int = 2
 
     # Their probabilities before the run. Judgement: half of the rigs obey their equations.
-    odds: tuple[float, ...] = (0.5, 0.25, 0.25)
+    odds: tuple[float, ...] = (0.25, 0.25, 0.25, 0.25)
 
-    # Probability of a larger size than the smallest beyond which the estimate is not believed.
+    # Probability of a larger size than these beyond which the estimate is not believed.
     misfit: float = 0.99
 
 

@@ -9,7 +9,7 @@ from math import hypot, isnan, pi
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.messages.readings import ENCODERS, MOTION
+from gritd.estimator.messages.readings import ENCODERS, MOTION, NS
 from gritd.estimator.messages.replacing import quickly_replaced
 from gritd.estimator.messages.status import CHANNEL_BITS, Flag, Status
 from gritd.estimator.stages.situation import Situation
@@ -23,6 +23,7 @@ from gritd.estimator.wheel.geometry import (
     slip,
     slip_sigma,
 )
+from gritd.estimator.wheel.odometry import Odometry, of_window
 from gritd.estimator.wheel.sync import NOTHING, Measured, Snapshot
 
 # the linearised shear displacement changes sign along the contact below about this slip
@@ -38,6 +39,7 @@ SCATTER = 3.0  # [σ] by which two windows of one condition may differ besides
 # share of the contact angle θ₁ by which the wheel turns in steady motion before a window counts:
 # most of the soil under the rim, and what lags in a force sensor's mounting, has then seen no other
 SETTLED = 0.5
+LAGGING = 1.0  # [s] of steady motion in which forces have caught up: three times a filter of 0.3 s
 HALF = 0.5  # counts
 BLOCKED_TORQUE = 0.1  # share of r W tan φ above which a standing motor is pushing, not resting
 
@@ -81,6 +83,7 @@ class WheelState(NamedTuple):
     grain: float = 0.0  # σ of slip by the encoders' counts: see `grain`
     doubts: tuple[float, float] = (0.0, 0.0)  # σ of slip and load [N] by what lags: no noise
     form: FormHere | None = None  # the learnt discrepancy of form; None where there is none
+    odometry: Odometry | None = None  # of a window that is offered to the filter
 
 
 def wheel_state(
@@ -218,7 +221,7 @@ def classify(
     return (
         _contact(settings, now)
         or _travel(settings, now)
-        or _steadiness(now, since, snapshot.wheel_angle)
+        or _steadiness(now, since, snapshot)
     )
 
 
@@ -252,7 +255,7 @@ def _travel(settings: Settings, now: WheelState) -> Status | None:
     return None
 
 
-def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> Status:
+def _steadiness(now: WheelState, since: Steady | None, snapshot: Snapshot) -> Status:
     # a wheel that is in as deep as its axle, or deeper, has no entry angle
     if now.theta_1.value >= pi / 2.0:
         return Status.UNCERTAIN
@@ -265,8 +268,9 @@ def _steadiness(now: WheelState, since: Steady | None, wheel_angle: float) -> St
 
     if since is None or not alike(now, since.state):
         return Status.UNSTEADY
-    turned = abs(wheel_angle - since.wheel_angle)
-    return Status.TRACKING if turned >= SETTLED * now.theta_1.value else Status.UNSTEADY
+    turned = abs(snapshot.wheel_angle - since.wheel_angle) >= SETTLED * now.theta_1.value
+    passed = (snapshot.evaluated - since.evaluated) / NS >= LAGGING
+    return Status.TRACKING if turned and passed else Status.UNSTEADY
 
 
 class Steady(NamedTuple):
@@ -274,13 +278,14 @@ class Steady(NamedTuple):
 
     state: WheelState
     wheel_angle: float  # [rad]
+    evaluated: int  # [ns]
 
 
-def steady_since(before: Steady | None, now: WheelState, wheel_angle: float) -> Steady:
+def steady_since(before: Steady | None, now: WheelState, snapshot: Snapshot) -> Steady:
     """The same after one more window."""
     if before is not None and alike(now, before.state):
         return before
-    return Steady(now, wheel_angle)
+    return Steady(now, snapshot.wheel_angle, snapshot.evaluated)
 
 
 def alike(now: WheelState, before: WheelState) -> bool:
@@ -306,6 +311,23 @@ def grain(settings: Settings, now: WheelState, window: float) -> float:
     speeds = (now.rim_speed.value, now.travel_speed.value)
     shares = [HALF * a / max(abs(v) * window, a) for a, v in zip(steps, speeds, strict=True)]
     return (1.0 - abs(now.slip.value)) * hypot(*shares)
+
+
+def odometry(now: WheelState, snapshot: Snapshot, radius: float, window: float) -> Odometry:
+    """What the encoders say of a window of so many seconds; radius [m] of the rim."""
+    read = (snapshot.wheel_speed.value * radius, snapshot.carriage_speed.value)
+    undone = (now.rim_speed.value - read[0], now.travel_speed.value - read[1])
+    ways = (snapshot.wheel_angle * radius, snapshot.carriage_position)
+    return of_window(snapshot.evaluated, window, ways, read, undone)
+
+
+def slip_over(odometry: Odometry, now: WheelState) -> Measured:
+    """Slip over several windows of one condition, each as noisy as `now`; σ as if each had that,
+    independently.
+    """
+    i, narrowing = slip(*odometry.speeds), odometry.narrowing
+    sigma = slip_sigma(i, now.rim_speed.sigma, now.travel_speed.sigma)
+    return Measured(i.value, narrowing * sigma)
 
 
 def moves(speed: Measured) -> bool:

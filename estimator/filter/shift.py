@@ -20,7 +20,7 @@ BLAS, whose order depends on the processor: compiled/closed.c gives the same bit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from math import cos, log, pi
@@ -109,7 +109,7 @@ class IntegralShift:
         by_n = along_n[0] + (2.0 * exponent) * t[8][0]
         by_peak = along_peak[0] + (2.0 * peak) * t[11][0]
         by_slip = by_slip + c2 * by_peak
-        slopes = [power * t[power][0] for power in range(1, POWERS)]
+        slopes = np.arange(1.0, POWERS)[:, None] * t[1:POWERS, 0]
         by_ln_k = _power_series(slopes, ln_k) + exponent * t[7][0] + peak * t[10][0]
         if ln_k != far:
             by_ln_k = 0.0 * by_ln_k
@@ -166,9 +166,9 @@ def _through(nodes: list[float], values: list[Array]) -> list[Array]:
     return [np.add.reduce(row[:, None, None, None] * stacked, axis=0) for row in rows]
 
 
-def _power_series(terms: Sequence[Array], x: float) -> Array:
+def _power_series(terms: Array, x: float) -> Array:
     """Σ termₙ xⁿ, by Horner's rule."""
-    total = terms[-1]
+    total: Array = terms[-1]
     for term in terms[-2::-1]:
         total = term + x * total
     return total

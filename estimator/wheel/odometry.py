@@ -15,61 +15,85 @@ from typing import NamedTuple
 from gritd.estimator.messages.readings import NS
 
 
+class Piece(NamedTuple):
+    """Consecutive windows: how many, and their means."""
+
+    windows: int
+    time: float  # [s] since the first window of all
+    rim: float  # [m] the rim's way rωt
+    travel: float  # [m] the travel vt
+
+    def joined(self, after: Piece) -> Piece:
+        """With those that follow."""
+        windows = self.windows + after.windows
+        share = after.windows / windows
+        means = [a + (b - a) * share for a, b in zip(self[1:], after[1:], strict=True)]
+        return Piece(windows, *means)
+
+
+class Sums(NamedTuple):
+    """Squares and products about the means of the pieces, a reading a second."""
+
+    spread: float  # [s²] of t
+    within: float  # [s²] of it, that within the windows
+    by_rim: float  # [s m] of t and the rim's way
+    by_travel: float  # [s m] of t and the travel
+
+    def plus(self, other: Sums) -> Sums:
+        """Of the pieces of both."""
+        return Sums(*[a + b for a, b in zip(self, other, strict=True)])
+
+
 class Odometry(NamedTuple):
-    """The sums of so many windows; `piece` is the last of their consecutive ones."""
+    """What the encoders say of so many windows."""
 
     windows: int
     at: int  # centre of the first window [ns]
     length: float  # of a window [s]
-    piece: int  # windows of the last piece
-    time: float  # [s] mean of the piece, since `at`
-    rim: float  # [m] mean of the rim's way rωt in the piece
-    travel: float  # [m] and of the travel vt
-    spread: float  # [s²] Σ(t − t̄)² over pieces, a reading a second
-    within: float  # [s²] of it, that within the windows
-    by_rim: float  # [s m] Σ(t − t̄)(rωt − mean)
-    by_travel: float  # [s m]
-    undone: tuple[float, float]  # [m/s] mean of what effects take from both speeds
+    piece: Piece  # the last one
+    sums: Sums
+    undone: tuple[float, float]  # [m/s] mean of what effects add to both speeds
 
     @property
     def speeds(self) -> tuple[float, float]:
         """rω and v [m/s], effects accounted for."""
-        rim, travel = self.undone
-        return self.by_rim / self.spread + rim, self.by_travel / self.spread + travel
+        sums, (rim, travel) = self.sums, self.undone
+        return sums.by_rim / sums.spread + rim, sums.by_travel / sums.spread + travel
 
     @property
     def narrowing(self) -> float:
         """σ of a speed over that of the mean of the windows' speeds, 0 … 1."""
-        return sqrt(self.within / self.spread)
+        return sqrt(self.sums.within / self.sums.spread)
 
     def joined(self, after: Odometry) -> Odometry:
         """These windows and later ones."""
-        both = self.windows + after.windows
-        share = after.windows / both
-        sums = [a + b for a, b in zip(self[7:11], after[7:11], strict=True)]
-        undone = tuple(
-            [a + (b - a) * share for a, b in zip(self.undone, after.undone, strict=True)]
-        )
-        moved = (after.at - self.at) / NS
-        gap = moved + after.time - self.time  # [s] between the means
-        if not self._consecutive(after, gap):
-            piece = (after.piece, moved + after.time, after.rim, after.travel)
-            return Odometry(both, self.at, self.length, *piece, *sums, undone)
+        windows = self.windows + after.windows
+        share = after.windows / windows
+        (rim, travel), (rim_after, travel_after) = self.undone, after.undone
+        undone = (rim + (rim_after - rim) * share, travel + (travel_after - travel) * share)
 
-        piece = self.piece + after.piece
-        weight = self.length * self.piece * after.piece / piece
-        rim, travel = after.rim - self.rim, after.travel - self.travel
-        between = (weight * gap * gap, 0.0, weight * gap * rim, weight * gap * travel)
-        sums = [a + b for a, b in zip(sums, between, strict=True)]
-        share = after.piece / piece
-        means = (self.time + gap * share, self.rim + rim * share, self.travel + travel * share)
-        return Odometry(both, self.at, self.length, piece, *means, *sums, undone)
+        last, moved = after.piece, (after.at - self.at) / NS
+        last, sums = last._replace(time=last.time + moved), self.sums.plus(after.sums)
+        if self._followed_by(last, after):
+            sums = sums.plus(self._between(last))
+            last = self.piece.joined(last)
+        return Odometry(windows, self.at, self.length, last, sums, undone)
 
-    def _consecutive(self, after: Odometry, gap: float) -> bool:
-        """Whether the later windows are one piece, and go on where this one's last ends."""
-        if after.piece != after.windows or after.length != self.length:
+    def _followed_by(self, piece: Piece, after: Odometry) -> bool:
+        """Whether later windows are one piece, and begin where this one's last ends."""
+        if piece.windows != after.windows or after.length != self.length:
             return False
-        return abs(gap / self.length - 0.5 * (self.piece + after.piece)) < 0.5
+        apart = (piece.time - self.piece.time) / self.length
+        return abs(apart - 0.5 * (self.piece.windows + piece.windows)) < 0.5
+
+    def _between(self, piece: Piece) -> Sums:
+        """Of the means of the last piece and of one that follows."""
+        mine = self.piece
+        share = piece.windows / (mine.windows + piece.windows)
+        weight = self.length * mine.windows * share
+        time = piece.time - mine.time
+        rim, travel = piece.rim - mine.rim, piece.travel - mine.travel
+        return Sums(weight * time * time, 0.0, weight * time * rim, weight * time * travel)
 
 
 def of_window(
@@ -80,10 +104,9 @@ def of_window(
     undone: tuple[float, float],
 ) -> Odometry:
     """One window of so many seconds about `at` [ns]: way of rim and carriage [m], their speeds as
-    read [m/s], and what effects take from these.
+    read [m/s], and what effects add to these.
     """
     within = length**3 / 12.0
     rim, travel = speeds
-    return Odometry(
-        1, at, length, 1, 0.0, *ways, within, within, rim * within, travel * within, undone
-    )
+    sums = Sums(within, within, rim * within, travel * within)
+    return Odometry(1, at, length, Piece(1, 0.0, *ways), sums, undone)

@@ -218,11 +218,7 @@ def classify(
     if snapshot.stuck & needed:
         return Status.STUCK
 
-    return (
-        _contact(settings, now)
-        or _travel(settings, now)
-        or _steadiness(now, since, snapshot)
-    )
+    return _contact(settings, now) or _travel(settings, now) or _steadiness(now, since, snapshot)
 
 
 def _unread(settings: Settings, now: WheelState) -> bool:

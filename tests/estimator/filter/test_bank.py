@@ -22,22 +22,23 @@ WHEEL = Wheel(0.072, 0.071)
 
 
 def bank(*evidence):
-    sizes = (0.1, 0.2, 0.4)
+    sizes = (0.1, 0.2, 0.4, 0.8)
     pairs = zip(sizes, evidence, strict=True)
     return tuple([made((1.0, 0.6, -3.7), size * np.eye(3), log) for size, log in pairs])
 
 
 def test_without_evidence_all_sizes_are_as_probable_as_before_the_run():
-    assert weights(bank(5.0, 5.0, 5.0)) == pytest.approx(FORM.odds)
+    assert weights(bank(5.0, 5.0, 5.0, 5.0)) == pytest.approx(FORM.odds)
 
 
 def test_evidence_for_exact_equations_narrows_and_against_them_widens():
-    exact, nothing, wrong = bank(50.0, 0.0, 0.0), bank(0.0, 0.0, 0.0), bank(0.0, 50.0, 0.0)
-    widths = [told(each).soil_P[0][0] for each in (exact, nothing, wrong)]
-    assert widths[0] == pytest.approx(0.1) and widths[2] == pytest.approx(0.4)
-    assert widths[0] < widths[1] < widths[2]
-    assert misfit(exact) < 1e-9 and misfit(wrong) > 1.0 - 1e-9
-    assert leading(wrong) == 1
+    exact, sensors = bank(50.0, 0.0, 0.0, 0.0), bank(0.0, 50.0, 0.0, 0.0)
+    nothing, wrong = bank(0.0, 0.0, 0.0, 0.0), bank(0.0, 0.0, 50.0, 0.0)
+    widths = [told(each).soil_P[0][0] for each in (exact, sensors, nothing, wrong)]
+    assert widths == sorted(widths)
+    assert widths[0] == pytest.approx(0.1) and widths[3] == pytest.approx(0.8)
+    assert misfit(exact) < 1e-9 and misfit(sensors) < 1e-9 and misfit(wrong) > 1.0 - 1e-9
+    assert leading(wrong) == 2
 
 
 @given(st.floats(-0.5, 1.2), st.floats(0.0, 1e4))

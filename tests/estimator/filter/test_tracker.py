@@ -35,14 +35,22 @@ def drawn(settings, seed):
     return c, tan_phi, exp(ln_k)
 
 
+def with_peak_drawn(settings, seed):
+    """A rig whose stress peaks where the stated σ of c₁ and c₂ allow."""
+    rng, peak = np.random.default_rng(seed), settings.peak
+    c1 = settings.wheel.c1 + peak.c1_sigma * float(rng.normal())
+    c2 = settings.wheel.c2 + peak.c2_sigma * float(rng.normal())
+    return replace(settings, wheel=replace(settings.wheel, c1=c1, c2=c2))
+
+
 def normalised(settings, schedule, runs):
-    """Normalised estimation error squared of (c, tan φ), one a run, each with its own soil and
-    noise.
+    """Normalised estimation error squared of (c, tan φ), one a run, each with its own soil, stress
+    peak and noise.
     """
     squares = []
     for seed in range(runs):
-        truth = drawn(settings, 1000 + seed)
-        e, P = error(run(settings, truth, schedule, seed)[0], truth)
+        truth, plant = drawn(settings, 1000 + seed), with_peak_drawn(settings, 2000 + seed)
+        e, P = error(run(settings, truth, schedule, seed, plant=plant)[0], truth)
         squares.append(e[:2] @ np.linalg.solve(P[:2, :2], e[:2]))
     return np.array(squares)
 
@@ -82,13 +90,12 @@ def test_one_load_keeps_the_truth_inside_the_joint_ellipse():
 
 @pytest.mark.slow
 def test_200_runs_are_consistent():
-    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: not above the 95 %
-    band of χ²(400)/200. It lies below: this plant has none of the errors of form and peak that the
-    filter allows for.
+    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: inside the 95 % band of
+    χ²(400)/200.
     """
     squares = normalised(RIG, THREE_LOADS, 200)
     print(f"NEES {squares.mean():.2f} of 2, inside the 95 % ellipse {np.mean(squares < 5.99):.1%}")
-    assert squares.mean() < 2.29
+    assert 1.73 < squares.mean() < 2.29
 
 
 @pytest.mark.slow

@@ -17,7 +17,8 @@
 #define LN_K 6                    /* of them powers of ln k */
 #define FARTHEST 1.0              /* as in shift.py */
 #define COLUMNS (PARTS * INTEGRALS)
-#define POWERS 14                 /* of the polynomials in theta_1 and in slip */
+#define ROWS 10                   /* powers of the polynomials in theta_1 … */
+#define POWERS 14                 /* … and in slip */
 #define SMALLEST 0.1              /* as in scalar.py */
 #define NEAREST 0.02
 
@@ -32,7 +33,7 @@ typedef struct {
     int shifted;
     double theta_1, slip;         /* where `point` was taken last */
     double point[3][COLUMNS];
-    double table[POWERS][POWERS][COLUMNS];
+    double table[ROWS][POWERS][COLUMNS];
     PyObject *quantity;           /* the named tuple of a result */
 } Closed;
 
@@ -117,7 +118,7 @@ static integrals added(integrals x, const double *change, double factor) {
 /* --- the shift (filter/shift.py) --- */
 
 /* T_0 .. at the place of x in its range, and their derivatives by x. */
-static void polynomials(double x, double low, double high, double first[POWERS],
+static void polynomials(double x, double low, double high, int powers, double first[POWERS],
                         double slopes[POWERS]) {
     double slope = 2.0 / (high - low), u = (x - low) * slope - 1.0;
     if (!(low <= x && x <= high)) {
@@ -127,19 +128,19 @@ static void polynomials(double x, double low, double high, double first[POWERS],
     double second[POWERS] = {0.0, 1.0};
     first[0] = 1.0;
     first[1] = u;
-    for (int n = 2; n < POWERS; n++) {
+    for (int n = 2; n < powers; n++) {
         first[n] = 2.0 * u * first[n - 1] - first[n - 2];
         second[n] = 2.0 * u * second[n - 1] - second[n - 2];
     }
-    for (int n = 0; n < POWERS; n++) slopes[n] = slope * (n * second[n]);
+    for (int n = 0; n < powers; n++) slopes[n] = slope * (n * second[n]);
 }
 
 /* self->point: the table at a point: values, derivatives by theta_1 and by slip. */
 static void tabulated(Closed *self, double theta_1, double slip) {
     if (theta_1 == self->theta_1 && slip == self->slip) return;
     double rows[POWERS], by_rows[POWERS], across[POWERS], by_across[POWERS];
-    polynomials(theta_1, self->low[0], self->high[0], rows, by_rows);
-    polynomials(slip, self->low[1], self->high[1], across, by_across);
+    polynomials(theta_1, self->low[0], self->high[0], ROWS, rows, by_rows);
+    polynomials(slip, self->low[1], self->high[1], POWERS, across, by_across);
 
     for (int b = 0; b < POWERS; b++) {
         double value[COLUMNS], by_theta_1[COLUMNS];
@@ -147,7 +148,7 @@ static void tabulated(Closed *self, double theta_1, double slip) {
             value[q] = rows[0] * self->table[0][b][q];
             by_theta_1[q] = by_rows[0] * self->table[0][b][q];
         }
-        for (int a = 1; a < POWERS; a++)
+        for (int a = 1; a < ROWS; a++)
             for (int q = 0; q < COLUMNS; q++) {
                 value[q] += rows[a] * self->table[a][b][q];
                 by_theta_1[q] += by_rows[a] * self->table[a][b][q];
@@ -377,7 +378,7 @@ static int closed_init(PyObject *object, PyObject *arguments, PyObject *names) {
         if (fits) memcpy(self->table, given.buf, sizeof self->table);
         PyBuffer_Release(&given);
         if (!fits) {
-            PyErr_Format(PyExc_ValueError, "expected a table of %d x %d x %d doubles", POWERS,
+            PyErr_Format(PyExc_ValueError, "expected a table of %d x %d x %d doubles", ROWS,
                          POWERS, COLUMNS);
             return -1;
         }

@@ -38,8 +38,8 @@ from gritd.estimator.terramechanics.soil import Array, Soil, Wheel
 
 THETA_1 = (0.05, 1.45)  # [rad] range of the table; outside it the edge is used
 SLIP = (-0.1, 1.0)
-NODES = (20, 20)  # of θ₁ and i
-DEGREE = (13, 13)
+NODES = (14, 20)  # of θ₁ and i
+DEGREE = (9, 13)
 # of ln k, n and λ, between which a polynomial stands for the shift: about what priors leave open
 STEP_LN_K, STEP_N, STEP_PEAK = 0.3, 0.15, 0.07
 FARTHEST = 1.0  # of ln k: beyond it the shift stays as it is

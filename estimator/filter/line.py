@@ -25,11 +25,16 @@ class Line(NamedTuple):
 
     def update(self, x: Vector, windows: int) -> Update:
         """The mean of so many windows as a measurement, about the vector x (d,)."""
-        noise = [
-            tuple([r / windows + d for r, d in zip(rs, ds, strict=True)])
-            for rs, ds in zip(self.R, self.D, strict=True)
-        ]
-        return Update(self.innovation(x), self.H, tuple(noise))
+        return Update(self.innovation(x), self.H, self.noise(windows))
+
+    def noise(self, windows: int) -> Matrix:
+        """Covariance (m, m) of the mean of so many windows."""
+        return tuple(
+            [
+                tuple([r / windows + d for r, d in zip(rs, ds, strict=True)])
+                for rs, ds in zip(self.R, self.D, strict=True)
+            ]
+        )
 
     def mixed(self, other: Line, weight: float) -> Line:
         """The mean of two, `weight` on the other."""

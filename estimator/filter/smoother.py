@@ -14,6 +14,7 @@ from gritd.estimator.filter.estimate import (
     KPA,
     STATES,
     Estimate,
+    Update,
     Vector,
     covariance,
     made,
@@ -38,13 +39,15 @@ class Smoother:
         walk = settings.filter
         self._rates = (walk.cohesion_walk / KPA, walk.tan_phi_walk, walk.ln_k_walk)
 
-    def walked(self, bank: Bank, elapsed: float, unrest: float) -> Bank:
+    def walked(self, estimate: Estimate, elapsed: float, unrest: float) -> Estimate:
         """Random walk of the soil over the elapsed time [s]; unrest: more of it after a change,
         [prior σ/√s].
         """
+        return predict(estimate, self._walk(elapsed, unrest))
+
+    def _walk(self, elapsed: float, unrest: float) -> Vector:
         rates = zip(self._rates, self.prior_sigma, strict=True)
-        walk = tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates])
-        return tuple([predict(member, walk) for member in bank])
+        return tuple([(rate * rate + (unrest * sigma) ** 2) * elapsed for rate, sigma in rates])
 
     def with_open(self, memory: Memory, base: Bank, x: Vector, doubt: float) -> tuple[Memory, Bank]:
         """The memory whose open stretch has its tangent at x (d,), and what it leaves on top of
@@ -98,7 +101,8 @@ class Smoother:
 
     def _absorbed(self, bank: Bank, stretch: Stretch, doubt: float) -> tuple[Stretch, Bank]:
         """Update with a whole stretch."""
-        bank = self.walked(bank, stretch.elapsed, stretch.unrest)
+        walk = self._walk(stretch.elapsed, stretch.unrest)
+        bank = tuple([predict(member, walk) for member in bank])
         if stretch.changed is not None:
             bank = tuple([self.renewed(member, doubt) for member in bank])
             stretch = stretch._replace(changed=bank)
@@ -107,10 +111,10 @@ class Smoother:
 
         line = stretch.line
         assert line is not None
-        after = []
+        noise, after = line.noise(stretch.windows), []
         for member in bank:
-            update = selected(line.update(member.x, stretch.windows), stretch.components)
-            after.append(self._engine.update(member, update))
+            update = Update(line.innovation(member.x), line.H, noise)
+            after.append(self._engine.update(member, selected(update, stretch.components)))
         return stretch, tuple(after)
 
     def _doubted(self, doubt: float) -> Vector:

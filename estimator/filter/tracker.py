@@ -256,7 +256,7 @@ class Tracker:
         review of the record begins.
         """
         trust = state.trust.passed(elapsed, state.misfit > self.misfit)
-        walked = told(self.smoother.walked(state.bank, elapsed, trust.unrest))
+        walked = self.smoother.walked(state.estimate, elapsed, trust.unrest)
 
         prediction = self.measurement.predict(walked, now)
         aids = self._gate(walked, now, self.measurement.linearise(now, prediction, walked))

@@ -179,6 +179,13 @@ class Memory(NamedTuple):
         """Whether the last stretch was left out when a new one began: it was too short."""
         return len(after.stretches) == len(self.stretches)
 
+    def without_open(self) -> Memory:
+        """The record without its open stretch; the next one is another."""
+        if self.closed or not self.stretches:
+            return self
+        *complete, last = self.stretches
+        return Memory(self.anchor, tuple(complete), self.pending + last.elapsed, closed=True)
+
     def ended(self) -> Memory:
         """The record of a run that is over."""
         return self._replace(closed=True)

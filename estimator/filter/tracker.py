@@ -141,14 +141,17 @@ class Tracker:
 
         context = _context(state, snapshot, elapsed)
         now = self.measurement.state(snapshot, context, state.estimate, state.columns)
-        status = classify(self.settings, snapshot, now, state.steady, self._required, state.started)
+        started = state.started
         aids: tuple[Aid, ...] = ()
+        if closes and snapshot.ready:
+            now = self._counted(now, snapshot, state.window / NS)
         if closes:
             state = self._closed(state, snapshot, now, elapsed)
-            if status == Status.TRACKING and not state.choosing:
-                now = self._counted(now, snapshot, state.window / NS)
-                now = self.measurement.with_columns(now, snapshot, context, state.estimate)
-                state, aids = self._update(state, now, elapsed)
+
+        status = classify(self.settings, snapshot, now, state.steady, self._required, started)
+        if closes and status == Status.TRACKING and not state.choosing:
+            now = self.measurement.with_columns(now, snapshot, context, state.estimate)
+            state, aids = self._update(state, now, elapsed)
 
         account = self._account(state, snapshot, now, status, aids)
         if aids and account.flags & Flag.PRIOR:
@@ -236,18 +239,28 @@ class Tracker:
         remember.
         """
         recall = self.measurement.remember(state.recall, elapsed, now, snapshot)
+        steady = steady_since(state.steady, now, snapshot) if snapshot.ready else None
+        if steady is None or steady.evaluated == snapshot.evaluated:
+            state = self._let_go(state)
 
         return state._replace(
             window_end=snapshot.evaluated,
             began=snapshot.evaluated if state.began < 0 else state.began,
             before=now if snapshot.ready else None,
-            steady=steady_since(state.steady, now, snapshot) if snapshot.ready else None,
+            steady=steady,
             recall=recall,
             started=state.started or snapshot.ready,
             origin=snapshot.carriage_position
             if state.origin is None and snapshot.ready
             else state.origin,
         )
+
+    def _let_go(self, state: TrackState) -> TrackState:
+        """Steady motion has ended, and that shows late: without the stretch that was open."""
+        memory = state.memory.without_open()
+        if memory is state.memory:
+            return state
+        return state._replace(memory=memory, bank=state.base, estimate=told(state.base))
 
     def _update(
         self, state: TrackState, now: WheelState, elapsed: float

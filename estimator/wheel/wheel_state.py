@@ -5,7 +5,7 @@ nothing about the soil.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import hypot, isnan, pi
+from math import hypot, isnan, pi, sqrt
 from typing import NamedTuple
 
 from gritd.estimator.config.settings import Settings
@@ -270,18 +270,35 @@ def _steadiness(now: WheelState, since: Steady | None, snapshot: Snapshot) -> St
 
 
 class Steady(NamedTuple):
-    """Since when the wheel has been in steady motion: the first window of it."""
+    """Since when the wheel has been in steady motion."""
 
-    state: WheelState
+    state: WheelState  # the first window of it, with the slip of all but the last
     wheel_angle: float  # [rad]
     evaluated: int  # [ns]
+    last: WheelState | None = None  # the last window, where there are two or more
 
 
 def steady_since(before: Steady | None, now: WheelState, snapshot: Snapshot) -> Steady:
-    """The same after one more window."""
-    if before is not None and alike(now, before.state):
-        return before
-    return Steady(now, snapshot.wheel_angle, snapshot.evaluated)
+    """The same after one more window. Two windows together know slip better than each."""
+    begun = Steady(now, snapshot.wheel_angle, snapshot.evaluated)
+    if before is None or not alike(now, before.state):
+        return begun
+    if before.last is None:
+        return before._replace(last=now)
+
+    if not alike(with_slip_of(before.last, now), before.state):
+        return begun
+    return before._replace(state=with_slip_of(before.state, before.last), last=now)
+
+
+def with_slip_of(state: WheelState, after: WheelState) -> WheelState:
+    """A window with the slip of it and a later one together."""
+    if state.odometry is None or after.odometry is None:
+        return state
+    both = state.odometry.joined(after.odometry)
+    slip = slip_over(both, after)
+    own = slip._replace(sigma=slip.sigma / sqrt(both.windows))
+    return state._replace(odometry=both, slip=own)
 
 
 def alike(now: WheelState, before: WheelState) -> bool:

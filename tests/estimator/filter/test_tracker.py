@@ -90,12 +90,13 @@ def test_one_load_keeps_the_truth_inside_the_joint_ellipse():
 
 @pytest.mark.slow
 def test_200_runs_are_consistent():
-    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: inside the 95 % band of
-    χ²(400)/200.
+    """Mean normalised estimation error squared of (c, tan φ) over 200 runs: not above the 95 % band
+    of χ²(400)/200, and not far below. This plant has none of the error of form that the filter
+    allows for.
     """
     squares = normalised(RIG, THREE_LOADS, 200)
     print(f"NEES {squares.mean():.2f} of 2, inside the 95 % ellipse {np.mean(squares < 5.99):.1%}")
-    assert 1.73 < squares.mean() < 2.29
+    assert 1.0 < squares.mean() < 2.29
 
 
 @pytest.mark.slow

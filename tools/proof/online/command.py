@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from argparse import Namespace
 
 from gritd.tools.cli.command import DONE, USAGE, CommandError
@@ -10,7 +11,7 @@ from gritd.tools.proof.blind import seal
 from gritd.tools.proof.online import batch
 from gritd.tools.proof.online.draw import STRATA
 
-TABLE = "online.md"
+TABLE, SCORES = "online.md", "scores.json"
 
 
 def prove(arguments: Namespace) -> int:
@@ -32,5 +33,9 @@ def prove(arguments: Namespace) -> int:
 
     lines = list(batch.table(scores))
     (arguments.output / TABLE).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    each = [
+        {**spec._asdict(), **score._asdict()} for spec, score in zip(specs, scores, strict=True)
+    ]
+    (arguments.output / SCORES).write_text(json.dumps(each, indent=1) + "\n", encoding="utf-8")
     print("\n".join(lines))
     return DONE

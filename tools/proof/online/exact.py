@@ -14,7 +14,7 @@ from gritd.tools.proof.online.draw import Bench
 from gritd.tools.proof.online.drive import CHANGING, STILL, Columns
 
 STEP = 1e-4
-PRIOR = (500.0, 0.15, 0.5)  # σ of c [Pa], tan φ and ln k in the template of an import
+PRIOR = (1000.0, 0.15, 0.5)  # σ of c [Pa], tan φ and ln k in the template of an import
 
 
 class Steady(NamedTuple):

@@ -13,8 +13,7 @@
 #include "complex_numbers.h"
 
 #define INTEGRALS 8               /* A1, A2, B1, B2, B3, C1, C2, C3 */
-#define PARTS 12                  /* of the shift: see filter/shift.py */
-#define LN_K 6                    /* of them powers of ln k */
+#define PARTS 15                  /* of the shift: see filter/shift.py */
 #define FARTHEST 1.0              /* as in shift.py */
 #define COLUMNS (PARTS * INTEGRALS)
 #define ROWS 10                   /* powers of the polynomials in theta_1 … */
@@ -166,6 +165,19 @@ static void tabulated(Closed *self, double theta_1, double slip) {
 /* What is added to the configured n, c1 and c2. */
 typedef struct { double exponent, c1, c2; } form;
 
+/* sum of terms[n] x^n by Horner's rule, and its slope; terms of one integral */
+static double series(const double *terms, int powers, double x) {
+    double total = terms[(powers - 1) * INTEGRALS];
+    for (int n = powers - 2; n >= 0; n--) total = terms[n * INTEGRALS] + x * total;
+    return total;
+}
+
+static double series_slope(const double *terms, int powers, double x) {
+    double total = (powers - 1) * terms[(powers - 1) * INTEGRALS];
+    for (int n = powers - 2; n >= 1; n--) total = n * terms[n * INTEGRALS] + x * total;
+    return total;
+}
+
 /* The shift at k: value, by theta_1, by slip, by ln k, by n and by the place of the peak, each of
    eight integrals. */
 static void shift_at(Closed *self, double k, double theta_1, double slip, form e,
@@ -179,16 +191,16 @@ static void shift_at(Closed *self, double k, double theta_1, double slip, form e
         for (int p = 0; p < 3; p++) {
             const double *t = self->point[p] + q;
 #define T(part) t[(part) * INTEGRALS]
-            const double along_n = T(6) + ln_k * T(7), along_peak = T(9) + ln_k * T(10);
-            double series = T(LN_K - 1), slope = (LN_K - 1.0) * T(LN_K - 1);
-            for (int power = LN_K - 2; power >= 0; power--) series = T(power) + ln_k * series;
-            out[p][q] = series + n * (along_n + n * T(8)) + peak * (along_peak + peak * T(11));
+            const double along_n = series(t + 6 * INTEGRALS, 3, ln_k);
+            const double along_peak = series(t + 10 * INTEGRALS, 3, ln_k);
+            out[p][q] = series(t, 6, ln_k) + n * (along_n + n * T(9)) +
+                        peak * (along_peak + peak * T(13) + n * T(14));
             if (p == 0) {
-                for (int power = LN_K - 2; power >= 1; power--) slope = power * T(power) + ln_k * slope;
-                out[3][q] = slope + n * T(7) + peak * T(10);
+                out[3][q] = series_slope(t, 6, ln_k) + n * series_slope(t + 6 * INTEGRALS, 3, ln_k) +
+                            peak * series_slope(t + 10 * INTEGRALS, 3, ln_k);
                 if (ln_k != far) out[3][q] = 0.0 * out[3][q];
-                out[4][q] = along_n + (2.0 * n) * T(8);
-                out[5][q] = along_peak + (2.0 * peak) * T(11);
+                out[4][q] = along_n + (2.0 * n) * T(9) + peak * T(14);
+                out[5][q] = along_peak + (2.0 * peak) * T(13) + n * T(14);
             }
 #undef T
         }

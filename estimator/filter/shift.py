@@ -8,8 +8,8 @@ therefore eight functions of θ₁ and i for a soil of given k and n and a stres
 c₂. They are tabulated once, as Chebyshev polynomials, with what changes when ln k, n and the place
 λ = θₘ/θ₁ of the peak do:
 
-    Δ = Δ₀ + κ (Δ₁ + κ (Δ₂ + κ (Δ₃ + κ (Δ₄ + κ Δ₅)))) + ν (Δ₆ + κ Δ₇ + ν Δ₈)
-        + μ (Δ₉ + κ Δ₁₀ + μ Δ₁₁)
+    Δ = Δ₀ + κ (Δ₁ + κ (Δ₂ + κ (Δ₃ + κ (Δ₄ + κ Δ₅)))) + ν (Δ₆ + κ (Δ₇ + κ Δ₈) + ν Δ₉)
+        + μ (Δ₁₀ + κ (Δ₁₁ + κ Δ₁₂) + μ Δ₁₃ + ν Δ₁₄)
 
 κ, ν, μ: ln k, n and λ less those of the prior. The filter stays exact in c, tan φ and W, and the
 triangles in k and λ too.
@@ -41,16 +41,16 @@ SLIP = (-0.1, 1.0)
 NODES = (14, 20)  # of θ₁ and i
 DEGREE = (9, 13)
 # of ln k, n and λ, between which a polynomial stands for the shift: about what priors leave open
-STEP_LN_K, STEP_N, STEP_PEAK = 0.3, 0.15, 0.07
+STEP_LN_K, STEP_N, STEP_PEAK = 0.6, 0.15, 0.07
 FARTHEST = 1.0  # of ln k: beyond it the shift stays as it is
-POWERS = 6  # of ln k
+POWERS, SLOPE = 6, 3  # of ln k: of the shift, and of its slope by n or λ
 QUANTUM = 2.0**-30  # of a coefficient; the largest is about 0.2, and the table is good to 1e-4
 # evaluated points: all stretches of the filter's memory, and the windows since they were last used
 REMEMBERED = 256
 ORDER = 24  # quadrature nodes in each zone
 PEAK = 0.999  # of θₘ/θ₁: at the entry itself σₘ says nothing of the modulus
 INTEGRALS = len(Integrals._fields)
-PARTS = POWERS + 6  # Δ₀ … Δ₁₁
+PARTS = POWERS + 2 * (SLOPE + 1) + 1  # Δ₀ … Δ₁₄
 
 Vector = tuple[float, ...]
 
@@ -80,7 +80,7 @@ class IntegralShift:
             return _shift(moved, varied, ordered, share, theta_1, slip)
 
         coefficients = _fitted(np.concatenate(_parts(shift)))
-        # (DEGREE[0] + 1, DEGREE[1] + 1, 96)
+        # (DEGREE[0] + 1, DEGREE[1] + 1, 120)
         self.coefficients: Array = np.ascontiguousarray(coefficients.transpose(1, 2, 0))
         self._table = lru_cache(REMEMBERED)(self._tabulated)  # a window is looked at more than once
 
@@ -100,17 +100,20 @@ class IntegralShift:
         ln_k, peak = min(max(far, -FARTHEST), FARTHEST), c1 + c2 * slip
         t = self._table(theta_1, slip)  # each (3, 8)
 
-        along_n, along_peak = t[6] + ln_k * t[7], t[9] + ln_k * t[10]
+        along_n, along_peak = _power_series(t[6:9], ln_k), _power_series(t[10:13], ln_k)
         value, by_theta_1, by_slip = (
-            _power_series(t[:POWERS], ln_k)
-            + exponent * (along_n + exponent * t[8])
-            + peak * (along_peak + peak * t[11])
+            _power_series(t[:6], ln_k)
+            + exponent * (along_n + exponent * t[9])
+            + peak * (along_peak + peak * t[13] + exponent * t[14])
         )
-        by_n = along_n[0] + (2.0 * exponent) * t[8][0]
-        by_peak = along_peak[0] + (2.0 * peak) * t[11][0]
+        by_n = along_n[0] + (2.0 * exponent) * t[9][0] + peak * t[14][0]
+        by_peak = along_peak[0] + (2.0 * peak) * t[13][0] + exponent * t[14][0]
         by_slip = by_slip + c2 * by_peak
-        slopes = np.arange(1.0, POWERS)[:, None] * t[1:POWERS, 0]
-        by_ln_k = _power_series(slopes, ln_k) + exponent * t[7][0] + peak * t[10][0]
+        by_ln_k = (
+            _slope_of_series(t[:6, 0], ln_k)
+            + exponent * _slope_of_series(t[6:9, 0], ln_k)
+            + peak * _slope_of_series(t[10:13, 0], ln_k)
+        )
         if ln_k != far:
             by_ln_k = 0.0 * by_ln_k
 
@@ -118,7 +121,7 @@ class IntegralShift:
         return Shift(*[Integrals(*row.tolist()) for row in every])
 
     def _tabulated(self, theta_1: float, slip: float) -> Array:
-        """Δ₀ … Δ₁₁ at one point, each with its derivatives by θ₁ and by i: (12, 3, 8)."""
+        """Δ₀ … Δ₁₄ at one point, each with its derivatives by θ₁ and by i: (15, 3, 8)."""
         rows = np.array(_polynomials(*_unit(theta_1, THETA_1), DEGREE[0]))
         columns = np.array(_polynomials(*_unit(slip, SLIP), DEGREE[1]))
 
@@ -131,7 +134,7 @@ class IntegralShift:
 
 
 def _parts(shift: Callable[..., Array]) -> list[Array]:
-    """Δ₀ … Δ₁₁ from the shift so far from the prior."""
+    """Δ₀ … Δ₁₄ from the shift so far from the prior."""
     nodes = [FARTHEST * x for x in _nodes((-1.0, 1.0), POWERS).tolist()]
     parts = _through(nodes, [shift(node) for node in nodes])
     here = shift(0.0)
@@ -141,14 +144,23 @@ def _parts(shift: Callable[..., Array]) -> list[Array]:
             (shift(ln_k, **{name: step}), shift(ln_k, **{name: -step}))
             for ln_k in (-STEP_LN_K, 0.0, STEP_LN_K)
         ]
-        slopes = [(more - less) / (2.0 * step) for more, less in pairs]
+        low, slope, high = [(more - less) / (2.0 * step) for more, less in pairs]
         more, less = pairs[1]
         parts += [
-            slopes[1],
-            (slopes[2] - slopes[0]) / (2.0 * STEP_LN_K),
+            slope,
+            (high - low) / (2.0 * STEP_LN_K),
+            (high - 2.0 * slope + low) / (2.0 * STEP_LN_K**2),
             (more - 2.0 * here + less) / (2.0 * step**2),
         ]
-    return parts
+    return [*parts, _cross(shift)]
+
+
+def _cross(shift: Callable[..., Array]) -> Array:
+    """∂²/∂n∂λ."""
+    n, peak = STEP_N, STEP_PEAK
+    more = shift(0.0, n, peak) - shift(0.0, n, -peak)
+    less = shift(0.0, -n, peak) - shift(0.0, -n, -peak)
+    return (more - less) / (4.0 * n * peak)
 
 
 def _through(nodes: list[float], values: list[Array]) -> list[Array]:
@@ -172,6 +184,11 @@ def _power_series(terms: Array, x: float) -> Array:
     for term in terms[-2::-1]:
         total = term + x * total
     return total
+
+
+def _slope_of_series(terms: Array, x: float) -> Array:
+    """Σ n termₙ xⁿ⁻¹; terms (n, 8)."""
+    return _power_series(np.arange(1.0, len(terms))[:, None] * terms[1:], x)
 
 
 def true_integrals(

@@ -186,7 +186,7 @@ def test_what_is_no_vector_is_refused(arguments):
 
 
 def test_a_table_of_another_size_is_refused():
-    with pytest.raises(ValueError, match="10 x 14 x 96"):
+    with pytest.raises(ValueError, match="10 x 14 x 120"):
         arithmetic.Closed(tuple, (0.1, 0.1, 0.5, 0.0), 0.0, (0.0, 1.0), (0.0, 1.0), b"12345678")
 
 

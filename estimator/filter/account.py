@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from math import isnan, nan, sqrt
 
-from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate
-from gritd.estimator.filter.measurement import COMPONENTS, Measurement, soil
+from gritd.estimator.filter.estimate import KPA, LN_K, TAN_PHI, C, Estimate, soil
+from gritd.estimator.filter.measurement import COMPONENTS, Measurement
 from gritd.estimator.filter.track import TrackState
 from gritd.estimator.filter.tracker import Account
 from gritd.estimator.messages.tick import (

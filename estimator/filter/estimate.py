@@ -10,6 +10,7 @@ condition do not claim more than the errors they share allow.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import exp
 from struct import Struct
 from typing import NamedTuple
 
@@ -126,6 +127,12 @@ def plain_mixed(members: Sequence[Estimate], weights: Sequence[float]) -> Estima
         off = np.array(estimate.x) - x
         P = P + weight * (covariance(estimate) + off[:, None] * off)
     return made(tuple(x.tolist()), P)
+
+
+def soil(estimate: Estimate) -> tuple[float, float, float]:
+    """c [Pa], tan φ [-], k [m] of a state."""
+    c, tan_phi, ln_k = estimate.x[:STATES]
+    return c * KPA, tan_phi, exp(ln_k)
 
 
 def dot(a: Vector, b: Vector) -> float:

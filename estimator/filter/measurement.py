@@ -5,7 +5,7 @@ what is predicted.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, isnan, sqrt
+from math import isnan, sqrt
 from operator import mul
 
 import numpy as np
@@ -21,8 +21,10 @@ from gritd.estimator.filter.estimate import (
     Update,
     Vector,
     dot,
+    soil,
     variance,
 )
+from gritd.estimator.filter.felt import by_estimate, effects_added, raised, soil_here, with_added
 from gritd.estimator.filter.model import FormError, Prediction, Quantity, WheelModel
 from gritd.estimator.filter.nuisance import (
     EXPONENT,
@@ -34,14 +36,13 @@ from gritd.estimator.filter.nuisance import (
 from gritd.estimator.filter.tuning import FORM
 from gritd.estimator.stages.situation import Recall
 from gritd.estimator.terramechanics.soil import Array
-from gritd.estimator.wheel.chain import Added, Chain, Context, Here, variants
+from gritd.estimator.wheel.chain import Chain, Context, variants
 from gritd.estimator.wheel.form import NAME, FormHere, Three
 from gritd.estimator.wheel.sync import Snapshot
 from gritd.estimator.wheel.wheel_state import WheelState, wheel_state, wheeling
 
 COMPONENTS = ("torque", "drawbar_pull")  # what the filter is offered, in this order
 
-ADDED_STEP = 1e-3  # relative, for the slope of what effects add
 Columns = tuple[tuple[float, float], ...]  # of G, for (T, DP)
 
 
@@ -289,7 +290,7 @@ class Measurement:
             return now
 
         rim = self._predicted(model, estimate, now)
-        return now._replace(added=_added(chain, now, rim, soil(estimate)))
+        return now._replace(added=effects_added(chain, now, rim, soil(estimate)))
 
     def _predicted(self, model: WheelModel, estimate: Estimate, now: WheelState) -> Prediction:
         """T, DP and resistance of the rim in the soil under this window, and what effects add,
@@ -303,85 +304,19 @@ class Measurement:
         if now.here is not None:
             here = now.here
             prediction = Prediction(
-                *(_by_estimate(quantity, estimate, here) for quantity in prediction)
+                *(by_estimate(quantity, estimate, here) for quantity in prediction)
             )
 
         if now.form is not None:
             torque, pull, _ = now.form.mean
             prediction = prediction._replace(
-                torque=_raised(prediction.torque, torque),
-                drawbar_pull=_raised(prediction.drawbar_pull, pull),
+                torque=raised(prediction.torque, torque),
+                drawbar_pull=raised(prediction.drawbar_pull, pull),
             )
 
         if now.added is None:
             return prediction
-        return _with_added(prediction, now.added, estimate)
-
-
-def soil(estimate: Estimate) -> tuple[float, float, float]:
-    """c [Pa], tan φ [-], k [m] of a state."""
-    c, tan_phi, ln_k = estimate.x[:STATES]
-    return c * KPA, tan_phi, exp(ln_k)
-
-
-def soil_here(estimate: Estimate, here: Here) -> tuple[float, float, float]:
-    """c [Pa], tan φ [-], k [m] under this window."""
-    c, tan_phi, k = soil(estimate)
-    return (
-        here.c_slope * c + here.c_offset,
-        here.tan_phi_slope * tan_phi + here.tan_phi_offset,
-        here.k_slope * k + here.k_offset,
-    )
-
-
-def _added(chain: Chain, now: WheelState, rim: Prediction, x: tuple[float, float, float]) -> Added:
-    """What the effects add to the rim's torque and pull, with its slope along x = (c, tan φ, k)."""
-
-    def added(x: tuple[float, float, float], torque: float, pull: float) -> tuple[float, float]:
-        assert now.situation is not None
-        felt = chain.felt(now.situation, torque, pull, x)
-        return felt[0] - torque, felt[1] - pull
-
-    torque, pull = rim.torque, rim.drawbar_pull
-    here = added(x, torque.value, pull.value)
-    slopes = []
-    for place, name in enumerate(("by_c", "by_tan_phi", "by_ln_k")):
-        step = ADDED_STEP * x[place] or ADDED_STEP
-        scale = step / x[place] if name == "by_ln_k" else step
-        c, tan_phi, k = (value + step if at == place else value for at, value in enumerate(x))
-        there = added(
-            (c, tan_phi, k),
-            torque.value + scale * getattr(torque, name),
-            pull.value + scale * getattr(pull, name),
-        )
-        slopes.append(((there[0] - here[0]) / step, (there[1] - here[1]) / step))
-    by_torque, by_pull = zip(*slopes, strict=True)
-    return Added._make(
-        (here[0] - dot(by_torque, x), *by_torque, here[1] - dot(by_pull, x), *by_pull)
-    )
-
-
-def _with_added(prediction: Prediction, added: Added, estimate: Estimate) -> Prediction:
-    x = soil(estimate)
-    return prediction._replace(
-        torque=_plus(prediction.torque, added[:4], x),
-        drawbar_pull=_plus(prediction.drawbar_pull, added[4:], x),
-    )
-
-
-def _plus(quantity: Quantity, added: Vector, x: Vector) -> Quantity:
-    """A quantity of the rim with what effects add, linear in x = (c, tan φ, k)."""
-    offset, *slopes = added
-    return quantity._replace(
-        value=quantity.value + offset + dot(tuple(slopes), x),
-        by_c=quantity.by_c + slopes[0],
-        by_tan_phi=quantity.by_tan_phi + slopes[1],
-        by_ln_k=quantity.by_ln_k + slopes[2] * x[2],
-    )
-
-
-def _raised(quantity: Quantity, value: float) -> Quantity:
-    return quantity._replace(value=quantity.value + value)
+        return with_added(prediction, now.added, estimate)
 
 
 def directions_of(settings: Settings) -> int:
@@ -411,18 +346,6 @@ def _plus_rest(noise: Matrix, rest: tuple[Vector, Vector], lasting: float) -> Ma
     torque, pull = rest
     b += lasting * torque[1] * pull[1]
     return (a + lasting * dot(torque, torque), b), (b, d + lasting * dot(pull, pull))
-
-
-def _by_estimate(quantity: Quantity, estimate: Estimate, here: Here) -> Quantity:
-    """Gradient with respect to the estimated soil, from that with respect to the soil under this
-    window.
-    """
-    k, k_here = soil(estimate)[2], soil_here(estimate, here)[2]
-    return quantity._replace(
-        by_c=quantity.by_c * here.c_slope,
-        by_tan_phi=quantity.by_tan_phi * here.tan_phi_slope,
-        by_ln_k=quantity.by_ln_k * here.k_slope * k / k_here,
-    )
 
 
 def _innovation(now: WheelState, prediction: Prediction) -> tuple[float, float]:

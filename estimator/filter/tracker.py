@@ -25,10 +25,11 @@ from gritd.estimator.filter.estimate import (
     Update,
     Vector,
     made,
+    soil,
     variance,
 )
 from gritd.estimator.filter.learnt_soil import with_learnt_soil
-from gritd.estimator.filter.measurement import Measurement, soil
+from gritd.estimator.filter.measurement import Measurement
 from gritd.estimator.filter.review import Reviewer
 from gritd.estimator.filter.segments import Memory
 from gritd.estimator.filter.smoother import Smoother

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gritd.estimator.config.configuration import Configuration
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.filter.estimate import Estimate
-from gritd.estimator.filter.measurement import soil as soil_of
+from gritd.estimator.filter.estimate import soil as soil_of
 from gritd.estimator.messages.status import UPDATED
 from gritd.estimator.offline.bed_runs import BedRun, bed_runs
 from gritd.estimator.offline.playback import without_absent

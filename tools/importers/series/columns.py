@@ -50,6 +50,7 @@ class SeriesTable:
 
     units: what a row of units, or the file's own description, says of a column; may lack some.
     lines: number of each row in the file (n,), for messages; None where they count from 1.
+    left_out: numbers of the rows that were not read, rising; None where none were.
     notes: what was not read, or what the user should know otherwise, one line each.
     group: what stands with a dot before the name of every column; a file may hold several tables.
     clock: when the rows were taken [ns], shape (n,), NONE where that is not known; None where the
@@ -63,6 +64,7 @@ class SeriesTable:
     notes: tuple[str, ...] = ()
     group: str = ""
     clock: Nanoseconds | None = None
+    left_out: NDArray[np.int64] | None = None
 
     @property
     def rows(self) -> int:

@@ -14,17 +14,19 @@ from gritd.estimator.limits import limits, raised
 from gritd.tools.importers.files import LARGEST, RigFileError
 from gritd.tools.importers.series.cells import OddCell
 from gritd.tools.importers.series.columns import SeriesTable, Told, no_column, told_rows
-from gritd.tools.importers.series.dialect import Layout, joined, layout, split
+from gritd.tools.importers.series.dialect import Layout, is_value, joined, layout, split
 from gritd.tools.importers.series.mapping import Mapped
 from gritd.tools.importers.series.text_columns import Builder, Loose, Numbers, Times, Words
 from gritd.tools.importers.series.text_file import TextFile, text_file
-from gritd.tools.importers.series.times import TimeFormatError
+from gritd.tools.importers.series.times import TimeFormatError, is_gap
 
 HEAD = 10  # lines that are looked at, or more
 FIRST = 2000  # rows that tell the last digit of a column
 GUESSED = 1_000_000  # cells that are enough for a proposal
 ZEROS = "zero bytes, as a loss of power leaves them"
 CUT = "cut in the row"
+HEADER = "the header again"
+WORDS = "no number in it"
 Rows = list[list[str]]
 
 
@@ -105,7 +107,8 @@ def _first(form: Layout, lines: Sequence[str]) -> list[tuple[str, ...]]:
         fields = _fields(line, form.separator)
         if len(fields) == form.width:
             rows.append(fields)
-    return list(zip(*rows, strict=True)) or [()] * form.width
+    columns = list(zip(*rows, strict=True))
+    return columns + [()] * (len(form.names) - len(columns))
 
 
 def _all(form: Layout, first: Sequence[Sequence[str]]) -> Iterator[tuple[str, int]]:
@@ -135,6 +138,7 @@ class _Table:
     def __init__(self, path: Path, form: Layout, columns: dict[tuple[str, int], Builder]) -> None:
         self._path, self._form, self._columns = path, form, columns
         self._plain = [at for (_, at), made in columns.items() if isinstance(made, Numbers)]
+        self._places = [at for _, at in columns]
         self._needed = max((at for _, at in columns), default=0) + 1
         self._lines: list[NDArray[np.int64]] = []
         self._left_out: dict[str, list[int]] = {}
@@ -171,8 +175,19 @@ class _Table:
             f"{self._path.name}: left out {told_rows(rows)}: {reason}"
             for reason, rows in self._left_out.items()
         ]
-        lines = np.concatenate(self._lines)
-        return SeriesTable(self._path, columns, self._form.units, lines, tuple(notes + why))
+        return SeriesTable(
+            self._path,
+            columns,
+            self._form.units,
+            np.concatenate(self._lines),
+            tuple(notes + why),
+            left_out=self._rows_left_out(),
+        )
+
+    def _rows_left_out(self) -> NDArray[np.int64]:
+        """Numbers (n,) of the lines that were rows."""
+        rows = [each for why, each in self._left_out.items() if why not in (HEADER, WORDS)]
+        return np.array(sorted(number for each in rows for number in each), dtype=np.int64)
 
     # --- blocks ---
 
@@ -259,8 +274,9 @@ class _Table:
         if any(cell.strip() for cell in fields[len(self._form.names) :]):
             return f"more than {self._form.width} fields"
         if self._form.header and _stripped(fields) == _stripped(self._form.header):
-            return "the header again"
-        return None
+            return HEADER
+        cells = [fields[at].strip() for at in self._places]
+        return None if any(map(is_value, cells)) or all(map(is_gap, cells)) else WORDS
 
     def _last(self, line: str, number: int, before: Sequence[str], cut: bool) -> None:
         """The last line, where no end of a line follows: it may be cut in a row or in a number,

@@ -16,7 +16,7 @@ from gritd.tools.importers.series.cells import NUMBER, number
 from gritd.tools.importers.series.mapping import spelled
 from gritd.tools.importers.series.times import FORMS, is_gap
 
-SEPARATORS = ("\t", ";", ",", " ")  # the last: any number of blanks and tabs
+SEPARATORS = ("\t", ";", "|", ",", " ")  # the last: any number of blanks and tabs
 COMMENT = re.compile(r"\s*(?:[#%]+|//)\s*")
 LAST = 20  # rows at the end of the beginning that tell how the table is written
 SHARE = 0.6  # of these with the usual number of fields
@@ -71,14 +71,14 @@ def layout(path: Path, lines: Sequence[str], wanted: Collection[str] = ()) -> La
     """The form of a table, from its first lines; `wanted` are names that its header may have.
     Raises RigFileError.
     """
-    separator, rows = _separator(path, lines)
+    asked = {name for name in wanted if not PLACE.fullmatch(name)}
+    separator, rows = _separator(path, lines, asked)
     width, numeric = len(rows[0]), _numeric(rows)
     parted = (_fields(line, separator) for line in lines)
     start = next((at for at, row in enumerate(parted) if _is_row(row, width, numeric)), None)
     if start is None:
         raise _no_rows(path, lines)
 
-    asked = {name for name in wanted if not PLACE.fullmatch(name)}
     place = _header(lines, separator, start, width, asked)
     if place is None:
         return Layout(separator, ("",) * width, width, start, {}, ())
@@ -87,8 +87,8 @@ def layout(path: Path, lines: Sequence[str], wanted: Collection[str] = ()) -> La
     if len(names) == width - 1 and any(row[-1] for row in rows):
         names = ["", *names]  # the rows have numbers or names of their own
     _check_width(path, names, rows)
-    below = next((line for line in lines[place + 1 : start] if line.strip()), "")
-    words = [cell.strip(" []()") for cell in _names(below, separator, width)]
+    below = next((line for line in lines[place + 1 : start] if line.strip("\0 \r\n")), "")
+    words = [cell.strip(" []()") for cell in _names(below, separator, width)] if below else []
     whole = (*names, *[""] * (width - len(names)))
     return Layout(
         separator, whole, width, start, dict(zip(names, words, strict=False)), tuple(names)
@@ -138,15 +138,17 @@ def _is_time(cell: str) -> bool:
 # --- separator ---
 
 
-def _separator(path: Path, lines: Sequence[str]) -> tuple[str, Rows]:
+def _separator(path: Path, lines: Sequence[str], wanted: set[str]) -> tuple[str, Rows]:
     """The separator that parts the last lines into most values, and these rows, which have as many
-    fields as each other. Raises RigFileError.
+    fields as each other; first of those that part a header with the wanted names. Raises
+    RigFileError.
     """
+    options = _of_header(lines, wanted) if len(wanted) > 1 else ()
     last = [line for line in lines if line.strip("\0 \r\n\t") and "\0" not in line][-LAST - 1 :]
     last = last[:-1] if len(last) > 2 else last  # may be cut
     last = last[-max(len(last) // 2, 1) :]  # a short file has its header in the other half
     found = []
-    for separator in SEPARATORS:
+    for separator in options or SEPARATORS:
         rows = [_fields(line, separator) for line in last]
         width, count = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2 or count < SHARE * len(rows):
@@ -162,6 +164,16 @@ def _separator(path: Path, lines: Sequence[str]) -> tuple[str, Rows]:
         )
     _, separator, rows = max(found, key=lambda each: each[0])
     return separator, rows
+
+
+def _of_header(lines: Sequence[str], wanted: set[str]) -> list[str]:
+    """The separators that part one of the first lines into the wanted names."""
+    first = lines[:FARTHEST]
+    return [
+        separator
+        for separator in SEPARATORS
+        if any(wanted <= set(_names(line, separator, 0)) for line in first)
+    ]
 
 
 def _sense(cell: str) -> float:
@@ -191,7 +203,9 @@ def _is_row(row: Sequence[str], width: int, numeric: Sequence[int]) -> bool:
 
 def _no_rows(path: Path, lines: Sequence[str]) -> RigFileError:
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return RigFileError(f"{path}: found no rows of numbers; expected data under {last[:80]!r}")
+    return RigFileError(
+        f"{path}: found no rows of numbers; expected some; the last line is {last[:80]!r}"
+    )
 
 
 # --- header ---

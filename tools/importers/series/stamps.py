@@ -83,7 +83,7 @@ def instants(table: SeriesTable, mapped: SeriesMap) -> Nanoseconds:
     times = [column.instants for column in told if column.instants is not None]
     if mapped.rate is not None:
         begin = sum(int(each[each != NONE][:1].sum()) for each in times)
-        return begin + np.round(np.arange(table.rows) * (NS / mapped.rate)).astype(np.int64)
+        return begin + np.round(_places(table) * (NS / mapped.rate)).astype(np.int64)
 
     known = np.all([each != NONE for each in times], axis=0)
     total = np.where(known, sum(times), NONE)
@@ -91,6 +91,14 @@ def instants(table: SeriesTable, mapped: SeriesMap) -> Nanoseconds:
     if one_day and (period := told[-1].period or _counter(total[known], mapped)):
         total[known] = unwrapped(total[known], period)
     return total
+
+
+def _places(table: SeriesTable) -> NDArray[np.int64]:
+    """Which row each is (n,), counted from 0 with those that were left out."""
+    rows = np.arange(table.rows)
+    if table.left_out is None or table.lines is None:
+        return rows
+    return np.asarray(rows + np.searchsorted(table.left_out, table.lines))
 
 
 def _counter(times: Nanoseconds, mapped: SeriesMap) -> int:

@@ -154,8 +154,8 @@ def clock(words: Sequence[str], order: str = "") -> Clock:
     form = next((name for name, form in FORMS.items() if form.fullmatch(known[0])), None)
     if form is None:
         raise TimeFormatError(
-            f"found {known[0][:SHOWN]!r}; "
-            "expected a date such as 2026-11-22T14:03:05.250 or a time such as 14:03:05.250"
+            f"found {known[0][:SHOWN]!r}; expected a date such as 2026-11-22T14:03:05.250 or a "
+            "time such as 14:03:05.250; numbers need their unit in the map"
         )
     if form != "numbered":
         return Clock(form)

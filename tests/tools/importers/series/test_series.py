@@ -190,6 +190,18 @@ def test_a_counter_that_begins_again_goes_on(
     assert len(stamps) == 250 and set(np.diff(stamps)) == {20_000_000}
 
 
+def test_a_row_that_is_left_out_keeps_its_time(tmp_path: Path) -> None:
+    """Where the rows are counted, the ones behind it are not earlier for it."""
+    lines = table(tmp_path).read_text().splitlines()
+    lines[100] = "1.98,10.0"
+    lines[150:150] = ["# a remark, of three, fields, "]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    text = MAP.replace("  t: {channel: time, unit: s}\n", "") + "rate: 50 Hz\n"
+    output = imported(tmp_path, tmp_path / "run.csv", text=text)
+    stamps = read(output / "run.mcap").arrays("/raw/wheel_encoder")["stamp"]
+    assert stamps[-1] - stamps[0] == 249 * 20_000_000 and len(stamps) == 249
+
+
 def test_a_time_that_falls_all_the_way_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(CommandError, match="249 times that fall, the first at row 3"):
         stamps_of(tmp_path, [f"{9.0 - 2 * at}" for at in range(250)], "{channel: time, unit: s}")

@@ -70,6 +70,8 @@ QUOTED = [(f'"{t}"', rpm, v, '"a, ""b"";\tc\nd"') for t, rpm, v in ROWS]
 DIALECTS = {
     "semicolons": text(";"),
     "tabs": text("\t"),
+    "bars": text("|"),
+    "a spreadsheet's word on its separator": "sep=;\n" + text(";"),
     "blanks": text(" "),
     "columns of one width": "".join(
         "".join(f"{cell:>12}" for cell in row) + "\n" for row in [("t", "rpm", "v"), *ROWS]
@@ -182,6 +184,12 @@ LEFT_OUT = {
     "too few fields": (text(rows=changed(20, "0.40", "1")), [20], "row 22"),
     "too many fields": (text(rows=changed(20, *ROWS[20], "1", "2")), [20], "row 22"),
     "the header again": (text(rows=[*ROWS[:50], ("t", "rpm", "v"), *ROWS[50:]]), [], "row 52"),
+    "the header of another log": (
+        text(rows=[*ROWS[:50], ("x", "y", "z"), *ROWS[50:]]),
+        [],
+        "row 52",
+    ),
+    "a remark": (text(rows=[*ROWS[:50], ("# stopped", " operator", ""), *ROWS[50:]]), [], "row 52"),
     "a field without end": (
         text(header="t,rpm,v,x", rows=changed(5, *ROWS[5], '"' + "x" * 150_000 + '"')),
         [5],

@@ -124,3 +124,51 @@ def test_a_missing_library_is_named(
     extra = "mdf" if ending == "mf4" else "formats"
     assert str(path) in str(error.value) and f"pip install 'gritd[{extra}]'" in str(error.value)
     assert error.value.code == 2
+
+
+def test_a_bag_without_definitions_takes_the_package_beside_it(tmp_path: Path) -> None:
+    """As ROS 2 wrote bags before it wrote definitions into them."""
+    import sqlite3
+
+    pytest.importorskip("rosbags")
+    path, own = tmp_path / "run.db3", tmp_path / "bench_msgs" / "msg"
+    writers.db3(path)
+    with sqlite3.connect(path) as database:
+        database.execute("DROP TABLE message_definitions")
+        database.execute("UPDATE schema SET schema_version = 3")
+    database.close()
+
+    text = map_of(TOPICS)
+    with pytest.raises(CommandError) as error:
+        imported(path, text)
+    assert "/drive" in str(error.value) and "bench_msgs/msg/WheelState.msg" in str(error.value)
+
+    own.mkdir(parents=True)
+    state, drive = writers.WHEEL_STATE.split("=" * 80 + "\nMSG: bench_msgs/Drive\n")
+    (own / "WheelState.msg").write_text(state)
+    (own / "Drive.msg").write_text(drive)
+    recording = read(imported(path, text) / "run.mcap")
+    assert len(recording.arrays("/raw/wheel_encoder")) == writers.ROWS
+
+
+def test_a_field_that_is_not_there_is_named_with_the_nearest(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    writers.mcap(tmp_path / "run.mcap")
+    with pytest.raises(CommandError) as error:
+        imported(tmp_path / "run.mcap", map_of(TOPICS).replace("travel[1]", "travl[1]"))
+    line = str(error.value)
+    assert "/drive.travl[1]" in line and "did you mean /drive.travel" in line and len(line) < 300
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_log_times_of_zero_are_no_times(
+    tmp_path: Path, stamped: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Headers, or the time of publishing, tell when a message was measured; the import says so."""
+    pytest.importorskip("rosbags")
+    path = tmp_path / "run.mcap"
+    writers.mcap_json(path, logged=False, stamped=stamped)
+    recording = read(imported(path, map_of(TOPICS)) / "run.mcap")
+    stamps = recording.arrays("/raw/wheel_encoder")["stamp"]
+    assert stamps[0] == writers.START and len(stamps) == writers.ROWS
+    assert "log times are no times" in capsys.readouterr().out

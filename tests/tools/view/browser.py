@@ -22,7 +22,7 @@ OPTIONS = (
     "--disable-sync", "--disable-background-networking", "--disable-component-update",
     "--hide-scrollbars", "--remote-debugging-pipe", "about:blank",
 )  # fmt: skip
-PATIENCE = 60.0  # [s]
+PATIENCE = 180.0  # [s]
 
 
 class Browser:

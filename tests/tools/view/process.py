@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from urllib.request import Request, urlopen
 
+PATIENCE = 180.0  # [s] with a computer that others keep busy
+
 
 @contextmanager
 def viewing(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
@@ -29,12 +31,12 @@ def place(address: str) -> tuple[str, int]:
 
 
 def asks(address: str, path: str = "") -> int:
-    with urlopen(Request(address + path), timeout=30.0) as answer:
+    with urlopen(Request(address + path), timeout=PATIENCE) as answer:
         return int(answer.status)
 
 
 def answers(address: str) -> bool:
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         try:
             return asks(address) == 200

@@ -18,7 +18,7 @@ from gritd.tools.view.feed import Feed
 from tests.tools.view.samples import TICK, daemon, report
 
 Frames = Queue[dict[str, Any]]
-LONG = 30.0  # [s] ends a test that has failed
+LONG = 180.0  # [s] ends a test that has failed
 
 
 @pytest.fixture

@@ -158,22 +158,28 @@ export class Chart {
   resize() { this.plot.setSize({width: Math.max(this.box.clientWidth, 200), height: HEIGHT}); }
 }
 
-// Of a series what is in sight, sorted.
-const sorted = (u, at) => {
-  const [from, to] = u.series[0].idxs || [0, -1];
-  return (u.data[at] || []).slice(from, to + 1).filter(v => v !== null && v !== undefined).sort((a, b) => a - b);
+// Least and greatest of what is in sight of a series; without its outermost share, of about 200 of its values.
+const extent = (u, at, share) => {
+  const [from, to] = u.series[0].idxs || [0, -1], values = u.data[at] || [], some = [];
+  const step = share ? Math.max(1, Math.floor((to - from) / 200)) : 1;
+  let low = Infinity, high = -Infinity;
+  for (let i = from; to >= i; i += step) {
+    const value = values[i];
+    if (value === null || value === undefined) continue;
+    if (share) some.push(value);
+    else { low = Math.min(low, value); high = Math.max(high, value); }
+  }
+  if (!share || some.length === 0) return [low, high];
+  some.sort((a, b) => a - b);
+  const cut = Math.floor(share * some.length);
+  return [some[cut], some[some.length - 1 - cut]];
 };
 
 // All of every line, of a band's edges all but the outermost: a σ that nothing is known of at a start would hide the rest.
 // A margin, and never a range so small that noise of the last digit fills the picture.
 const ranged = u => {
-  let low = Infinity, high = -Infinity;
-  for (let i = 1; u.series.length > i; i++) {
-    const values = sorted(u, i), cut = u.series[i].width === 0 ? Math.floor(0.05 * values.length) : 0;
-    if (values.length === 0) continue;
-    low = Math.min(low, values[cut]);
-    high = Math.max(high, values[values.length - 1 - cut]);
-  }
+  const extents = u.series.slice(1).map((series, i) => extent(u, i + 1, series.width === 0 ? 0.05 : 0));
+  const low = Math.min(...extents.map(e => e[0])), high = Math.max(...extents.map(e => e[1]));
   if (!Number.isFinite(low)) return [0, 1];
   const room = Math.max(high - low, 1e-3 * Math.abs(high), 1e-9), middle = (low + high) / 2;
   return [middle - 0.6 * room, middle + 0.6 * room];

@@ -11,7 +11,7 @@ const RENEW = 900; // rows appended before the curves are asked for anew
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
 const page = {about: null, charts: [], curves: new Curves(), events: [], frame: null, prior: null,
-  window: WINDOWS[0], held: null, marks: -1, answered: 0, frames: 0, told: 0, drawn: 0, labelled: 0};
+  window: WINDOWS[0], held: null, marks: -1, answered: 0, frames: 0, told: 0, drawn: 0, took: 0, labelled: 0};
 
 const span = () => page.held || [(page.curves.last || 0) - page.window, page.curves.last || 1];
 const utc = t => new Date(t * 1e3).toISOString().slice(11, 19);
@@ -95,8 +95,8 @@ const wire = () => {
 
 const draw = () => {
   const now = performance.now();
-  const slow = page.window > 300 ? 1000 : still.matches ? 1000 : 90; // [ms] a wide window moves slowly
-  if (now - page.drawn < slow) return;
+  const slow = page.window > 300 || still.matches ? 1000 : 90; // [ms] a wide window moves slowly
+  if (now - page.drawn < Math.max(slow, 4 * page.took)) return; // a slow computer has time for other things
   page.drawn = now;
   if (page.curves.time.length) page.charts.forEach(chart => chart.draw(page.curves));
   if (page.frame) {
@@ -104,6 +104,7 @@ const draw = () => {
     wheel(byId("wheel"), byId("wheel-told"), page.frame.rim);
   }
   const [from, to] = span();
+  page.took = performance.now() - now;
   byId("span").textContent = page.curves.time.length ? `${utc(from)} to ${utc(to)} UTC` : "";
 };
 

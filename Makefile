@@ -30,7 +30,7 @@ demo: $(READY) ## the daemon against the simulated testbed on real wires, 60 s
 test: $(READY) ## the tests, without the slow ones
 	@$(BIN)/python -m pytest --quiet -n 3
 
-tutorial: $(READY) ## the first day and the notebooks of docs/first-day, word for word
+tutorial: $(READY) ## the pages and notebooks of docs/first-day and docs/your-data, word for word
 	@$(BIN)/python -m pytest --quiet -m "slow or not slow" tests/docs
 
 slow: $(READY) ## the slow tests

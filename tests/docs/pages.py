@@ -11,7 +11,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-FIRST_DAY = Path(__file__).parents[2] / "docs" / "first-day"
+DOCS = Path(__file__).parents[2] / "docs"
+FIRST_DAY, YOUR_DATA = DOCS / "first-day", DOCS / "your-data"
 COMMANDS = re.compile(r"^```sh\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
@@ -21,9 +22,9 @@ def commands(page: Path) -> list[str]:
     return [line for block in blocks for line in block.splitlines() if line]
 
 
-def laid_out(folder: Path) -> Path:
-    """An empty folder with the files that the page says to copy."""
-    for file in [*FIRST_DAY.glob("*.py"), *FIRST_DAY.glob("*.yaml")]:
+def laid_out(folder: Path, page: Path = FIRST_DAY) -> Path:
+    """An empty folder with the files that the page in folder `page` says to copy."""
+    for file in [*page.glob("*.py"), *page.glob("*.yaml")]:
         shutil.copy(file, folder)
     return folder
 

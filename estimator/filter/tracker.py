@@ -183,7 +183,9 @@ class Tracker:
         """When the review is complete, what the innovations of its window say of the estimate."""
         if state.task is not None or state.withheld is None:
             return state
-        trust = state.trust.surprised(*state.withheld, self.measurement.components[0])
+        aids, elapsed = state.withheld
+        first = self.measurement.components[0]
+        trust = state.trust.surprised(aids, elapsed / _memory(state), first)
         return self._doubting(self._set_back(state._replace(trust=trust, withheld=None)))
 
     def _doubting(self, state: TrackState) -> TrackState:
@@ -293,7 +295,9 @@ class Tracker:
             columns=now.columns,
             memory=memory,
             unlinearised=state.unlinearised + 1,
-            trust=trust if task else trust.surprised(aids, elapsed, self.measurement.components[0]),
+            trust=trust
+            if task
+            else trust.surprised(aids, elapsed / _memory(state), self.measurement.components[0]),
             updates=state.updates + bool(taken),
             task=task,
             withheld=None if task is None else Withheld(aids, elapsed),
@@ -375,7 +379,12 @@ class Tracker:
 
 def _experienced(state: TrackState) -> float:
     """Half of what the memory of innovations holds of one component."""
-    return 0.5 * TRUST.memory * NS / state.window
+    return 0.5 * _memory(state) * NS / state.window
+
+
+def _memory(state: TrackState) -> float:
+    """[s] over which innovations are averaged."""
+    return max(TRUST.memory, TRUST.windows * state.window / NS)
 
 
 def _context(state: TrackState, snapshot: Snapshot, elapsed: float) -> Context:

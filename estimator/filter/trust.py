@@ -49,9 +49,11 @@ class Trust(NamedTuple):
             changes=self.changes * exp(-elapsed / TRUST.restless_memory),
         )
 
-    def surprised(self, aids: Sequence[Aid], elapsed: float, first: int = 0) -> Trust:
-        """With the innovations of one more window; first: 1 where the torque is not measured."""
-        keep = exp(-elapsed / TRUST.memory)
+    def surprised(self, aids: Sequence[Aid], passed: float, first: int = 0) -> Trust:
+        """With the innovations of one more window; passed: the time since the last one, as a share
+        of the memory; first: 1 where the torque is not measured.
+        """
+        keep = exp(-passed)
         squares = [min(aid.innovation**2 / aid.s, TRUST.most) for aid in aids]
         both = (*(0.0,) * first, *squares, 0.0)[: len(self.surprise)]
         surprise = tuple([keep * a + b for a, b in zip(self.surprise, both, strict=True)])
@@ -76,7 +78,8 @@ class Trust(NamedTuple):
     @property
     def doubt(self) -> float:
         """By how much the prior's σ is thought too small."""
-        return TRUST.doubt ** min(self.streak, TRUST.widest) if self.relapsing else 1.0
+        times = min(max(self.streak - 1, self.doubts), TRUST.widest)
+        return TRUST.doubt**times if self.relapsing else 1.0
 
     @property
     def unrest(self) -> float:

@@ -40,6 +40,10 @@ class TrustTuning:
     # [s] over which normalised innovations are averaged. Judgement: a few slips of the wheel.
     memory: float = 2.0
 
+    # Windows over which they are at least: two stretches, for a change of the soil is judged where
+    # a stretch ends.
+    windows: int = 10
+
     # Mean square beyond which model and measurement disagree. A calibration three σ off keeps all
     # innovations on one side, and is no disagreement: 3² of its own.
     mismatch: float = 9.0

@@ -63,7 +63,7 @@ def test_what_was_set_back_again_and_again_has_diverged_until_it_holds():
     trust = Trust()
     for _ in range(TRUST.diverged):
         trust = trust.reset().passed(TRUST.patience + 1.0)
-    assert trust.standing(HALF, 0.3) == Status.DIVERGED and trust.doubt == TRUST.doubt**3
+    assert trust.standing(HALF, 0.3) == Status.DIVERGED and trust.doubt == TRUST.doubt**2
     trust = trust.passed(TRUST.relapse)
     assert trust.standing(HALF, 0.3) == Status.TRACKING and trust.doubt == 1.0
 

@@ -16,8 +16,6 @@ from gritd.estimator.filter.estimate import (
     Estimate,
     Update,
     Vector,
-    covariance,
-    made,
     predict,
 )
 from gritd.estimator.filter.line import Line, line_of
@@ -122,11 +120,7 @@ class Smoother:
         return tuple([doubt * sigma for sigma in self.prior_sigma])
 
     def renewed(self, estimate: Estimate, doubt: float = 1.0) -> Estimate:
-        """Of another soil nothing is known but the prior. What is known of the errors that all
-        windows share stays.
+        """Another soil is the one before, and a change of the prior's size: what change.py weighs.
+        What is known of the errors that all windows share stays.
         """
-        P = covariance(estimate).copy()
-        P[:STATES] = P[:, :STATES] = 0.0
-        for state, sigma in enumerate(self._doubted(doubt)):
-            P[state, state] = sigma * sigma
-        return made((*self._prior, *estimate.x[STATES:]), P, estimate.log_evidence)
+        return predict(estimate, tuple([sigma * sigma for sigma in self._doubted(doubt)]))

@@ -18,8 +18,8 @@ class ChangeTuning:
     alarm: float = 11.2
 
     # Share of the torque by which the closed forms, shifted to the true stresses, may be off in a
-    # stretch: what the table of the shift misses. Judgement.
-    model_error: float = 0.0002
+    # stretch, with what sensors and calibrations add meanwhile. Judgement.
+    model_error: float = 0.001
 
     # [prior σ/√s] random walk of the soil right after a change: a ramp goes on changing. Learnt
     # from ramps of 20 s.

@@ -15,6 +15,7 @@ from gritd.drivers.framing import Framing
 from gritd.drivers.framing_ascii import AsciiFraming
 from gritd.drivers.framing_can import CanFraming
 from gritd.drivers.framing_cobs import CobsFraming
+from gritd.drivers.guarded import made
 from gritd.drivers.link import Clock, Link
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader, Tap
@@ -112,7 +113,7 @@ def _sensor(channel: str, settings: SensorSettings) -> Sensor:
         raise DeviceSettingsError(
             f"channel {channel}", f"no such sensor, expected one of {', '.join(sorted(kinds))}"
         )
-    return kinds[channel](settings)  # type: ignore[arg-type]
+    return made(kinds[channel], settings)
 
 
 def _keys(sensors: list[Sensor]) -> list[str]:

@@ -10,6 +10,7 @@ from gritd.drivers.decoder import Decoder
 from gritd.drivers.errors import DeviceError, one_line
 from gritd.drivers.link import Chunk, Link
 from gritd.drivers.queue import ReadingQueue
+from gritd.estimator.plugins import running
 from gritd.estimator.threads.waiting import wait_until
 
 BACKOFF_FIRST = 0.1  # [s]
@@ -76,6 +77,11 @@ class Reader:
         """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
 
+    @property
+    def inside(self) -> str:
+        """The plug-in that the thread is in just now; '' where it is in none."""
+        return running(self._thread.ident or 0) if self._thread else ""
+
     def start(self) -> None:
         """Start the thread, also again after it ended or died."""
         if self.alive:
@@ -117,7 +123,7 @@ class Reader:
             turns_unknown=sum(sensor.turns_unknown for sensor in sensors),
             readings=self._readings,
             reopened=max(self._opened - 1, 0),
-            hint=self.decoder.framing.hint,
+            hint=next((s.failed for s in sensors if s.failed), self.decoder.framing.hint),
         )
 
     def _run(self) -> None:

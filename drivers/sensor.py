@@ -39,6 +39,7 @@ class Sensor(ABC):
     """One channel's values out of the frames of one device."""
 
     channel: ClassVar[str]  # a key of gritd.estimator.messages.readings.CHANNELS
+    failed = ""  # why it gives no values any more: one of another package that raised
 
     def __init__(self, signal: str) -> None:
         self.keys: tuple[str, ...] = (signal,)  # the frames it wants
@@ -212,7 +213,7 @@ def sensor_kinds() -> dict[str, type[Sensor]]:
 
 def _added(own: Mapping[str, type[Sensor]]) -> dict[str, type[Sensor]]:
     """Sensor kinds of other packages, each named for a channel."""
-    kinds = plugins(SENSORS)
+    kinds = plugins(SENSORS, required=True)  # it stands in the place of a kind of ours
     for name, kind in kinds.items():
         if not (isinstance(kind, type) and issubclass(kind, Sensor)):
             raise refused(SENSORS, name, "found no subclass of Sensor; expected one")

@@ -60,6 +60,9 @@ class ReaderThread(Protocol):
     beats: int  # moves while the thread is not held up
 
     @property
+    def inside(self) -> str: ...
+
+    @property
     def alive(self) -> bool: ...
 
     def start(self) -> None: ...
@@ -99,7 +102,12 @@ class Daemon:
             Pulse("loop", lambda: self.loop.ticks, LOOP_PATIENCE),
             Pulse("writer", lambda: self.writer.beats, WRITER_PATIENCE),
             *(
-                Pulse(f"reader {reader.device}", partial(_beats, reader), READER_PATIENCE)
+                Pulse(
+                    f"reader {reader.device}",
+                    partial(_beats, reader),
+                    READER_PATIENCE,
+                    partial(_inside, reader),
+                )
                 for reader in readers
             ),
         ]
@@ -235,6 +243,10 @@ def _writer(path: Path, configuration: Configuration, run: RunInfo) -> WriterThr
         flush_interval=logging.flush_interval,
         mode=MODES[logging.readable_by],
     )
+
+
+def _inside(reader: ReaderThread) -> str:
+    return reader.inside
 
 
 def _beats(reader: ReaderThread) -> int:

@@ -16,7 +16,7 @@ from dataclasses import fields
 
 from gritd.estimator.effects.base import STAGES, Effect
 from gritd.estimator.plugins import EFFECTS as GROUP
-from gritd.estimator.plugins import plugins, refused
+from gritd.estimator.plugins import PluginError, leave_out, plugins, refused, without
 
 SHARED = ("base", "library")  # modules of this package that are no effect
 
@@ -41,18 +41,26 @@ def _find() -> dict[str, type[Effect]]:
 
 
 def _added(own: Mapping[str, type[Effect]]) -> dict[str, type[Effect]]:
-    """Effects of other packages. Raises PluginError."""
-    effects = plugins(GROUP)
-    for name, effect in effects.items():
-        if not (isinstance(effect, type) and issubclass(effect, Effect)):
-            raise refused(GROUP, name, "found no subclass of Effect; expected one")
-        if effect.name != name:
-            why = f"found the effect {effect.name}; expected {name}, the name of its file"
-            raise refused(GROUP, name, why)
-        if name in own:
-            raise refused(GROUP, name, "found an effect of gritd's own; expected another name")
-
+    """Effects of other packages; without what is none, which is said."""
+    effects = {}
+    for name, effect in plugins(GROUP).items():
+        try:
+            _check(name, effect, own)
+            effects[name] = effect
+        except PluginError as error:
+            leave_out(GROUP, name, error)
     return effects
+
+
+def _check(name: str, effect: object, own: Mapping[str, type[Effect]]) -> None:
+    """Raises PluginError."""
+    if not (isinstance(effect, type) and issubclass(effect, Effect)):
+        raise refused(GROUP, name, "found no subclass of Effect; expected one")
+    if effect.name != name:
+        why = f"found the effect {effect.name}; expected {name}, the name of its file"
+        raise refused(GROUP, name, why)
+    if name in own:
+        raise refused(GROUP, name, "found an effect of gritd's own; expected another name")
 
 
 def make(name: str, values: Mapping[str, float]) -> Effect:
@@ -60,15 +68,17 @@ def make(name: str, values: Mapping[str, float]) -> Effect:
     not exist.
     """
     if name not in EFFECTS:
-        raise ValueError(f"effects: no effect '{name}'; there are {', '.join(EFFECTS)}")
+        known = ", ".join(EFFECTS)
+        raise ValueError(f"effects: no effect '{name}'{without(GROUP, name)}; there are {known}")
 
     effect = EFFECTS[name]
 
-    known = {parameter.name: parameter for parameter in effect.parameters()}
+    parameters = {parameter.name: parameter for parameter in effect.parameters()}
     for key, value in values.items():
-        if key not in known:
-            raise ValueError(f"effects.{name}: no parameter '{key}'; there are {', '.join(known)}")
-        bounds = known[key]
+        if key not in parameters:
+            there = ", ".join(parameters)
+            raise ValueError(f"effects.{name}: no parameter '{key}'; there are {there}")
+        bounds = parameters[key]
         if not bounds.low <= value <= bounds.high:
             raise ValueError(
                 f"effects.{name}.{key}: {value:g} is outside"

@@ -12,8 +12,15 @@ from collections.abc import Callable, Sequence
 class Pulse:
     """A counter that has to move; `patience` is how many looks it may stand still."""
 
-    def __init__(self, name: str, count: Callable[[], int], patience: int) -> None:
-        self.name = name
+    def __init__(
+        self,
+        name: str,
+        count: Callable[[], int],
+        patience: int,
+        inside: Callable[[], str] = str,
+    ) -> None:
+        """inside: what the thread is in just now, said beside its name; '' for nothing special."""
+        self.name, self.inside = name, inside
         self._count, self._patience = count, patience
         self._last = count()
         self._still = 0
@@ -28,4 +35,5 @@ class Pulse:
 
 def silent(pulses: Sequence[Pulse]) -> str:
     """Names of those that stand still; '' while all beat. One look at each."""
-    return ", ".join([pulse.name for pulse in pulses if not pulse.beats()])
+    still = [pulse for pulse in pulses if not pulse.beats()]
+    return ", ".join([" in ".join(filter(None, (p.name, p.inside()))) for p in still])

@@ -42,6 +42,51 @@ class Laser(Analog):
 
     channel = "sinkage_pot"
 '''
+ENDS = "import sys\n\nsys.exit(0)\n"
+HANGS = """
+import time
+
+while True:
+    try:
+        time.sleep(60.0)
+    except ValueError:
+        pass
+"""
+BADARG = IMPORTER.replace('"mylab"', '"badarg"').replace("parser.add", "raise KeyError; parser.add")
+FAILS = """
+NAME, SUMMARY = "fails", "fails"
+
+
+def add_arguments(parser):
+    pass
+
+
+def run(args, tell):
+    if str(args.paths[0]) == "exit":
+        raise SystemExit(0)
+    raise KeyError(7)
+"""
+READING = """
+from gritd.config import packaged
+from gritd.drivers.decoder import Decoder
+from gritd.drivers.framing import Counts, Frame
+from gritd.drivers.guarded import made
+from gritd.drivers.sensor import sensor_kinds
+from gritd.estimator.config.configuration import load
+
+settings = load(packaged()).settings
+sensors = [made(sensor_kinds()[n], settings.channels[n]) for n in ("sinkage_pot", "motor_shunt")]
+
+
+class Once:
+    clock_modulus = staticmethod(lambda key: 2**32)
+    decode = staticmethod(lambda data: [Frame(s.keys[0], None, None, (2.0,)) for s in sensors])
+
+
+for reading in Decoder(Once(), sensors).decode(10**18, b"x"):
+    print(reading.channel)
+print(sensors[0].failed)
+"""
 
 
 @pytest.fixture
@@ -49,6 +94,8 @@ def package(tmp_path: Path) -> Path:
     """A folder like site-packages with one distribution, my-rig."""
     (tmp_path / "my_rig").mkdir()
     files = {"__init__": "", "second": EFFECT, "mylab": IMPORTER, "laser": SENSOR}
+    files |= {"ends": ENDS, "hangs": HANGS, "badarg": BADARG, "fails": FAILS}
+    files |= {"prints": "print('hello')\n" + IMPORTER}
     for name, text in files.items():
         (tmp_path / "my_rig" / f"{name}.py").write_text(text)
     (tmp_path / "my_rig-1.dist-info").mkdir()
@@ -96,21 +143,64 @@ def test_all_three_are_found(package: Path) -> None:
         ("effects", "third = my_rig.nowhere:X", "cannot be loaded: ModuleNotFoundError"),
         ("effects", "third = my_rig.second:Second", "found the effect second; expected third"),
         ("effects", "second = my_rig.mylab", "found no subclass of Effect"),
+        ("effects", "second = my_rig.ends", "ends the program"),
+        ("effects", "second = my_rig.hangs", "takes more than"),
         ("importers", "other = my_rig.mylab", "found the name mylab"),
         ("importers", "mylab = my_rig.laser", "found no NAME"),
-        ("sensors", "wrench = my_rig.laser:Laser", "found the channel sinkage_pot"),
+        ("importers", "badarg = my_rig.badarg", "add_arguments: KeyError"),
     ],
 )
-def test_one_that_is_wrong_is_one_line_with_its_package(
+def test_one_that_is_wrong_is_named_with_its_package_and_left_out(
     package: Path, group: str, line: str, said: str
 ) -> None:
     offer(package, f"[gritd.{group}]\n{line}\n")
-    command = {"effects": ["effects"], "importers": ["import"], "sensors": ["check-config"]}
-    done = python(package, "-m", "gritd", *command[group])
-    assert done.returncode == 2 and done.stdout == ""
+    command = ["effects"] if group == "effects" else ["import", "--help"]
+    done = python(package, "-m", "gritd", *command)
+    own = "bulldozing" if group == "effects" else "cmu"
+    assert done.returncode == 0 and own in done.stdout
     assert done.stderr.startswith(f"gritd: plug-in {line.split()[0]} of gritd.{group}")
     assert "(package my-rig)" in done.stderr and said in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert done.stderr.count("\n") == 1 and len(done.stderr) <= 300
+
+    if group == "effects":
+        assert python(package, "-m", "gritd", "check-config").returncode == 2
+
+
+@pytest.mark.parametrize("module", ["ends", "laser:Nothing", "mylab"])
+def test_a_sensor_that_is_wrong_ends_what_would_read_it(package: Path, module: str) -> None:
+    offer(package, f"[gritd.sensors]\nsinkage_pot = my_rig.{module}\n")
+    done = python(package, "-m", "gritd", "check-config")
+    assert done.returncode == 2 and done.stdout == ""
+    assert "(package my-rig)" in done.stderr and done.stderr.count("\n") == 1
+    assert python(package, "-m", "gritd", "effects").stderr == ""
+
+
+def test_what_an_importer_raises_or_ends_is_in_its_name(package: Path) -> None:
+    offer(package, "[gritd.importers]\nfails = my_rig.fails\n")
+    for word in ("raise", "exit"):
+        done = python(package, "-m", "gritd", "import", "fails", word, "-o", "y")
+        assert done.returncode == 2 and done.stderr.count("\n") == 1
+        assert "plug-in fails of gritd.importers (package my-rig): " in done.stderr
+
+
+def test_what_an_import_prints_is_told_and_does_not_reach_the_output(package: Path) -> None:
+    offer(package, "[gritd.importers]\nmylab = my_rig.prints\n")
+    done = python(package, "-m", "gritd", "import", "--help")
+    assert "mylab" in done.stdout and "hello" not in done.stdout
+    assert "(package my-rig): its import prints 'hello'" in done.stderr
+
+
+@pytest.mark.parametrize("act", ["raise KeyError(1)", "return 'much'", "raise SystemExit(0)"])
+def test_a_sensor_that_fails_is_named_and_the_others_of_its_device_go_on(
+    package: Path, act: str
+) -> None:
+    (package / "my_rig" / "laser.py").write_text(
+        SENSOR + f"\n    def value(self, frame):\n        {act}\n"
+    )
+    offer(package, "[gritd.sensors]\nsinkage_pot = my_rig.laser:Laser\n")
+    read = python(package, "-c", READING).stdout.splitlines()
+    assert read[0] == "motor_shunt" and len(read) == 2
+    assert read[1].startswith("plug-in sinkage_pot of gritd.sensors (package my-rig): ")
 
 
 def test_two_packages_of_one_name_are_refused_not_chosen_from(package: Path) -> None:
@@ -121,4 +211,4 @@ def test_two_packages_of_one_name_are_refused_not_chosen_from(package: Path) -> 
     (other / "entry_points.txt").write_text("[gritd.effects]\nsecond = my_rig.second:Second\n")
     done = python(package, "-m", "gritd", "effects")
     said = "plug-in second of gritd.effects (package my-rig, other-rig): found it twice"
-    assert done.returncode == 2 and said in done.stderr
+    assert "bulldozing" in done.stdout and said in done.stderr

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.estimator.config.yamltree import ConfigError
 from gritd.estimator.limits import LimitsError
-from gritd.estimator.plugins import PluginError
+from gritd.estimator.plugins import PluginError, blamed, in_words
 from gritd.tools.cli import memory
 from gritd.tools.cli.command import DAMAGED, DONE, FAILED, INTERRUPTED, USAGE, CommandError
 
@@ -19,6 +19,7 @@ SETTINGS = (
     LimitsError,
     PluginError,
 )  # what the user set is wrong
+KNOWN = (CommandError, DeviceError, *SETTINGS)  # each is one line for the user
 
 
 def guarded(command: Callable[[], int | None]) -> int:
@@ -31,8 +32,20 @@ def guarded(command: Callable[[], int | None]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return _leave_pipe()
+    except SystemExit as error:
+        if not blamed(error.__traceback__):
+            raise
+        return _fail(_of_plugin(error))
     except Exception as error:
-        return _fail(error)
+        known = isinstance(error, KNOWN) or memory.line(error)
+        return _fail(error if known or not blamed(error.__traceback__) else _of_plugin(error))
+
+
+def _of_plugin(error: BaseException) -> PluginError:
+    """What a plug-in raised, in its name."""
+    named = PluginError(f"{blamed(error.__traceback__)}: {in_words(error)}")
+    named.__cause__ = error
+    return named
 
 
 def _fail(error: Exception) -> int:
@@ -55,7 +68,7 @@ def _one_line(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
         return where + error.strerror.lower()
-    if isinstance(error, (CommandError, DeviceError, OSError, *SETTINGS)):
+    if isinstance(error, (OSError, *KNOWN)):
         return text
     return f"internal error: {type(error).__name__}: {text} (GRITD_TRACEBACK=1 shows where)"
 

@@ -27,6 +27,7 @@ from gritd.estimator.messages.readings import ENCODERS
 from gritd.estimator.offline.streams import RAW
 from gritd.estimator.plausibility.recorded import driven_recording
 from gritd.estimator.plausibility.words import table, warnings
+from gritd.estimator.plugins import left_out
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.estimator.wheel import geometry
 from gritd.tools.cli import files
@@ -80,7 +81,8 @@ def main(argv: Sequence[str]) -> int:
 
     ending = "" if read.ended else "; without a last line '...' it cannot be reloaded"
     sys.stdout.write(f"{arguments.file}: valid{ending}\n\n{summary(read.settings)}")
-    return against(read.settings, arguments.against) if arguments.against else DONE
+    code = against(read.settings, arguments.against) if arguments.against else DONE
+    return USAGE if left_out else code
 
 
 def against(settings: Settings, paths: Sequence[Path]) -> int:

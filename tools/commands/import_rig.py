@@ -9,10 +9,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from gritd.estimator.plugins import (
+    IMPORTERS,
+    PluginError,
+    blamed,
+    in_words,
+    leave_out,
+    left_out,
+    refused,
+)
 from gritd.estimator.recording.mcapfile import RecordingError
 from gritd.tools.cli.command import DONE, Parser
 from gritd.tools.cli.files import unwritten
-from gritd.tools.importers.registry import importers
+from gritd.tools.importers.registry import Importer, importers
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,6 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     written.
     """
     args = _parser().parse_args(argv)
+    if (IMPORTERS, args.rig) in left_out:
+        raise PluginError(left_out[IMPORTERS, args.rig])
     try:
         written = importers()[args.rig].run(args, lambda line: print(line, flush=True))
     except RecordingError as error:
@@ -51,9 +62,21 @@ def _parser() -> argparse.ArgumentParser:
             metavar="OUTDIR",
             help="folder to write into",
         )
-        rig.add_arguments(command)
+        _own_arguments(rig, name, command)
 
     return parser
+
+
+def _own_arguments(rig: Importer, name: str, command: argparse.ArgumentParser) -> None:
+    """Those of the rig; where a plug-in fails at it, its command stays without them, and is
+    refused.
+    """
+    try:
+        rig.add_arguments(command)
+    except (Exception, SystemExit) as error:
+        if not blamed(error.__traceback__):
+            raise
+        leave_out(IMPORTERS, name, refused(IMPORTERS, name, f"add_arguments: {in_words(error)}"))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol, cast
 
-from gritd.estimator.plugins import IMPORTERS, plugins, refused
+from gritd.estimator.plugins import IMPORTERS, PluginError, leave_out, plugins, refused
 from gritd.tools.importers import rigs
 
 Tell = Callable[[str], None]  # takes a line for the user
@@ -36,7 +36,7 @@ class Importer(Protocol):
 
 
 def importers() -> dict[str, Importer]:
-    """Every importer by its name: ours, and those of other packages. Raises PluginError."""
+    """Every importer by its name: ours, and those of other packages."""
     names = sorted(module.name for module in pkgutil.iter_modules(rigs.__path__))
     modules = (cast(Importer, importlib.import_module(f"{rigs.__name__}.{name}")) for name in names)
     own = {module.NAME: module for module in modules}
@@ -44,13 +44,27 @@ def importers() -> dict[str, Importer]:
 
 
 def _added(own: Mapping[str, Importer]) -> dict[str, Importer]:
-    """Importers of other packages: modules like those of `rigs/`."""
-    importers: dict[str, Importer] = plugins(IMPORTERS)
-    for name, importer in importers.items():
-        lacking = [part for part in PARTS if not hasattr(importer, part)]
-        if lacking or name != importer.NAME:
-            why = f"found no {lacking[0]}" if lacking else f"found the name {importer.NAME}"
-            raise refused(IMPORTERS, name, f"{why}; expected {', '.join(PARTS)}, NAME {name!r}")
-        if name in own:
-            raise refused(IMPORTERS, name, "found one of gritd's own; expected another name")
+    """Importers of other packages: modules like those of `rigs/`; without what is none, which is
+    said.
+    """
+    importers: dict[str, Importer] = {}
+    for name, importer in plugins(IMPORTERS).items():
+        try:
+            _check(name, importer, own)
+            importers[name] = importer
+        except PluginError as error:
+            leave_out(IMPORTERS, name, error)
     return importers
+
+
+def _check(name: str, importer: object, own: Mapping[str, Importer]) -> None:
+    """Raises PluginError."""
+    lacking = [part for part in PARTS if not hasattr(importer, part)]
+    if lacking or name != getattr(importer, "NAME", None):
+        found = f"no {lacking[0]}" if lacking else f"the name {getattr(importer, 'NAME', None)}"
+        why = f"found {found}; expected {', '.join(PARTS)}, NAME {name!r}"
+        raise refused(IMPORTERS, name, why)
+    if not isinstance(getattr(importer, "SUMMARY", None), str):
+        raise refused(IMPORTERS, name, "SUMMARY is no text; expected one line")
+    if name in own:
+        raise refused(IMPORTERS, name, "found one of gritd's own; expected another name")

@@ -24,6 +24,8 @@ LIMIT = 600.0  # [s] ends a test that has failed
 
 
 class StandingReader:
+    inside = ""
+
     """A device whose thread lives until it is stopped, or until `unplug`."""
 
     def __init__(self, device="encoders"):

@@ -243,8 +243,8 @@ class Tracker:
         """
         recall = self.measurement.remember(state.recall, elapsed, now, snapshot)
         steady = steady_since(state.steady, now, snapshot) if snapshot.ready else None
-        if steady is None or steady.evaluated == snapshot.evaluated:
-            state = self._let_go(state)
+        if state.steady and steady and not snapshot.stale & self._required:
+            state = state if steady.evaluated < snapshot.evaluated else self._let_go(state)
 
         return state._replace(
             window_end=snapshot.evaluated,

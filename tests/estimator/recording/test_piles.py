@@ -92,8 +92,10 @@ def test_an_intact_recording_is_read_in_piles(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     singly = []
-    one = salvage._Check._block
-    monkeypatch.setattr(salvage._Check, "_block", lambda *given: singly.append(1) or one(*given))
+    one = salvage.RecordingCheck._block
+    monkeypatch.setattr(
+        salvage.RecordingCheck, "_block", lambda *given: singly.append(1) or one(*given)
+    )
     write_sample(tmp_path / "a.mcap", 200, every=4)
     assert read(tmp_path / "a.mcap").complete
     assert not singly, "the index defines every channel"

@@ -189,10 +189,11 @@ class _WavyWall(SideWallRubbing):
         return replace(reaction, drawbar_pull=reaction.drawbar_pull - lost)
 
 
-def test_a_wall_that_is_not_straight_is_a_wall() -> None:
+def test_a_wall_that_is_not_straight_resembles_a_wall() -> None:
+    """Its law would have to be bent by more than a law may be: it is likeliest, and no name."""
     found = diagnosed(plan(seconds=30.0), (_WavyWall(0.12),))
-    assert found.verdict == "explained"
-    assert [h.effect for h in found.hypotheses if h.accepted] == ["side_wall_rubbing"]
+    assert found.hypotheses[0].effect == "side_wall_rubbing"
+    assert "side_wall_rubbing" in found.summary and not found.accepted
 
 
 def test_no_law_says_what_profile_a_hub_has() -> None:

@@ -323,7 +323,7 @@ def _ripples(
     screening: Screening, projection: Projection, projected: Projected, families: list[Family]
 ) -> list[Place]:
     """The strongest order of the wheel angle in each channel beside all smooth functions, against
-    every surrogate's. A ripple in any channel by noise alone is as rare as order_chance.
+    every surrogate's. A ripple in any channel by noise alone is as rare as the level of the screen.
     """
     stack = screening.problem.stack
     orders = orders_shown(stack, TUNING.explain.lowest_order)

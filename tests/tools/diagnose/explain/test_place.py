@@ -138,7 +138,8 @@ def test_a_ripple_by_chance_in_one_of_many_channels_is_none() -> None:
     drawn = plan(seconds=48.0, seed=5)
     screening = prepared(WheelRig(record(drawn, ()), drawn.settings))
     channels = len(screening.problem.stack.rig.channels)
-    with replaced("explain", order_chance=1.0, least_share=0.0, places_listed=99):
+    every = replaced("explain", least_share=0.0, places_listed=99)
+    with every, replaced("screen", level=1.0):
         told = [p for p in locate(screening, screening.base) if p.covariate == "wheel_angle"]
     assert told
     assert [p.q for p in told] == [pytest.approx(min(p.p * channels, 1.0)) for p in told]

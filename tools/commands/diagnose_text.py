@@ -28,7 +28,7 @@ def text(diagnosis: Diagnosis) -> str:
     lines = [
         f"verdict: {diagnosis.verdict}. {diagnosis.summary}",
         *(f"  where: {place.where} (p {place.p:.2g})" for place in diagnosis.location[1:SHOWN]),
-        *(_hypothesis(of, diagnosis) for of in diagnosis.hypotheses[:SHOWN] if _told(of)),
+        *(_hypothesis(of, diagnosis) for of in _shown(diagnosis)),
         *_had(diagnosis.reference),
     ]
     if diagnosis.law is not None:
@@ -44,9 +44,11 @@ def text(diagnosis: Diagnosis) -> str:
     return "\n".join(map(visible, lines))
 
 
-def _told(of: Hypothesis) -> bool:
-    """Whether a hypothesis is accepted, or has a probability in the digits that are printed."""
-    return of.accepted or of.probability >= 0.5 * 10.0**-DIGITS
+def _shown(diagnosis: Diagnosis) -> list[Hypothesis]:
+    """What is accepted, then what has a probability in the digits that are printed."""
+    others = (of for of in diagnosis.hypotheses if not of.accepted)
+    likely = [of for of in others if of.probability >= 0.5 * 10.0**-DIGITS]
+    return [*diagnosis.accepted, *likely][:SHOWN]
 
 
 def _hypothesis(of: Hypothesis, diagnosis: Diagnosis) -> str:

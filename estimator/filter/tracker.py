@@ -42,6 +42,7 @@ from gritd.estimator.wheel.chain import Context
 from gritd.estimator.wheel.sync import Snapshot, window_at_first
 from gritd.estimator.wheel.wheel_state import (
     WheelState,
+    begun_anew,
     classify,
     grain,
     odometry,
@@ -243,8 +244,8 @@ class Tracker:
         """
         recall = self.measurement.remember(state.recall, elapsed, now, snapshot)
         steady = steady_since(state.steady, now, snapshot) if snapshot.ready else None
-        if state.steady and steady and not snapshot.stale & self._required:
-            state = state if steady.evaluated < snapshot.evaluated else self._let_go(state)
+        if begun_anew(state.steady, steady) and not snapshot.stale & self._required:
+            state = self._let_go(state)
 
         return state._replace(
             window_end=snapshot.evaluated,

@@ -291,6 +291,11 @@ def steady_since(before: Steady | None, now: WheelState, snapshot: Snapshot) -> 
     return before._replace(state=with_slip_of(before.state, before.last), last=now)
 
 
+def begun_anew(before: Steady | None, after: Steady | None) -> bool:
+    """Whether one steady motion has ended and another begun."""
+    return before is not None and after is not None and after.evaluated != before.evaluated
+
+
 def with_slip_of(state: WheelState, after: WheelState) -> WheelState:
     """A window with the slip of it and a later one together."""
     if state.odometry is None or after.odometry is None:

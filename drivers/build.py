@@ -7,16 +7,17 @@ from collections.abc import Callable
 import can
 from cantools.database.can import Signal
 
-from gritd.drivers.can_link import CanLink
+from gritd.drivers.can_link import CanLink, port_of
 from gritd.drivers.can_signals import database
 from gritd.drivers.decoder import Decoder
-from gritd.drivers.errors import DeviceSettingsError
+from gritd.drivers.errors import DeviceError, DeviceSettingsError
 from gritd.drivers.framing import Framing
 from gritd.drivers.framing_ascii import AsciiFraming
 from gritd.drivers.framing_can import CanFraming
 from gritd.drivers.framing_cobs import CobsFraming
 from gritd.drivers.guarded import made
 from gritd.drivers.link import Clock, Link
+from gritd.drivers.port_lock import holder_of
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.reader import Reader, Tap
 from gritd.drivers.recorded import Playback
@@ -50,6 +51,14 @@ def build_readers(
         readers.append(Reader(device.name, link, decoder, queue, tap(device.name)))
 
     return readers
+
+
+def check_free(settings: Settings) -> None:
+    """Raise DeviceError where a device's port belongs to another process just now."""
+    for device in used_devices(settings):
+        port = port_of(device)
+        if port and (holder := holder_of(port)):
+            raise DeviceError(device.name, f"{port} is in use by {holder}")
 
 
 def used_devices(settings: Settings) -> list[Device]:

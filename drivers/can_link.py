@@ -4,6 +4,7 @@ such hardware.
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import stat
@@ -18,6 +19,7 @@ from gritd.drivers.errors import DeviceError
 from gritd.drivers.framing_can import ERROR, EXTENDED, HEAD, REMOTE, Accepted, pack
 from gritd.drivers.link import POLL, Chunk, Clock
 from gritd.drivers.port import Port
+from gritd.drivers.port_lock import held
 from gritd.drivers.slcan import LONGEST_LINE, SlcanLines
 from gritd.estimator.config.settings import Device
 
@@ -49,6 +51,7 @@ class CanLink:
         self._filters = filters
         self._clock = clock
         self._bus: can.BusABC | None = None
+        self._lock = -1  # of the port behind the bus
         self._direct: tuple[Port, Decode] | None = None  # past python-can, which is slower
 
     def open(self) -> None:
@@ -60,6 +63,7 @@ class CanLink:
         }
 
         try:
+            self._lock = held(port) if (port := port_of(device)) else -1
             bus = can.Bus(
                 device.channel,
                 device.interface,
@@ -68,6 +72,7 @@ class CanLink:
                 **options,
             )
         except Exception as error:  # every backend has exceptions of its own
+            self._unlock()
             where = f"{device.interface} {device.channel}"
             raise DeviceError(device.name, f"cannot open {where}: {_reason(error)}") from None
 
@@ -128,12 +133,30 @@ class CanLink:
 
     def close(self) -> None:
         bus, self._bus, self._direct = self._bus, None, None
+        self._unlock()
         if bus is None:
             return
         with suppress(Exception):  # a device that is gone cannot be told to stop
             bus.shutdown()
         with suppress(Exception):  # slcan leaves its port open where that failed
             bus.serialPortOrig.close()  # type: ignore[attr-defined]
+
+    def _unlock(self) -> None:
+        lock, self._lock = self._lock, -1
+        if lock >= 0:
+            os.close(lock)
+
+
+def port_of(device: Device) -> str:
+    """The device file that a device has for itself; '' where there is none: a bus of the kernel
+    and a multicast group are for all.
+    """
+    port = device.port if device.kind == "serial" else device.channel.partition("@")[0]
+    shared = device.kind != "serial" and device.interface in ("socketcan", "udp_multicast")
+    with suppress(OSError, ValueError):
+        if not shared and stat.S_ISCHR(os.stat(port).st_mode):
+            return port
+    return ""
 
 
 def packed(message: can.Message) -> bytes:
@@ -191,4 +214,6 @@ def _reason(error: BaseException) -> str:
     while error.__cause__ is not None:
         error = error.__cause__
     number = getattr(error, "errno", None)
+    if number == errno.EWOULDBLOCK:  # a port that is locked: its words name the holder
+        return str(getattr(error, "strerror", error))
     return os.strerror(number) if isinstance(number, int) else str(error) or type(error).__name__

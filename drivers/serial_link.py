@@ -12,6 +12,7 @@ import serial
 from gritd.drivers.errors import DeviceError
 from gritd.drivers.link import POLL, Chunk, Clock
 from gritd.drivers.port import Port
+from gritd.drivers.port_lock import in_use
 
 # what pyserial lets through; SerialException is an OSError
 _FAILURES = (OSError, ValueError, TypeError, termios.error)
@@ -36,7 +37,9 @@ class SerialLink:
             self._port = serial.Serial(self._path, self._baud, timeout=POLL, exclusive=True)
             self._bytes = Port(self._port.fileno())
         except _FAILURES as error:
-            raise DeviceError(self._device, f"cannot open {self._path}: {_reason(error)}") from None
+            locked = getattr(error, "errno", None) == errno.EWOULDBLOCK
+            reason = in_use(self._path) if locked else _reason(error)
+            raise DeviceError(self._device, f"cannot open {self._path}: {reason}") from None
 
     def read(self) -> Chunk | None:
         if self._bytes is None:

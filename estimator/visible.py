@@ -16,3 +16,14 @@ def visible(text: str) -> str:
 
 def _escape(character: str) -> str:
     return character.encode("unicode_escape", "surrogatepass").decode("ascii")
+
+
+def writable(text: str) -> str:
+    """The text as UTF-8 can hold it: bytes of a name or an argument that are none stand as escapes,
+    such as `\\udcff`.
+    """
+    try:
+        text.encode()
+        return text
+    except UnicodeEncodeError:
+        return "".join(_escape(c) if "\ud800" <= c <= "\udfff" else c for c in text)

@@ -16,15 +16,22 @@ from typing import Any
 
 import numpy as np
 
+from gritd.estimator.config.names import is_file_name
 from gritd.estimator.config.settings import Settings
 from gritd.estimator.filter.bank import Bank
-from gritd.estimator.filter.estimate import STATES, Estimate, Vector, made
+from gritd.estimator.filter.bounds import Bounds
+from gritd.estimator.filter.estimate import STATES, Estimate, Vector, covariance, made
 from gritd.estimator.filter.tracker import Tracker
 from gritd.estimator.filter.tuning import FORM
 from gritd.estimator.online.bed import Known, Start, after_run, before_run, fingerprint
 
 FILE = "bed.json"
 DATE = "%Y-%m-%d %H:%M:%S UTC"
+UNNAMED = "unnamed"  # a bed begun in the place of one that cannot be read
+FARTHEST = 30.0  # [σ of the prior] that a run may move an error that all runs share
+WIDEST = 1.01  # a run widens none of them but by rounding
+LATEST = 1e10  # [s since the epoch], in the year 2286
+MOST_RUNS = 10**6
 
 
 class BedError(Exception):
@@ -59,7 +66,7 @@ def load(folder: Path) -> Bed | None:
         return None
     except OSError as error:
         raise BedError(f"{path}: {(error.strerror or 'cannot read').lower()}") from None
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ArithmeticError, ValueError, LookupError, TypeError, RecursionError):
         raise BedError(f"{path}: is no file of a bed; `gritd bed new NAME` begins one") from None
 
 
@@ -117,16 +124,54 @@ def current(folder: Path, settings: Settings, now: float) -> Bed | None:
     return bed
 
 
+def anew(folder: Path, settings: Settings, now: float) -> Bed:
+    """A new bed in the place of one that cannot be used, on disk if that is possible."""
+    name = settings.bed.name or UNNAMED
+    try:
+        return begin(folder, name, now)
+    except BedError:  # it is tried again at the end of the run
+        return Bed(name, now)
+
+
 def useless(bed: Bed, settings: Settings, now: float) -> str:
     """Why a run on the bed begins with the stated prior; '' where it begins with what is known."""
     if bed.known is None:
         return "no run on it yet"
     age = now - bed.updated
-    if age > settings.bed.stale_after:
-        return f"its last run was {age / 3600.0:.0f} h ago"
+    if abs(age) > settings.bed.stale_after:
+        hours = f"{abs(age) / 3600.0:.0f} h"
+        return f"its last run was {hours} ago" if age > 0.0 else f"its last run is {hours} ahead"
     if bed.rig != fingerprint(settings):
         return "prior, calibration, filter or effects have changed since"
+    return _impossible(bed.known.bank, settings)
+
+
+def _impossible(bank: Bank, settings: Settings) -> str:
+    """What of a bank no run can have left by these settings; '' for nothing."""
+    prior = Tracker(settings).prior_bank
+    if [len(member.x) for member in bank] != [len(member.x) for member in prior]:
+        return "it holds other quantities than this filter"
+
+    mean, sigma = prior[0].x[:STATES], np.sqrt(np.diag(covariance(prior[0]))[:STATES])
+    bounds = Bounds(settings, mean, tuple(sigma.tolist()))
+    if any(bounds.inside(member).x != member.x for member in bank):
+        return "it holds a soil outside the bounds of the filter"
+    if not all(map(_believable, bank, prior)):
+        return "it holds values that the prior excludes"
     return ""
+
+
+def _believable(member: Estimate, prior: Estimate) -> bool:
+    """Whether a run may have left it: no error that all runs share is far from its prior or known
+    less well than there, and nothing of the soil is exact.
+    """
+    variance, before = np.diag(covariance(member)), np.diag(covariance(prior))
+    moved = np.abs(np.array(member.x) - np.array(prior.x))[STATES:]
+    soil = bool(np.all(variance[:STATES] > 0.0))
+    return soil and bool(
+        np.all(moved <= FARTHEST * np.sqrt(before[STATES:]))
+        and np.all(variance[STATES:] <= WIDEST * before[STATES:])
+    )
 
 
 def start_of(bed: Bed, settings: Settings, now: float) -> Start | None:
@@ -164,9 +209,14 @@ def _plain(bed: Bed) -> dict[str, Any]:
 
 def _read(plain: Mapping[str, Any]) -> Bed:
     """Raises ValueError, KeyError, TypeError where it is no bed."""
-    bed = Bed(str(plain["name"]), float(plain["updated"]), None, str(plain["rig"]))
+    (updated,) = _vector([plain["updated"]])
+    bed = Bed(str(plain["name"]), updated, None, str(plain["rig"]))
+    if not is_file_name(bed.name) or not 0.0 <= updated <= LATEST:
+        raise ValueError("no name or time of a bed")
     if "runs" not in plain:
         return bed
+    if not 1 <= int(plain["runs"]) <= MOST_RUNS:
+        raise ValueError("no number of runs")
     bank = tuple([_member(member) for member in plain["members"]])
     if len(bank) != len(FORM.sizes) or len({len(member.x) for member in bank}) != 1:
         raise ValueError("not what a run leaves")

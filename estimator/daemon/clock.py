@@ -18,6 +18,17 @@ BELIEVED = (datetime(2020, 1, 1, tzinfo=UTC), datetime(2037, 1, 1, tzinfo=UTC))
 FALLBACK = datetime(2000, 1, 1, tzinfo=UTC)
 
 
+LAST = 2**63 - 1  # [ns] 11 April 2262: the system tells no later time in nanoseconds
+
+
+def wall_ns() -> int:
+    """The wall clock [ns since the epoch]; LAST where it is later than that."""
+    try:
+        return time.time_ns()
+    except OverflowError:
+        return LAST
+
+
 class Clock:
     """Never steps. `wall_offset` tells how far the wall clock is away from it.
 
@@ -25,7 +36,7 @@ class Clock:
     """
 
     def __init__(self) -> None:
-        wall = time.time_ns()
+        wall = wall_ns()
         believed = _ns(BELIEVED[0]) <= wall < _ns(BELIEVED[1])
         self.notice = "" if believed else _notice(wall)
         self._origin = wall - time.monotonic_ns() if believed else _ns(FALLBACK)
@@ -38,7 +49,7 @@ class Clock:
         """Wall clock minus this clock [s]. Where the wall clock was believed, 0 until somebody sets
         it.
         """
-        return (time.time_ns() - self.now()) * 1e-9
+        return (wall_ns() - self.now()) * 1e-9
 
     def sleep_until(self, deadline: int) -> None:
         """Return at or after the deadline [ns]; at once if it has passed."""

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gritd.estimator.visible import writable
+
 Field = tuple[str, str, str]  # name, ROS type, what it is and its unit
 Values = Sequence[Any]
 Rows = NDArray[np.void]  # structured
@@ -229,7 +231,7 @@ def _layout(codes: Sequence[str]) -> tuple[str, list[int], int]:
 
 def _encode_one(code: str, value: Any, position: int) -> bytes:
     if code == "s":
-        text = str(value).encode() + b"\0"
+        text: bytes = writable(str(value)).encode() + b"\0"
         return b"\0" * (-position % 4) + struct.pack("<I", len(text)) + text
     return b"\0" * (-position % struct.calcsize("<" + code)) + struct.pack("<" + code, value)
 

@@ -9,6 +9,8 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
+from gritd.estimator.visible import writable
+
 CONFIG, RUN, RECOVERED = "gritd.config", "gritd.run", "gritd.recovered"
 TICK_REVISION = "tick_revision"  # entry of CONFIG: messages.tick.REVISION of what computed /tick
 CHECKSUM = "crc32"
@@ -18,7 +20,7 @@ def sealed(name: str, entries: Mapping[str, str]) -> dict[str, str]:
     """A metadata record's entries and their checksum: MCAP has none, and a flipped bit must not
     pass for a setting.
     """
-    kept = {key: value for key, value in entries.items() if key != CHECKSUM}
+    kept = {key: writable(value) for key, value in entries.items() if key != CHECKSUM}
     return {**kept, CHECKSUM: _checksum(name, kept)}
 
 

@@ -195,7 +195,7 @@ def _unpacked(
     """The blocks' records, as far as they unpack; and (number of the block, entries) of every
     message index, none where one cannot be read.
     """
-    origin = blocks[0].start
+    origin = min(block.start for block in blocks)  # an index may list them in any order
     reach = max(max(b.start + b.stored, b.index[1]) for b in blocks) - origin
     if reach > 2 * max(int(limits().chunk), REACH):
         return [], []
@@ -210,6 +210,8 @@ def _unpacked(
             break
         contents.append(content)
         while first < end:
+            if first + _INDEX_HEAD > end:
+                return contents, []
             after = first + RECORD_HEAD.size + RECORD_HEAD.unpack_from(packed, first)[1]
             if after > end:
                 return contents, []

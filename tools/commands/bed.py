@@ -12,6 +12,7 @@ from gritd.config import packaged
 from gritd.estimator.config.configuration import load
 from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import Bed, BedError
+from gritd.estimator.daemon.clock import NS, wall_ns
 from gritd.estimator.filter.estimate import KPA, TAN_PHI, C
 from gritd.tools.cli.command import DONE, FAILED, CommandError, Parser, file_name
 
@@ -23,7 +24,7 @@ def main(argv: Sequence[str]) -> int:
     try:
         if arguments.what == "new":
             folder.mkdir(parents=True, exist_ok=True)
-            bed: Bed | None = bed_file.begin(folder, arguments.name, time.time())
+            bed: Bed | None = bed_file.begin(folder, arguments.name, wall_ns() / NS)
         else:
             bed = bed_file.load(folder)
     except (BedError, OSError) as error:

@@ -86,7 +86,7 @@ def _earlier(path: Path) -> Mapping[str, Any]:
             raise KeyError("redo.files")
     except FileNotFoundError:
         raise CommandError(f"{path}: found no such file; expected a reference", USAGE) from None
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise CommandError(
             f"{path}: found no diagnosis; expected recordings or the JSON of `gritd diagnose`",
             DAMAGED,

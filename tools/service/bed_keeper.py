@@ -4,13 +4,13 @@ it.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gritd.estimator.config.settings import Settings, settings_of_run
 from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import Bed, BedError
+from gritd.estimator.daemon.clock import NS, wall_ns
 from gritd.estimator.daemon.daemon import Daemon
 from gritd.estimator.filter.reasons import withheld
 from gritd.estimator.messages.run_info import RunInfo
@@ -25,6 +25,7 @@ class BedOfRun:
     bed: Bed
     settings: Settings  # of the run
     began: float  # [s since the epoch]
+    trouble: str = ""  # why the bed that was there is not used: one line
 
     @property
     def start(self) -> Start | None:
@@ -37,6 +38,8 @@ class BedOfRun:
 
     def announced(self) -> str:
         """What the run begins with, in a line."""
+        if self.trouble:
+            return f"{self.trouble}; the run begins with the stated prior"
         reason = bed_file.useless(self.bed, self.settings, self.began)
         if reason:
             return f"bed {self.bed.name!r}: begins with the stated prior: {reason}"
@@ -49,7 +52,7 @@ class BedOfRun:
 
         assert daemon.loop.left is not None
         after = bed_file.after(
-            self.bed, self.settings, daemon.loop.left.bank, self.began, time.time()
+            self.bed, self.settings, daemon.loop.left.bank, self.began, wall_ns() / NS
         )
 
         try:
@@ -70,9 +73,13 @@ class BedOfRun:
 
 
 def bed_of_run(folder: Path, settings: Settings, run: RunInfo) -> BedOfRun | None:
-    """The bed in the bin, or None. Raises BedError."""
-    now = time.time()
-    bed = bed_file.current(folder, settings, now)
+    """The bed in the bin, or None. One that cannot be used is put aside."""
+    now = wall_ns() / NS
+    bed: Bed | None
+    try:
+        bed, trouble = bed_file.current(folder, settings, now), ""
+    except BedError as error:
+        bed, trouble = bed_file.anew(folder, settings, now), str(error)
     if bed is None:
         return None
-    return BedOfRun(folder, bed, settings_of_run(settings, run), now)
+    return BedOfRun(folder, bed, settings_of_run(settings, run), now, trouble)

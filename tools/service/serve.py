@@ -10,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from gritd.drivers.build import build_readers
+from gritd.drivers.build import build_readers, check_free
 from gritd.drivers.queue import ReadingQueue
 from gritd.drivers.recorded import Playback
 from gritd.estimator.config.configuration import Configuration
@@ -72,6 +72,8 @@ def _serve(configuration: Configuration, service: Service) -> int:
     taps = Taps(service.tap, settings) if service.tap else None
     playback = playback_of(service.from_tap, settings, clock.now) if service.from_tap else None
     tap_of = taps.writers.__getitem__ if taps else _no_tap
+    if playback is None:
+        check_free(settings)
     readers = build_readers(settings, clock.now, queue, tap_of, playback)
 
     for rescued in sweep(service.folder):

@@ -1,4 +1,4 @@
-"""A port belongs to one process: a lock on its device file, as pyserial has it, and who holds it."""
+"""A port belongs to one process: a lock on its device file, as pyserial has it; who holds it."""
 
 from __future__ import annotations
 

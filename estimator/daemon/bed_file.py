@@ -8,7 +8,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import stat
 import time
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,18 +20,30 @@ import numpy as np
 
 from gritd.estimator.config.names import is_file_name
 from gritd.estimator.config.settings import Settings
-from gritd.estimator.filter.bank import Bank
+from gritd.estimator.filter.bank import Bank, told
 from gritd.estimator.filter.bounds import Bounds
 from gritd.estimator.filter.estimate import STATES, Estimate, Vector, covariance, made
 from gritd.estimator.filter.tracker import Tracker
-from gritd.estimator.filter.tuning import FORM
-from gritd.estimator.online.bed import Known, Start, after_run, before_run, fingerprint
+from gritd.estimator.filter.tuning import FORM, TRUST
+from gritd.estimator.online.bed import (
+    Known,
+    Start,
+    after_run,
+    before_run,
+    fingerprint,
+    variances_of,
+)
+from gritd.estimator.terramechanics.soil import Array
 
 FILE = "bed.json"
 DATE = "%Y-%m-%d %H:%M:%S UTC"
+SEAL = "crc32"  # entry: of all the others
+MAX_BYTES = 1 << 20  # a bed takes a hundredth of it
 UNNAMED = "unnamed"  # a bed begun in the place of one that cannot be read
-FARTHEST = 30.0  # [σ of the prior] that a run may move an error that all runs share
-WIDEST = 1.01  # a run widens none of them but by rounding
+# [σ of the prior] that an error which all runs share may be off. The filter finds truths up to
+# ten σ off its prior (TrustTuning.doubt); beyond, it sets itself back, and the run adds nothing.
+FARTHEST = 10.0
+ROUNDING = 1e-6  # relative; no measurement widens what is known of a shared error
 LATEST = 1e10  # [s since the epoch], in the year 2286
 MOST_RUNS = 10**6
 
@@ -61,12 +75,12 @@ def load(folder: Path) -> Bed | None:
     """The bed in the bin; None where none was named. Raises BedError."""
     path = path_of(folder)
     try:
-        return _read(json.loads(path.read_text(encoding="utf-8")))
+        return _read(_unsealed(json.loads(_text(path))))
     except FileNotFoundError:
         return None
     except OSError as error:
         raise BedError(f"{path}: {(error.strerror or 'cannot read').lower()}") from None
-    except (ArithmeticError, ValueError, LookupError, TypeError, RecursionError):
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         raise BedError(f"{path}: is no file of a bed; `gritd bed new NAME` begins one") from None
 
 
@@ -77,7 +91,7 @@ def save(folder: Path, bed: Bed) -> None:
 
     try:
         with new.open("w", encoding="utf-8") as file:
-            json.dump(_plain(bed), file, indent=1)
+            json.dump(_sealed(_plain(bed)), file, indent=1)
             file.write("\n")
             file.flush()
             os.fsync(file.fileno())
@@ -156,22 +170,33 @@ def _impossible(bank: Bank, settings: Settings) -> str:
     bounds = Bounds(settings, mean, tuple(sigma.tolist()))
     if any(bounds.inside(member).x != member.x for member in bank):
         return "it holds a soil outside the bounds of the filter"
-    if not all(map(_believable, bank, prior)):
-        return "it holds values that the prior excludes"
+    preparation = np.array(variances_of(settings.bed.repeatability))
+    if not all(map(_narrower, bank, prior)) or not _credible(told(bank), prior[-1], preparation):
+        return "it holds values that no run leaves"
     return ""
 
 
-def _believable(member: Estimate, prior: Estimate) -> bool:
-    """Whether a run may have left it: no error that all runs share is far from its prior or known
-    less well than there, and nothing of the soil is exact.
+def _narrower(member: Estimate, prior: Estimate) -> bool:
+    """Whether a run may have left its σ: nothing of the soil is exact, and no error that all runs
+    share is known less well than before any run.
     """
     variance, before = np.diag(covariance(member)), np.diag(covariance(prior))
-    moved = np.abs(np.array(member.x) - np.array(prior.x))[STATES:]
-    soil = bool(np.all(variance[:STATES] > 0.0))
-    return soil and bool(
-        np.all(moved <= FARTHEST * np.sqrt(before[STATES:]))
-        and np.all(variance[STATES:] <= WIDEST * before[STATES:])
-    )
+    exact = np.any(variance[:STATES] <= 0.0)
+    return not exact and bool(np.all((variance <= before * (1.0 + ROUNDING))[STATES:]))
+
+
+def _credible(known: Estimate, prior: Estimate, preparation: Array) -> bool:
+    """Whether what all members say together is what the filter itself would believe: soil no wider
+    than TrustTuning.wider allows, no shared error farther from its prior than the filter goes. (A
+    single member that does not fit the record takes errors of any size, and counts nothing.)
+
+    preparation: variances (3,).
+    """
+    variance, before = np.diag(covariance(known)), np.diag(covariance(prior))
+    widest = TRUST.wider**2 * before[:STATES] + preparation
+    off = np.abs(np.array(known.x) - np.array(prior.x))
+    near = off <= FARTHEST * np.sqrt(before) * (1.0 + ROUNDING)
+    return bool(np.all(variance[:STATES] <= widest) and np.all(near[STATES:]))
 
 
 def start_of(bed: Bed, settings: Settings, now: float) -> Start | None:
@@ -207,11 +232,39 @@ def _plain(bed: Bed) -> dict[str, Any]:
     return plain
 
 
+def _text(path: Path) -> str:
+    """Of a regular file, without waiting for a pipe. Raises OSError, ValueError."""
+    with open(path, "rb", opener=_at_once) as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            raise ValueError("no regular file")
+        data = stream.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise ValueError("too long")
+    return data.decode()
+
+
+def _at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def _sealed(plain: Mapping[str, Any]) -> dict[str, Any]:
+    """With a checksum: a digit that changed on the disk must not pass for what a run knows."""
+    return {**plain, SEAL: zlib.crc32(json.dumps(plain).encode())}
+
+
+def _unsealed(sealed: dict[str, Any]) -> dict[str, Any]:
+    """Raises ValueError where it is not what was sealed."""
+    plain = {key: value for key, value in sealed.items() if key != SEAL}
+    if sealed != _sealed(plain):
+        raise ValueError("not what was written")
+    return plain
+
+
 def _read(plain: Mapping[str, Any]) -> Bed:
     """Raises ValueError, KeyError, TypeError where it is no bed."""
     (updated,) = _vector([plain["updated"]])
-    bed = Bed(str(plain["name"]), updated, None, str(plain["rig"]))
-    if not is_file_name(bed.name) or not 0.0 <= updated <= LATEST:
+    bed = Bed(plain["name"], updated, None, str(plain["rig"]))
+    if not bed.name or not is_file_name(bed.name) or not 0.0 <= updated <= LATEST:
         raise ValueError("no name or time of a bed")
     if "runs" not in plain:
         return bed

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+import time
+
+import pytest
 
 from gritd.estimator.daemon import bed_file
-from tests.scenarios.rig import driven, rows, service, verified
+from tests.scenarios.rig import (
+    TESTBED,
+    WIRES,
+    DaemonProcess,
+    Wires,
+    driven,
+    rows,
+    service,
+    verified,
+)
 
+BED = "bed file that cannot be, or of another time"
 UPDATES = 20  # more of them in every run; how many more, the computer's load decides
 
 
@@ -44,3 +58,62 @@ def sigma_after(daemon, updates):
     """σ of tan φ at the first tick with so many updates."""
     ticks = rows(daemon.path(), "/tick")
     return ticks["tan_phi_sigma"][ticks["updates"] >= updates][0]
+
+
+def test_a_bed_file_that_cannot_be(tmp_path, figure):
+    check(tmp_path, figure, ['{"name": "box", "updated": 17'])
+
+
+@pytest.mark.slow
+def test_every_bed_file_that_cannot_be(tmp_path, figure):
+    before = tmp_path / "before"
+    before.mkdir()
+    run(before, 0.0)
+    text = bed_file.path_of(before).read_text()
+    changed = [sealed_anew(text, **change) for change in CHANGES]
+    check(tmp_path, figure, [text[: len(text) // 2], "", text.replace("1", "2", 1), *changed])
+
+
+def check(folder, figure, contents):
+    """The run begins with the stated prior, and says so in one line."""
+    silent = [n for n, content in enumerate(contents) if not begins_anew(folder / str(n), content)]
+    figure(BED, WIRES, "files", len(contents))
+    figure(BED, WIRES, "not said in one line, or believed", len(silent), limit=0)
+
+
+MONTH = 30 * 86_400.0  # [s]
+CHANGES = (
+    {"c": 900e3},  # [kPa]
+    {"c": float("nan")},
+    {"variance": -1.0},
+    {"variance": 1e12},
+    {"age": MONTH},
+    {"age": -MONTH},
+)
+
+
+def sealed_anew(text, c=None, variance=None, age=None):
+    """A bed file with another value."""
+    plain = json.loads(text)
+    del plain[bed_file.SEAL]
+    for member in plain["members"]:
+        member["x"][0] = member["x"][0] if c is None else c
+        member["P"][0][0] = member["P"][0][0] if variance is None else variance
+    if age is not None:
+        plain["updated"] = time.time() - age
+    return json.dumps(bed_file._sealed(plain))
+
+
+def begins_anew(folder, content):
+    """Whether a run in the folder with this bed file tells of the stated prior, in one line, and
+    begins with it.
+    """
+    folder.mkdir()
+    bed_file.path_of(folder).write_text(content)
+    with Wires(folder, bed={"name": "box"}) as wires, DaemonProcess(wires.config) as daemon:
+        daemon.ready()
+        daemon.stop()
+    prior = TESTBED.settings.soil.cohesion
+    told = daemon.lines("begins with the stated prior")
+    first = rows(daemon.path(), "/tick")[0]
+    return len(told) == 1 and first["cohesion"] == prior.value and verified(daemon.path())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 import re
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -11,11 +13,12 @@ import pytest
 
 from gritd.estimator.messages.status import CHANNEL_BITS, Status
 from tests.drivers.rig import damage
-from tests.scenarios.rig import WIRES, driven, rows, service, verified
+from tests.scenarios.rig import ROOT, WIRES, driven, rows, service, verified
 
 ENCODERS = CHANNEL_BITS["wheel_encoder"] | CHANNEL_BITS["carriage_encoder"]
 UNPLUGGED = "device unplugged and back"
 GARBAGE = "serial garbage, bad CRC, truncated frame"
+SHARED = "second daemon on a port of the first"
 
 
 def unplug_and_back(wires, daemon, rng, cycles):
@@ -116,3 +119,41 @@ def counted(daemon, *names):
     """Counters of the encoders' device, from the daemon's own account."""
     line = [line for _, line in daemon.said if line.startswith("device encoders: ")][-1]
     return [int(re.search(rf"(\d+) {name}", line).group(1)) for name in names]
+
+
+def another(config, folder, *options):
+    """A second daemon on the same devices, with logs of its own: exit code and what it said."""
+    done = subprocess.run(
+        [sys.executable, "-m", "gritd", "run", "--config", config, "--directory", folder, *options],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_two_daemons_on_one_adapter(tmp_path, figure):
+    """The second is refused, with the name of the first, which loses nothing."""
+    (tmp_path / "wires").mkdir()
+    with service(tmp_path / "wires", driven(9.0, 1, skip=1.0), bus="slcan") as (wires, daemon):
+        daemon.wait_status(lambda report: report["status"] == "TRACKING")
+        refused = [another(wires.config, tmp_path / str(n)) for n in range(3)]
+        wires.finish()
+        daemon.wait_status(lambda report: report["queue"]["queued"] == 0)
+        lost = wires.bus.lost + wires.encoders.lost
+        daemon.stop()
+
+    silent = [said for said in refused if not refuses(*said, daemon.pid)]
+    assert not silent, silent
+    bad, gone = counted(daemon, "bad", "lost")
+    bus = [line for _, line in daemon.said if line.startswith("device bus: ")][-1]
+    for words in ("bad", "lost"):
+        lost += int(re.search(rf"(\d+) {words}", bus).group(1))
+    figure(
+        SHARED, WIRES, "second daemons not refused with the name of the first", len(silent), limit=0
+    )
+    figure(SHARED, WIRES, "frames of the first that were lost", lost + bad + gone, "", 0)
+    assert verified(daemon.path())
+
+
+def refuses(code, said, holder):
+    """One line that names who has the port."""
+    return code == 1 and said.count("\n") == 1 and f"in use by process {holder} (" in said

@@ -59,7 +59,7 @@ ROWS = (
     "one wrong stamp of a device clock",
     "step of a device clock",
     "random histories of a device clock",
-    "wall clock in 1901, 1970, 2040, 2200",
+    "wall clock in 1901, 1970, 2040, 2200, 2603",
     "message that cannot be written",
     "recording that unpacks to a thousand times its size",
     "last reading a day, fifty years later",
@@ -87,6 +87,15 @@ ROWS = (
     "encoder silent while its counter wraps",
     "random counter of the wheel",
     "sensor frozen but for its last digit",
+    "second daemon on a port of the first",
+    "chunks in reverse order",
+    "names and notes that are no UTF-8",
+    "JSON nested 100,000 deep",
+    "wire logs of impossible times",
+    "DBC with impossible numbers, a pipe, a device",
+    "a file that is no DBC",
+    "recover of a cut recording",
+    "bed file that cannot be, or of another time",
 )
 
 Figure = dict[str, Any]

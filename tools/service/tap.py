@@ -25,6 +25,9 @@ from gritd.estimator.recording.topics import TOPICS, messages_of
 from gritd.tools.cli.command import DAMAGED, USAGE, CommandError
 from gritd.tools.cli.progress import Progress
 
+# [ns] a recording keeps seconds as int32, and a stamp may lie before its bytes
+EARLIEST, LATEST = 31_536_000 * 10**9, (2**31 - 86_400) * 10**9
+
 
 class Taps:
     """A wire log for every device, in a folder that is made where there is none.
@@ -138,6 +141,9 @@ def _merged(
 
     def counted(path: Path) -> Iterator[Chunk]:
         for chunk in read_wire(path):
+            if not EARLIEST <= chunk.received < LATEST:
+                found = f"bytes received at {chunk.received} ns"
+                raise CommandError(f"{path}: found {found}; expected from 1971 to 2038", DAMAGED)
             progress.advance(len(chunk.data))
             yield chunk
 

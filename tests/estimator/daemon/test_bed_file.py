@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from dataclasses import replace
 
 import pytest
@@ -11,6 +13,8 @@ from gritd.estimator.daemon import bed_file
 from gritd.estimator.daemon.bed_file import BedError
 from gritd.estimator.filter.estimate import covariance, made
 from gritd.estimator.filter.tracker import Tracker
+from gritd.estimator.messages.run_info import RunInfo
+from gritd.tools.service.bed_keeper import bed_of_run
 from tests.rig import SETTINGS
 
 DAY = 86400.0
@@ -74,21 +78,89 @@ def test_the_configured_name_begins_a_new_bed_and_the_old_one_keeps_its_file(tmp
     assert '"runs": 1' in kept.read_text()
 
 
-HEAD = '"name": "a", "updated": 0, "rig": "", "runs": 1'
-SQUARE = "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+def stored(folder, settings=SETTINGS, now=0.0):
+    """A bed after one run, on disk."""
+    bed = bed_file.after(bed_file.begin(folder, "a", 0.0), settings, learnt(settings), 0.0, now)
+    bed_file.save(folder, bed)
+    return bed_file.path_of(folder)
+
+
+def test_a_bed_from_the_future_is_stale_too(tmp_path):
+    limit = SETTINGS.bed.stale_after
+    stored(tmp_path, now=DAY)
+    bed = bed_file.load(tmp_path)
+    assert bed_file.useless(bed, SETTINGS, DAY - limit + 1.0) == ""
+    assert "ahead" in bed_file.useless(bed, SETTINGS, DAY - limit - 1.0)
+    assert bed_file.start_of(bed, SETTINGS, DAY - limit - 1.0) is None
+
+
+def test_what_is_no_bed_is_one_line(tmp_path):
+    path = stored(tmp_path)
+    good = path.read_bytes()
+    digits = [at for at, byte in enumerate(good) if byte in b"0123456789"]
+
+    cuts = [good[: len(good) * share // 20] for share in range(20)]
+    changed = [good[:at] + b"37"[good[at] == 51 :][:1] + good[at + 1 :] for at in digits[::97]]
+    unlike = [b"[]", b"{}", b"\xff", b"[" * 100_000, b'{"name": 1}', good * 2, bytes(2 << 20)]
+    for content in (*cuts, *changed, *unlike):
+        path.write_bytes(content)
+        with pytest.raises(BedError, match=r"bed\.json: is no file of a bed"):
+            bed_file.load(tmp_path)
+
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(BedError, match=r"bed\.json: is no file of a bed"):
+        bed_file.load(tmp_path)
+
+
+IMPOSSIBLE = {
+    "name": ["../../a", "a/b", "", 3, "\n"],
+    "updated": [-1.0, 1e300, float("nan"), float("inf"), "now", 10**400],
+    "runs": [0, -1, 10**9, 1e300, "many"],
+    "x.0": [900e3, -1.0, float("nan"), float("inf"), 1e300],
+    "x.1": [-0.5, 50.0],
+    "x.2": [3.0, 710.0],
+    "x.5": [1e6, float("inf"), 1e300],
+    "P.0.0": [-1.0, 0.0, float("nan"), 1e300],
+    "P.0.1": [1e3],
+    "P.5.5": [-1e-9, 1e3],
+    "log_evidence": [float("nan"), float("-inf"), "x"],
+}
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "[]",
-        "{}",
-        f'{{{HEAD}, "x": [1], "P": [[1]], "cross": [[]]}}',
-        f'{{{HEAD}, "x": [NaN, 1, 1], "P": {SQUARE}, "cross": [[], [], []]}}',
-    ],
+    ("key", "value"), [(key, value) for key, values in IMPOSSIBLE.items() for value in values]
 )
-def test_what_is_no_bed_is_one_line(tmp_path, text):
-    bed_file.path_of(tmp_path).write_text(text)
-    with pytest.raises(BedError, match=r"bed\.json: is no file of a bed"):
-        bed_file.load(tmp_path)
+def test_no_run_begins_with_what_no_run_left(tmp_path, key, value):
+    """Values of any kind, sealed anew: the stated prior instead."""
+    plain = json.loads(stored(tmp_path).read_text())
+    del plain[bed_file.SEAL]
+    name, *at = key.split(".")
+    for holder in [plain] if name in plain else plain["members"]:
+        put(holder, [name, *map(int, at)], value)
+    bed_file.path_of(tmp_path).write_text(json.dumps(bed_file._sealed(plain)))
+
+    try:
+        bed = bed_file.load(tmp_path)
+    except BedError as error:
+        assert "\n" not in str(error)
+    else:
+        assert bed_file.start_of(bed, SETTINGS, 0.0) is None
+        assert bed_file.useless(bed, SETTINGS, 0.0)
+
+
+def put(holder, path, value):
+    for key in path[:-1]:
+        holder = holder[key]
+    holder[path[-1]] = value
+
+
+def test_what_cannot_be_used_is_put_aside_and_the_run_says_so(tmp_path):
+    path = stored(tmp_path)
+    path.write_bytes(path.read_bytes()[:100])
+    bed = bed_of_run(tmp_path, SETTINGS, RunInfo("run"))
+    assert bed.start is None and "is no file of a bed" in bed.announced()
+    assert "stated prior" in bed.announced() and "\n" not in bed.announced()
+    (aside,) = tmp_path.glob("bed-unreadable-*.json")
+    assert len(aside.read_bytes()) == 100
+    assert bed_file.load(tmp_path).runs == 0
